@@ -1,0 +1,95 @@
+# Everything runs in .venv, which `make setup` builds from uv.lock; nothing else need be installed
+# but Python 3.11 or newer. Extra arguments: make test ARGS="-k wait".
+
+BIN := .venv/bin
+STAMP := .venv/.set-up
+ARGS :=
+
+# The lock names the public index wherever it is made; certificates and proxies are the user's.
+UV_LOCK := env -u UV_DEFAULT_INDEX -u UV_INDEX -u UV_INDEX_URL -u UV_EXTRA_INDEX_URL \
+	-u UV_FIND_LINKS .tools/uv lock --default-index https://pypi.org/simple \
+	--no-config --no-python-downloads
+
+# Whatever environment the calling shell is in, this project uses its own.
+unexport VIRTUAL_ENV PYTHONHOME PYTHONPATH PYTHONSAFEPATH UV_PROJECT UV_WORKING_DIR
+
+# A shell fragment that puts the first Python that is new enough into $$python.
+define find_python
+for python in $(PYTHON) python3 python3.14 python3.13 python3.12 python3.11 ""; do \
+	if [ -z "$$python" ]; then \
+		echo "no Python 3.11 or newer on PATH: try make PYTHON=/path/to/python3" >&2; exit 3; \
+	fi; \
+	if $$python -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then break; fi; \
+done
+endef
+
+.PHONY: help setup demo test check format generate lock clean
+.PHONY: check-lock check-format check-lint check-types check-floors check-specs check-generated
+
+help: ## list the targets
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' Makefile
+
+setup: $(STAMP) ## build .venv with everything, this project included
+	@:
+
+$(STAMP): pyproject.toml uv.lock tools/set_up.py
+	@$(find_python); exec $$python tools/set_up.py
+
+demo: setup ## show the product at work
+	@$(BIN)/modewright demo $(ARGS)
+
+test: export CI := true
+test: export HYPOTHESIS_PROFILE := ci
+test: export LC_ALL := C
+test: export MPLBACKEND := Agg
+test: export OMP_NUM_THREADS := 1
+test: export OPENBLAS_NUM_THREADS := 1
+test: export PYTHONHASHSEED := 0
+test: export PYTHONUTF8 := 1
+test: export TZ := UTC
+test: setup ## run the tests, the same way everywhere
+	$(BIN)/pytest -n 2 -q $(ARGS)
+
+check: check-lock check-format check-lint check-types ## run all checks
+check: check-floors check-specs check-generated
+
+check-lock: setup
+	@$(UV_LOCK) --check --quiet --offline --no-cache --python $(BIN)/python 2>/dev/null || \
+		{ echo "uv.lock does not fit pyproject.toml: make lock" >&2; exit 1; }
+
+check-format: setup
+	$(BIN)/ruff format --check .
+
+check-lint: setup
+	$(BIN)/ruff check .
+
+check-types: setup
+	$(BIN)/mypy
+
+check-floors: setup
+	$(BIN)/lint-imports --no-logo
+
+check-specs: setup
+	$(BIN)/modewright check --all
+
+check-generated: setup
+	$(BIN)/modewright generate --all --check
+
+format: setup ## format the code and repair what can be repaired
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+generate: setup ## write the generated C anew
+	$(BIN)/modewright generate --all $(ARGS)
+
+.tools/uv: tools/fetch_uv.py
+	@$(find_python); exec $$python tools/fetch_uv.py $@
+
+lock: .tools/uv ## pin the dependencies anew (ARGS=--upgrade for newer ones)
+	@$(find_python); settings=$$($$python tools/index_settings.py) || exit; eval "$$settings"; \
+	$(UV_LOCK) --python $$python $(ARGS)
+
+clean: ## remove .venv, fetched tools, caches and build products
+	rm -rf .venv .tools .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .hypothesis
+	rm -rf build dist *.egg-info
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,117 @@
+"""Build: generated C compiled with the flags under which its bits are defined (rule R7)."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from codegen.names import CNames
+from codegen.source import c_files, render
+from language.program import Program, Variable
+
+FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-fast-math", "-fno-math-errno")
+WARNINGS = ["-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wfloat-conversion", "-Wdouble-promotion", "-Wshadow", "-Wundef", "-Wstrict-prototypes", "-Wmissing-prototypes", "-Wcast-qual", "-Wswitch-default", "-Wswitch-enum", "-Wvla"]
+SECONDS = 120
+"""Longest compilation or run before it is given up."""
+
+
+class ToolMissing(Exception):
+    """A program that is needed is not installed; the message says how to get it."""
+
+
+class BuildError(Exception):
+    """Generated code does not compile or run: a defect of ours; the message is the compiler's."""
+
+
+@dataclass(frozen=True)
+class Observed:
+    """A variable that the executable writes after each tick: its name and its kind."""
+
+    name: str
+    kind: str
+
+
+def compiler() -> list[str]:
+    """Return the C compiler: `CC` if it is set, else cc, gcc or clang. Raises ToolMissing."""
+    wanted = shlex.split(os.environ.get("CC", ""))
+    for candidate in [wanted] if wanted else [["cc"], ["gcc"], ["clang"]]:
+        if shutil.which(candidate[0]):
+            return candidate
+    name = wanted[0] if wanted else "cc"
+    raise ToolMissing(f"the C compiler `{name}` is missing: apt-get install gcc libc6-dev")
+
+
+def observed(program: Program) -> tuple[Observed, ...]:
+    """Return what is compared after a tick: all that the instance carries."""
+    kinds = {"real": "real", "truth": "whole", "whole": "whole"}
+    return tuple(
+        Observed(variable.name, kinds[variable.type])
+        for variable in program.variables
+        if variable.name.partition(".")[0] not in ("work", "input", "is_new")
+    )
+
+
+def fed(program: Program) -> tuple[Variable, ...]:
+    """Return the inputs of a tick, the flags of new values among them."""
+    return tuple(
+        variable
+        for variable in program.variables
+        if variable.name.partition(".")[0] in ("input", "is_new")
+    )
+
+
+def write_harness(program: Program, folder: Path) -> list[Path]:
+    """Write the C files of a program and a main around them; return the sources to compile."""
+    files = c_files(program)
+    files["main.c"] = render("lockstep_main.c.jinja", _harness(program))
+    for name, text in files.items():
+        (folder / name).write_text(text)
+    return [folder / name for name in files if name.endswith(".c")]
+
+
+def compile_program(sources: Sequence[Path], target: Path, flags: Sequence[str] = FLAGS) -> None:
+    """Compile sources into an executable. Raises ToolMissing, BuildError."""
+    command = [*compiler(), *flags, *WARNINGS, "-Werror", *map(str, sources)]
+    done = subprocess.run(
+        [*command, "-lm", "-o", str(target)], capture_output=True, text=True, timeout=SECONDS
+    )
+    if done.returncode != 0:
+        raise BuildError(done.stderr.strip() or f"the compiler ended with {done.returncode}")
+
+
+@contextmanager
+def executable(program: Program, flags: Sequence[str] = FLAGS) -> Iterator[Path]:
+    """Give the compiled harness of a program, in a folder that goes away again."""
+    with tempfile.TemporaryDirectory(prefix="modewright-") as name:
+        folder = Path(name)
+        target = folder / "program"
+        compile_program(write_harness(program, folder), target, flags)
+        yield target
+
+
+def run_executable(target: Path, records: bytes) -> bytes:
+    """Run a harness on input records and return its output records. Raises BuildError."""
+    done = subprocess.run([str(target)], input=records, capture_output=True, timeout=SECONDS)
+    if done.returncode != 0:
+        raise BuildError(f"the compiled program ended with {done.returncode}")
+    return done.stdout
+
+
+def _harness(program: Program) -> Mapping[str, object]:
+    place = CNames(program)
+    inputs = [
+        {"place": place(v.name).replace("in->", "in."), "truth": v.type == "truth"}
+        for v in fed(program)
+    ]
+    fields = [
+        {"place": place(o.name).replace("self->", "self."), "kind": o.kind}
+        for o in observed(program)
+    ]
+    return {"name": program.name, "inputs": inputs, "fields": fields}

@@ -1,0 +1,80 @@
+"""Names: where each variable and constant of a Program lives in C, and as what type."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from language.program import Program, Variable, short
+
+UNSIGNED = ("timer.", "memory.fired", "memory.faults")
+
+
+@dataclass(frozen=True)
+class CNames:
+    """The C text of names inside one function: locals by their own name, the rest by group."""
+
+    program: Program
+    local: frozenset[str] = frozenset()
+
+    def __call__(self, name: str) -> str:
+        """Return the C text for a variable or constant."""
+        group, _, rest = name.partition(".")
+        member = c_member(name)
+        if name in self.local:
+            return member
+        match group:
+            case "constant":
+                return f"constant.{rest}"
+            case "solved":
+                return f"solved_{member}"
+            case "calibration":
+                return f"cal->{rest}"
+            case "input":
+                return f"in->{rest}"
+            case "is_new":
+                return f"in->is_new.{rest}"
+            case "work":
+                return f"work->{member}"
+            case "memory":
+                return f"self->{rest}"
+            case _:
+                return f"self->{group}.{rest}"
+
+    def whole(self, name: str, number: int) -> str:
+        """Return a number as it is written beside a variable: a mode by its name."""
+        if name == "memory.mode":
+            return mode_constant(self.program, number)
+        if name == "memory.run_mode":
+            return run_mode_constant(self.program, number)
+        return f"{number}U" if name.startswith(UNSIGNED) else str(number)
+
+
+def c_member(name: str) -> str:
+    """Return the name of a struct member or local: the name without its group."""
+    return short(name).replace(".", "_")
+
+
+def c_type(variable: Variable) -> str:
+    """Return the C type of a variable."""
+    if variable.type == "real":
+        return "double"
+    if variable.type == "truth":
+        return "bool"
+    if variable.name.startswith("timer."):
+        return "uint16_t"
+    if variable.name == "memory.faults":
+        return "uint32_t"
+    if variable.name == "memory.fired":
+        return "uint16_t"
+    return "int16_t" if variable.name.endswith("mode") else "int32_t"
+
+
+def mode_constant(program: Program, number: int) -> str:
+    """Return the name of a mode in C."""
+    return f"{program.name}_MODE_{program.mode_name(number)}"
+
+
+def run_mode_constant(program: Program, number: int) -> str:
+    """Return the name of a mode of the run in C."""
+    name = next(mode.name for mode in program.run_modes if mode.number == number)
+    return f"{program.name}_RUN_{name}"

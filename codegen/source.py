@@ -1,0 +1,233 @@
+"""Source: a sampled Program as C99 - header, source and the mathematics that they use."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from importlib import metadata, resources
+from typing import Any
+
+import jinja2
+
+from codegen.expression import literal
+from codegen.names import CNames, c_member, c_type, mode_constant, run_mode_constant
+from codegen.statement import Writer
+from codegen.usage import Usage, locals_of, usages
+from language.elementary import FUNCTIONS
+from language.printing import digest
+from language.program import Assign, Constant, Function, Program, Ref, Variable, short
+from language.wiring import reads
+
+GROUPS = ("state", "equation", "before", "innovation", "timer")
+"""Nested structs of the instance, in order."""
+ENTRIES = ("init", "derive", "step")
+INLINE = ("min", "max", "clip", "sign", "pow2")
+
+
+@dataclass(frozen=True)
+class Field:
+    """A member of a struct with its comment."""
+
+    type: str
+    name: str
+    comment: str
+    value: str = ""
+    size: int = 0
+
+
+def c_files(program: Program) -> dict[str, str]:
+    """Return the generated files of a sampled Program by name."""
+    if program.period is None:
+        raise ValueError(f"{program.name} is continuous: C is generated for sampled automata")
+    context = _context(program)
+    files = {
+        f"{program.name}.h": render("module.h.jinja", context),
+        f"{program.name}.c": render("module.c.jinja", context),
+    }
+    if context["uses_math"]:
+        files.update(math_files())
+    return files
+
+
+def math_files() -> dict[str, str]:
+    """Return ha_math: elementary functions whose bits do not depend on a library (rule R6)."""
+    functions = [_function(function) for function in FUNCTIONS.values()]
+    context = {"functions": functions, "version": version()}
+    return {
+        "ha_math.h": render("ha_math.h.jinja", context),
+        "ha_math.c": render("ha_math.c.jinja", context),
+    }
+
+
+def render(template: str, context: Mapping[str, Any]) -> str:
+    """Return a template filled in; a hole without a value is an error."""
+    folder = resources.files("codegen").joinpath("templates")
+    environment = jinja2.Environment(
+        loader=jinja2.FunctionLoader(lambda name: folder.joinpath(name).read_text("utf-8")),
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        autoescape=False,
+    )
+    return environment.get_template(template).render(context)
+
+
+def version() -> str:
+    """Return the version of the product."""
+    return metadata.version("modewright")
+
+
+def _context(program: Program) -> dict[str, Any]:
+    local = locals_of(program)
+    used = usages(program, local)
+    kinds = {variable.name: c_type(variable) for variable in program.variables}
+    called = {name.removeprefix("call ") for name in reads(program.blocks.values()) if " " in name}
+    shared = _work(program, local)
+    blocks = [_block(program, name, local[name], used, kinds) for name in _callees_first(program)]
+    return {
+        "name": program.name,
+        "guard": f"{program.name.upper()}_H",
+        "version": version(),
+        "digest": digest(program),
+        "period": f"{program.period} s",
+        "modes": [(mode_constant(program, mode.number), mode.number) for mode in program.modes],
+        "run_modes": [(run_mode_constant(program, m.number), m.number) for m in program.run_modes],
+        "faults": list(enumerate(program.faults)),
+        "transitions": program.transitions,
+        "calibration": [_constant(c) for c in program.constants if c.kind == "tunable"],
+        "derived": [_constant(c) for c in program.constants if c.kind == "derived"],
+        "constants": [_constant(c) for c in program.constants if c.name.startswith("constant.")],
+        "solved": [_constant(c) for c in program.constants if c.kind == "solved"],
+        "inputs": [_field(v) for v in program.inputs],
+        "is_new": [_field(v) for v in program.variables if v.name.startswith("is_new.")],
+        "groups": _groups(program),
+        "memory": [_field(v) for v in program.variables if v.name.startswith("memory.")],
+        "outputs": _outputs(program),
+        "work": [_field(variable) for variable in shared],
+        "blocks": [block for block in blocks if block["name"] not in ENTRIES],
+        "entries": {block["name"]: block for block in blocks if block["name"] in ENTRIES},
+        "uses_math": bool(called & {*FUNCTIONS, *INLINE}),
+        "uses_libm": bool(called & {"abs", "sqrt"}),
+    }
+
+
+def _field(variable: Variable) -> Field:
+    comment = variable.unit if variable.type == "real" else variable.about
+    if variable.type == "real" and variable.about:
+        comment = f"{variable.unit}; {variable.about}"
+    member = c_member(variable.name)
+    return Field(c_type(variable), member, comment, size=variable.size)
+
+
+def _constant(constant: Constant) -> Field:
+    comment = "; ".join(text for text in (constant.unit, constant.key) if text)
+    if constant.range:
+        low, high = constant.range
+        comment += f"; {low!r} to {high!r}"
+    return Field("double", c_member(constant.name), comment, literal(constant.value))
+
+
+def _groups(program: Program) -> list[tuple[str, list[Field]]]:
+    found = []
+    for group in GROUPS:
+        fields = [_field(v) for v in program.variables if v.name.startswith(f"{group}.")]
+        if fields:
+            found.append((group, fields))
+    return found
+
+
+def _outputs(program: Program) -> list[dict[str, str]]:
+    types = {"real": "double", "truth": "bool", "whole": "int16_t"}
+    place = CNames(program)
+    return [
+        {
+            "type": types[wire.type],
+            "name": wire.name,
+            "unit": wire.unit,
+            "source": place(wire.source),
+        }
+        for wire in program.outputs
+    ]
+
+
+def _work(program: Program, local: Mapping[str, Iterable[str]]) -> list[Variable]:
+    inside = {name for names in local.values() for name in names}
+    return [v for v in program.variables if v.name.startswith("work.") and v.name not in inside]
+
+
+def _block(
+    program: Program,
+    name: str,
+    local: frozenset[str],
+    used: Mapping[str, Usage],
+    kinds: Mapping[str, str],
+) -> dict[str, Any]:
+    place = CNames(program, local)
+    writer = Writer(program, used, local, place, kinds)
+    types = {
+        "self": f"{program.name}_Self",
+        "cal": f"{program.name}_Cal",
+        "in": f"{program.name}_In",
+        "work": "Work",
+    }
+    usage = used[name]
+    parameters = [
+        f"{'' if pointer in usage.writes else 'const '}{types[pointer]} *{pointer}"
+        for pointer in usage.parameters
+    ]
+    return {
+        "name": name,
+        "parameters": ", ".join(parameters) or "void",
+        "needs": usage.needs,
+        "lines": list(writer.lines(program.blocks[name])),
+    }
+
+
+def _callees_first(program: Program) -> list[str]:
+    """Return the blocks so that each comes after those that it runs: no prototypes needed."""
+    done: dict[str, None] = {}
+
+    def visit(name: str) -> None:
+        if name in done:
+            return
+        for called in _runs(program, name):
+            visit(called)
+        done[name] = None
+
+    for name in program.blocks:
+        visit(name)
+    return list(done)
+
+
+def _runs(program: Program, name: str) -> list[str]:
+    from language.program import Run
+    from language.wiring import walk
+
+    return [op.block for op in walk(program.blocks[name]) if isinstance(op, Run)]
+
+
+class _FunctionNames:
+    """Inside a function of ha_math every variable is a local."""
+
+    def __call__(self, name: str) -> str:
+        return short(name)
+
+    def whole(self, name: str, number: int) -> str:
+        return str(number)
+
+
+def _function(function: Function) -> dict[str, Any]:
+    from codegen.expression import c_expression
+
+    place = _FunctionNames()
+    lines = []
+    for op in function.body:
+        assert isinstance(op, Assign)
+        text = c_expression(op.value, place)
+        last = op.target == "work.y"
+        lines.append(f"return {text};" if last else f"const double {place(op.target)} = {text};")
+    return {"name": function.name, "about": function.about, "lines": lines}
+
+
+__all__ = ["Ref", "c_files", "math_files", "render", "version"]

@@ -1,0 +1,144 @@
+"""Statement: the operations of a block as lines of C99."""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from codegen.expression import Place, c_expression
+from codegen.usage import Usage
+from language.program import (
+    Assign,
+    Block,
+    Branch,
+    Choose,
+    Count,
+    FaultBit,
+    Loop,
+    Op,
+    Program,
+    Run,
+    Store,
+    Value,
+    short,
+)
+
+INDENT = "    "
+WIDTH = 100
+"""Longest line of generated C; longer expressions are broken at a sum or a blank."""
+
+
+@dataclass(frozen=True)
+class Writer:
+    """What is needed to print one block."""
+
+    program: Program
+    usages: Mapping[str, Usage]
+    local: frozenset[str]
+    place: Place
+    types: Mapping[str, str]
+
+    def lines(self, block: Block, depth: int = 1) -> Iterator[str]:
+        """Yield the lines of a block."""
+        for op in block:
+            for line in self._op(op):
+                yield (INDENT * depth + line) if line else ""
+
+    def _op(self, op: Op) -> Iterator[str]:
+        match op:
+            case Assign(target, value, key):
+                yield from self._assign(target, c_expression(value, self.place), value, key)
+            case Store(array, index, value):
+                left = f"{self.place(array)}[{c_expression(index, self.place)}]"
+                yield from _wrapped(f"{left} = ", c_expression(value, self.place), "")
+            case Branch(condition, then, other):
+                yield from self._branch(condition, then, other)
+            case Choose(selector, cases):
+                yield from self._choose(selector, cases)
+            case Loop(count, index, body):
+                name = short(index)
+                yield f"for (int32_t {name} = 0; {name} < {count}; {name}++) {{"
+                yield from self.lines(body)
+                yield "}"
+            case Count(timer, condition, limit, key):
+                yield from self._count(self.place(timer), condition, limit, key)
+            case FaultBit(fault):
+                yield f"self->faults |= {self.program.name}_FAULT_{fault};"
+            case Run(name):
+                yield f"{name}({', '.join(self.usages[name].parameters)});"
+
+    def _assign(self, target: str, text: str, value: object, key: str) -> Iterator[str]:
+        if isinstance(value, Value) and type(value.value) is int:
+            text = self.place.whole(target, value.value)
+        declared = f"const {self.types[target]} " if target in self.local else ""
+        yield from _wrapped(f"{declared}{self.place(target)} = ", text, key)
+
+    def _branch(self, condition: object, then: Block, other: Block) -> Iterator[str]:
+        test = c_expression(condition, self.place)  # type: ignore[arg-type]
+        yield f"if ({test}) {{"
+        yield from self.lines(then)
+        while len(other) == 1 and isinstance(other[0], Branch):
+            inner = other[0]
+            yield f"}} else if ({c_expression(inner.condition, self.place)}) {{"
+            yield from self.lines(inner.then)
+            other = inner.other
+        if other:
+            yield "} else {"
+            yield from self.lines(other)
+        yield "}"
+
+    def _choose(self, selector: str, cases: tuple[tuple[int, Block], ...]) -> Iterator[str]:
+        yield f"switch ({self.place(selector)}) {{"
+        for number, block in cases:
+            yield f"case {self.place.whole(selector, number)}:"
+            yield from self.lines(block)
+            yield f"{INDENT}break;"
+        yield "default:"
+        yield f"{INDENT}break;"
+        yield "}"
+
+    def _count(self, timer: str, condition: object, limit: int, key: str) -> Iterator[str]:
+        test = c_expression(condition, self.place)  # type: ignore[arg-type]
+        yield f"if ({test}) {{{_comment(key)}"
+        yield f"{INDENT}if ({timer} < {limit}U) {{"
+        yield f"{INDENT * 2}{timer}++;"
+        yield f"{INDENT}}}"
+        yield "} else {"
+        yield f"{INDENT}{timer} = 0U;"
+        yield "}"
+
+
+def _comment(key: str) -> str:
+    return f" /* {key} */" if key else ""
+
+
+def _wrapped(left: str, text: str, key: str) -> Iterator[str]:
+    """Yield `left text;` with the key path cited, broken before operators where it is too long."""
+    comment = _comment(key)
+    if len(left) + len(text) + len(comment) <= WIDTH:
+        yield f"{left}{text};{comment}"
+        return
+    if key:
+        yield f"/* {key} */"
+    if len(left) + len(text) <= WIDTH:
+        yield f"{left}{text};"
+        return
+    pieces = textwrap.wrap(
+        re.sub(r" ([*/?:]|[<>=!]=?|&&) ", "\1\\g<1>\1", text)
+        .replace(" + ", " +\1")
+        .replace(" - ", " -\1"),
+        width=WIDTH - 2 * len(INDENT),
+        initial_indent="",
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    joined = "\n".join(pieces).replace("\1", " ")
+    first, *rest = joined.split("\n")
+    lines = (
+        [f"{left}{first}"] if len(left) + len(first) <= WIDTH else [left.rstrip(), INDENT + first]
+    )
+    lines += [INDENT + line for line in rest]
+    lines[-1] += ";"
+    yield from (line.rstrip() for line in lines)

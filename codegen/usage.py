@@ -1,0 +1,158 @@
+"""Usage: what each block of a Program reads and writes, directly and through the blocks it runs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from language.program import (
+    Assign,
+    Block,
+    Branch,
+    Choose,
+    Count,
+    FaultBit,
+    Loop,
+    Program,
+    Run,
+    Store,
+)
+from language.wiring import expr_names, walk
+
+GROUP_OF = {
+    "input": "in",
+    "is_new": "in",
+    "calibration": "cal",
+    "work": "work",
+    "state": "self",
+    "equation": "self",
+    "before": "self",
+    "innovation": "self",
+    "timer": "self",
+    "memory": "self",
+    "derived": "self",
+}
+ORDER = ("self", "cal", "in", "work")
+
+
+@dataclass(frozen=True)
+class Usage:
+    """The pointers that a block needs, and those through which it writes."""
+
+    needs: frozenset[str]
+    writes: frozenset[str]
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """The pointers in the order in which functions take them."""
+        return tuple(name for name in ORDER if name in self.needs)
+
+
+def usages(program: Program, local: Mapping[str, frozenset[str]]) -> dict[str, Usage]:
+    """Return the usage of every block; `local` are the variables that live inside a block."""
+    found: dict[str, Usage] = {}
+
+    def visit(name: str) -> Usage:
+        if name not in found:
+            read = {n for n in block_reads(program.blocks[name]) if n not in local[name]}
+            written = {n for n in block_writes(program.blocks[name]) if n not in local[name]}
+            needs = {GROUP_OF.get(n.partition(".")[0], "") for n in read | written} - {""}
+            writes = {GROUP_OF.get(n.partition(".")[0], "") for n in written} - {""}
+            for op in walk(program.blocks[name]):
+                if isinstance(op, Run):
+                    inner = visit(op.block)
+                    needs |= inner.needs
+                    writes |= inner.writes
+            found[name] = Usage(frozenset(needs), frozenset(writes))
+        return found[name]
+
+    for name in program.blocks:
+        visit(name)
+    return found
+
+
+def locals_of(program: Program) -> dict[str, frozenset[str]]:
+    """Return, per block, the work variables that live inside it: set once, then read there.
+
+    A variable that some block reads without having set it is shared by the blocks.
+    """
+    once = {name: _set_once(block) for name, block in program.blocks.items()}
+    shared = {variable.name for variable in program.variables if variable.size}
+    for name, block in program.blocks.items():
+        used = {n for n in (*block_reads(block), *block_writes(block)) if n.startswith("work.")}
+        shared |= used - once[name]
+    found = {}
+    for name, block in program.blocks.items():
+        loops = {op.index for op in walk(block) if isinstance(op, Loop)}
+        found[name] = frozenset((once[name] - shared) | loops)
+    return found
+
+
+def block_reads(block: Block) -> Iterator[str]:
+    """Yield the variables that a block reads."""
+    for op in walk(block):
+        match op:
+            case Assign(_, value, _):
+                yield from expr_names(value)
+            case Store(_, index, value):
+                yield from expr_names(index)
+                yield from expr_names(value)
+            case Branch(condition, _, _) | Count(_, condition, _, _):
+                yield from expr_names(condition)
+            case Choose(selector, _):
+                yield selector
+            case _:
+                pass
+
+
+def block_writes(block: Block) -> Iterator[str]:
+    """Yield the variables that a block writes."""
+    for op in walk(block):
+        match op:
+            case Assign(target, _, _):
+                yield target
+            case Store(array, _, _):
+                yield array
+            case Count(timer, _, _, _):
+                yield timer
+            case Loop(_, index, _):
+                yield index
+            case FaultBit():
+                yield "memory.faults"
+            case _:
+                pass
+
+
+def _set_once(block: Block) -> set[str]:
+    """Work variables assigned exactly once, and read only in the same list of operations."""
+    counts: dict[str, int] = {}
+    for op in walk(block):
+        if isinstance(op, Assign):
+            counts[op.target] = counts.get(op.target, 0) + 1
+    found: set[str] = set()
+    for ops in _lists(block):
+        for position, op in enumerate(ops):
+            if isinstance(op, Assign) and counts[op.target] == 1 and op.target.startswith("work."):
+                after = set(block_reads(ops[position + 1 :]))
+                before = set(block_reads(ops[: position + 1]))
+                outside = sum(1 for name in block_reads(block) if name == op.target)
+                inside = sum(1 for name in block_reads(ops) if name == op.target)
+                if op.target in after and op.target not in before and outside == inside:
+                    found.add(op.target)
+    return found
+
+
+def _lists(block: Block) -> Iterator[Block]:
+    yield block
+    for op in block:
+        match op:
+            case Branch(_, then, other):
+                yield from _lists(then)
+                yield from _lists(other)
+            case Choose(_, cases):
+                for _, case_block in cases:
+                    yield from _lists(case_block)
+            case Loop(_, _, body):
+                yield from _lists(body)
+            case _:
+                pass

@@ -1,0 +1,1 @@
+"""Interprets a Program: micro-steps, crossings, scenarios, trajectories."""

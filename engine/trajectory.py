@@ -1,0 +1,55 @@
+"""Trajectory: values over time with modes, and the events in between."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Values = NDArray[np.float64] | NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Event:
+    """A transition: time [s], micro-step at that instant, and what changed."""
+
+    time: float
+    micro_step: int
+    instance: str
+    transition: str
+    source: str
+    target: str
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Samples of signals (n_samples,) each, in SI, and all events up to `stopped`.
+
+    `signals` are keyed `instance.output`; modes are whole numbers, `modes` names them.
+    `stopped` says why the run ended before the horizon; None if it did not.
+    """
+
+    name: str
+    times: NDArray[np.float64]
+    signals: Mapping[str, Values]
+    units: Mapping[str, str]
+    modes: Mapping[str, Mapping[int, str]]
+    events: tuple[Event, ...]
+    stopped: str | None = None
+
+    def events_of(self, instance: str) -> tuple[Event, ...]:
+        """Return the events of one instance."""
+        return tuple(event for event in self.events if event.instance == instance)
+
+    def csv(self) -> str:
+        """Return the samples as CSV: a head line with units, shortest exact decimals."""
+        text = io.StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerow(["t [s]", *(f"{name} [{self.units[name]}]" for name in self.signals)])
+        columns = [values.tolist() for values in (self.times, *self.signals.values())]
+        writer.writerows(zip(*columns, strict=True))
+        return text.getvalue()

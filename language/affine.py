@@ -1,0 +1,110 @@
+"""Affine: the terms of a mode's rates that are linear in the states with constant coefficients."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from language.evaluate import Scalar, apply, divide, evaluate
+from language.matrix import Matrix
+from language.program import Assign, Binary, Block, Call, Expr, Ref, Select, Unary, Value
+
+
+@dataclass(frozen=True)
+class Affine:
+    """`sum(slopes) + constant`; the constant is None where there is anything else besides."""
+
+    slopes: Mapping[str, float] = field(default_factory=dict)
+    constant: float | None = None
+
+    @property
+    def is_constant(self) -> bool:
+        """Tell whether there is nothing but a known constant."""
+        return not self.slopes and self.constant is not None
+
+
+OTHER = Affine()
+"""Something that is not affine, or not known before the program runs."""
+
+
+def jacobian(rates: Block, states: tuple[str, ...], constants: Mapping[str, Scalar]) -> Matrix:
+    """Return A (n, n) of the terms of `work.rate_<state>` linear in `work.at_<state>`.
+
+    Entry i j in unit_i/(unit_j s). What is not linear, or has no constant coefficient, is left out.
+    """
+    known: dict[str, Affine] = {name: Affine({}, float(value)) for name, value in constants.items()}
+    known.update({f"work.at_{name}": Affine({name: 1.0}, 0.0) for name in states})
+    for op in rates:
+        assert isinstance(op, Assign)
+        known[op.target] = _affine(op.value, known)
+    rows = [known[f"work.rate_{name}"].slopes for name in states]
+    return tuple(tuple(row.get(column, 0.0) for column in states) for row in rows)
+
+
+def _affine(expr: Expr, known: Mapping[str, Affine]) -> Affine:
+    match expr:
+        case Value(bool()):
+            return OTHER
+        case Value(value):
+            return Affine({}, float(value))
+        case Ref(name):
+            return known.get(name, OTHER)
+        case Unary("-", operand):
+            return _scaled(_affine(operand, known), -1.0)
+        case Binary("+", left, right):
+            return _sum(_affine(left, known), _affine(right, known))
+        case Binary("-", left, right):
+            return _sum(_affine(left, known), _scaled(_affine(right, known), -1.0))
+        case Binary("*", left, right):
+            return _product(_affine(left, known), _affine(right, known))
+        case Binary("/", left, right):
+            return _quotient(_affine(left, known), _affine(right, known))
+        case Call(function, arguments):
+            parts = [_affine(argument, known) for argument in arguments]
+            if all(part.is_constant for part in parts):
+                values: list[Scalar] = [part.constant or 0.0 for part in parts]
+                return Affine({}, float(apply(function, values)))
+            return OTHER
+        case Select():
+            return _constant(expr, known)
+        case _:
+            return OTHER
+
+
+def _constant(expr: Expr, known: Mapping[str, Affine]) -> Affine:
+    values: dict[str, Scalar] = {}
+    for name, part in known.items():
+        if part.is_constant and part.constant is not None:
+            values[name] = part.constant
+    try:
+        return Affine({}, float(evaluate(expr, values)))
+    except (KeyError, TypeError):
+        return OTHER
+
+
+def _sum(a: Affine, b: Affine) -> Affine:
+    slopes = dict(a.slopes)
+    for name, slope in b.slopes.items():
+        slopes[name] = slopes.get(name, 0.0) + slope
+    unknown = a.constant is None or b.constant is None
+    return Affine(slopes, None if unknown else (a.constant or 0.0) + (b.constant or 0.0))
+
+
+def _scaled(a: Affine, factor: float) -> Affine:
+    slopes = {name: slope * factor for name, slope in a.slopes.items()}
+    return Affine(slopes, None if a.constant is None else a.constant * factor)
+
+
+def _product(a: Affine, b: Affine) -> Affine:
+    if a.is_constant and a.constant is not None:
+        return _scaled(b, a.constant)
+    if b.is_constant and b.constant is not None:
+        return _scaled(a, b.constant)
+    return OTHER
+
+
+def _quotient(a: Affine, b: Affine) -> Affine:
+    if not b.is_constant or b.constant is None:
+        return OTHER
+    slopes = {name: divide(slope, b.constant) for name, slope in a.slopes.items()}
+    return Affine(slopes, None if a.constant is None else divide(a.constant, b.constant))

@@ -1,0 +1,356 @@
+"""Automaton reader: an expanded document to an Automaton, all problems of form reported."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from fractions import Fraction
+from typing import cast
+
+from language.document import Document, Entry, Node, Scalar, Table
+from language.model import (
+    Automaton,
+    Balance,
+    Formula,
+    Input,
+    Kind,
+    Mode,
+    Parameter,
+    State,
+    Transition,
+)
+from language.observer import read_observer, read_run
+from language.overlay import lay, without
+from language.problem import Problems, SpecError, nearest
+from language.project import Project, expanded, read_document
+from language.reader import Reader
+from language.syntax import Application, Arithmetic, Name, Tree, parse_balance, walk
+from language.units import SECOND, Unit, fits, parse_unit
+
+COMMON_KEYS = ("language", "automaton", "parameters", "inputs", "states", "equations")
+LOGIC_KEYS = ("flow", "initial", "modes", "templates", "outputs")
+CLOCK_KEYS = ("period", "step", "numbers", "model")
+MODE_KEYS = ("number", "equations", "flow", "update", "observer", "runs", "transitions")
+TRANSITION_KEYS = ("to", "when", "wait", "priority", "reset")
+DEFAULT_STEP = Fraction(1, 1000)
+"""Major step of a continuous automaton that gives none."""
+
+Values = Mapping[str, Scalar]
+
+
+def read_automaton(document: Document, project: Project, values: Values | None = None) -> Automaton:
+    """Read an automaton or variant with some parameter values replaced. Raises SpecError."""
+    document = expanded(document, project)
+    problems = Problems()
+    if document.kind != "automaton":
+        label = f"`{document.name}` is a {document.kind}, not an automaton"
+        problems.error("form", document.name_span, label)
+    problems.stop_if_any()
+    tree, model = _with_model(document.root, project, values or {}, problems)
+    automaton = _AutomatonReader(problems).read(document, tree, model)
+    problems.stop_if_any()
+    return automaton
+
+
+def _with_model(
+    tree: Table, project: Project, values: Values, problems: Problems
+) -> tuple[Table, Automaton | None]:
+    """Apply values; parameters that the model has go to the model, the rest stays."""
+    node = tree.get("model")
+    own = _parameters(tree)
+    if not isinstance(node, Scalar):
+        return _set_values(tree, own, values, own, problems), None
+    base = expanded(read_document(project.path_of(node.text, node.span)), project)
+    theirs = _parameters(base.root)
+    shared = {key: entry for key, entry in own.entries.items() if key in theirs.entries}
+    laid = lay(theirs, Table(shared, own.span), problems, template=True)
+    known = Table({**theirs.entries, **own.entries}, own.span)
+    passed = {key: value for key, value in values.items() if key in theirs.entries}
+    kept = {key: value for key, value in values.items() if key not in passed}
+    root = _with(base.root, "parameters", laid)
+    changed = Document(base.kind, base.name, base.name_span, root, base.source)
+    model = read_automaton(changed, project, passed)
+    rest = without(own, *shared)
+    return _set_values(_with(tree, "parameters", rest), rest, kept, known, problems), model
+
+
+def _parameters(tree: Table) -> Table:
+    node = tree.get("parameters")
+    return node if isinstance(node, Table) else Table({}, tree.span)
+
+
+def _with(tree: Table, key: str, node: Node) -> Table:
+    span = tree.entries[key].span if key in tree.entries else tree.span
+    return Table({**tree.entries, key: Entry(key, span, node)}, tree.span)
+
+
+def _set_values(
+    tree: Table, parameters: Table, values: Values, known: Table, problems: Problems
+) -> Table:
+    for name, value in values.items():
+        entry = parameters.entries.get(name)
+        if entry is None or not isinstance(entry.node, Table):
+            label = f"there is no parameter `{name}`"
+            problems.error("name", value.span, label, nearest(name, known.entries))
+        elif "derived" in entry.node.entries:
+            label = f"`{name}` is derived: set what it follows from"
+            problems.error("values", value.span, label)
+        else:
+            changed = _with(entry.node, "value", value)
+            parameters = _with(parameters, name, changed)
+    return _with(tree, "parameters", parameters) if values else tree
+
+
+class _AutomatonReader(Reader):
+    """The sections of an automaton, one method each."""
+
+    def read(self, document: Document, tree: Table, model: Automaton | None) -> Automaton:
+        keys = (*COMMON_KEYS, *LOGIC_KEYS, *CLOCK_KEYS)
+        tree = self.table(tree, f"automaton {document.name}", keys)
+        self.at = document.name_span
+        self.model = model
+        period = self._time(tree.get("period"), "period")
+        self.sampled = period is not None
+        self._check_numbers(tree)
+        own = {e.key: self._parameter(e) for e in self.named(tree.get("parameters"), "parameters")}
+        modes = self._modes(tree)
+        initial = self._initial(tree, modes)
+        automaton = Automaton(
+            name=document.name,
+            period=period,
+            step=self._time(tree.get("step"), "step") or DEFAULT_STEP,
+            model=model,
+            parameters={**(model.parameters if model else {}), **own},
+            inputs={e.key: self._input(e) for e in self.named(tree.get("inputs"), "inputs")},
+            states=self._states(tree),
+            modes=modes,
+            initial=initial,
+            outputs=tuple(item.text for item in self.items(tree.get("outputs"), "outputs")),
+            span=document.name_span,
+        )
+        self._check_sections(tree)
+        return automaton
+
+    def _check_numbers(self, tree: Table) -> None:
+        node = tree.get("numbers")
+        if self.sampled:
+            scalar = self.scalar(node, "numbers", self.at)
+            if scalar and scalar.text != "float64":
+                label = f"numbers `{scalar.text}` is not known to this version: use float64"
+                self.problems.error("choice", scalar.span, label)
+        elif node is not None:
+            self.problems.error("form", node.span, "`numbers` belongs to a sampled automaton")
+
+    def _check_sections(self, tree: Table) -> None:
+        for key in ("flow", "step") if self.sampled else ("model",):
+            node = tree.get(key)
+            if node is not None:
+                other = "continuous" if self.sampled else "sampled"
+                label = f"`{key}` belongs to a {other} automaton"
+                self.problems.error("form", tree.entries[key].span, label)
+
+    def _time(self, node: Node | None, what: str) -> Fraction | None:
+        if node is None:
+            return None
+        value, unit = self.quantity(node, what, node.span, None)
+        if not fits(unit.dimension, SECOND):
+            self.problems.error("dimension", node.span, f"`{what}` is a time, like `1 ms`")
+        elif value <= 0:
+            self.problems.error("range", node.span, f"`{what}` is above zero")
+        else:
+            return value
+        return Fraction(1, 1000)
+
+    def _parameter(self, entry: Entry) -> Parameter:
+        keys = ("value", "unit", "range", "tunable", "derived")
+        table = self.table(entry.node, f"parameters.{entry.key}", keys)
+        key = f"parameters.{entry.key}"
+        unit_node = table.get("unit")
+        unit: Unit | None = self.unit(unit_node) if unit_node else None
+        tunable = self.choice(table.get("tunable"), "tunable", ("true", "false"), "false") == "true"
+        kind: Kind = "tunable" if tunable else "fixed"
+        value, derived = None, None
+        if "derived" in table.entries:
+            kind = "derived"
+            derived = self.expression(table.get("derived"), f"{key}.derived", entry.span)
+            for other in ("value", "tunable", "range"):
+                if other in table.entries:
+                    label = f"a derived parameter has no `{other}`"
+                    self.problems.error("form", table.entries[other].span, label)
+        else:
+            value, own = self.quantity(table.get("value"), f"{key}.value", entry.span, unit)
+            unit = unit or own
+        unit = unit or parse_unit("1")
+        limits = self.range(table.get("range"), unit)
+        if limits and value is not None and not limits[0] <= value <= limits[1]:
+            place = cast(Scalar, table.get("value")).span
+            self.problems.error("range", place, f"the value of `{entry.key}` is outside its range")
+        return Parameter(entry.key, kind, unit, value, derived, limits, key, entry.span)
+
+    def _input(self, entry: Entry) -> Input:
+        keys = ("unit", "range", "default", "type")
+        table = self.table(entry.node, f"inputs.{entry.key}", keys)
+        truth = self.choice(table.get("type"), "type", ("real", "bool"), "real") == "bool"
+        unit = self.unit(table.get("unit"))
+        default: Fraction | None = None
+        node = table.get("default")
+        if node is not None and truth:
+            default = Fraction(self.choice(node, "default", ("true", "false"), "false") == "true")
+        elif node is not None:
+            default, _ = self.quantity(node, f"inputs.{entry.key}.default", node.span, unit)
+        limits = self.range(table.get("range"), unit)
+        return Input(entry.key, unit, truth, default, limits, f"inputs.{entry.key}", entry.span)
+
+    def _states(self, tree: Table) -> dict[str, State]:
+        found = {}
+        for entry in self.named(tree.get("states"), "states"):
+            table = self.table(entry.node, f"states.{entry.key}", ("unit", "initial", "range"))
+            known = self.model.states.get(entry.key) if self.model else None
+            unit = (
+                known.unit
+                if known and "unit" not in table.entries
+                else self.unit(table.get("unit"))
+            )
+            key = f"states.{entry.key}"
+            initial = self.expression(table.get("initial"), f"{key}.initial", entry.span)
+            limits = self.range(table.get("range"), unit)
+            if initial:
+                found[entry.key] = State(entry.key, unit, initial, limits, key, entry.span)
+        return found
+
+    def _modes(self, tree: Table) -> dict[str, Mode]:
+        templates = self.table(tree.get("templates"), "templates")
+        root = tree
+        modes = {}
+        for entry in self.named(tree.get("modes"), "modes"):
+            table = entry.node if isinstance(entry.node, Table) else Table({}, entry.span)
+            table = self._like(table, templates)
+            modes[entry.key] = self._mode(entry, table, root, len(modes))
+        if not modes:
+            self.problems.error("missing", self.at, "an automaton has at least one mode in `modes`")
+        numbers: dict[int, str] = {}
+        for mode in modes.values():
+            if mode.number in numbers:
+                label = f"number {mode.number} is that of mode `{numbers[mode.number]}`"
+                self.problems.error("duplicate", mode.span, label)
+            numbers.setdefault(mode.number, mode.name)
+        return modes
+
+    def _like(self, mode: Table, templates: Table) -> Table:
+        node = mode.get("like")
+        if node is None:
+            return mode
+        name = self.text(node, "like", node.span)
+        template = templates.get(name)
+        if not isinstance(template, Table):
+            label = f"there is no template `{name}`"
+            self.problems.error("name", node.span, label, nearest(name, templates.entries))
+            return without(mode, "like")
+        return lay(template, without(mode, "like"), self.problems, template=True)
+
+    def _mode(self, entry: Entry, body: Table, root: Table, position: int) -> Mode:
+        key = f"modes.{entry.key}"
+        table = self.table(body, key, MODE_KEYS)
+        equations = self._formulas(root.get("equations"), "equations")
+        for name, formula in self._formulas(table.get("equations"), f"{key}.equations").items():
+            if name in equations:
+                label = f"`{name}` has an equation for every mode already"
+                hint = f"it is given at {equations[name].span}"
+                self.problems.error("duplicate", formula.span, label, hint)
+            equations[name] = formula
+        flow = self._flow(root.get("flow"), "flow")
+        flow.update(self._flow(table.get("flow"), f"{key}.flow"))
+        observer_node, run_node = table.get("observer"), table.get("runs")
+        return Mode(
+            name=entry.key,
+            number=self.whole(table.get("number"), "number", position, -100, 100),
+            equations=equations,
+            flow=flow,
+            update=self._formulas(table.get("update"), f"{key}.update"),
+            observer=read_observer(self, observer_node, f"{key}.observer")
+            if observer_node
+            else None,
+            run=read_run(self, run_node, f"{key}.runs", self.model) if run_node else None,
+            transitions=tuple(self._transitions(table.get("transitions"), entry.key)),
+            key=key,
+            span=entry.span,
+        )
+
+    def _formulas(self, node: Node | None, key: str) -> dict[str, Formula]:
+        found = {}
+        for entry in self.named(node, key):
+            formula = self.expression(entry.node, f"{key}.{entry.key}", entry.span)
+            if formula:
+                found[entry.key] = formula
+        return found
+
+    def _flow(self, node: Node | None, key: str) -> dict[str, Balance]:
+        found = {}
+        for entry in self.named(node, key):
+            scalar = self.scalar(entry.node, f"{key}.{entry.key}", entry.span)
+            if scalar is None:
+                continue
+            with self.problems.collecting():
+                left, right = parse_balance(scalar)
+                found[entry.key] = Balance(entry.key, left, right, f"{key}.{entry.key}")
+        return found
+
+    def _transitions(self, node: Node | None, source: str) -> list[Transition]:
+        found = []
+        for entry in self.named(node, "transitions"):
+            key = f"modes.{source}.transitions.{entry.key}"
+            table = self.table(entry.node, key, TRANSITION_KEYS)
+            to = table.get("to")
+            target = self.text(to, "to", entry.span) if to else entry.key
+            when = self.expression(table.get("when"), f"{key}.when", entry.span)
+            wait_node = table.get("wait")
+            wait = self.expression(wait_node, f"{key}.wait", entry.span) if wait_node else None
+            priority_node = table.get("priority")
+            priority = self.whole(priority_node, "priority", 0, 0, 1000) if priority_node else None
+            reset = self._formulas(table.get("reset"), f"{key}.reset")
+            if when:
+                at = to.span if to else entry.span
+                found.append(
+                    Transition(entry.key, source, target, when, wait, priority, reset, key, at)
+                )
+        return found
+
+    def _initial(self, tree: Table, modes: dict[str, Mode]) -> str:
+        node = tree.get("initial")
+        if node is None and len(modes) == 1:
+            return next(iter(modes))
+        name = self.text(node, "initial", self.at)
+        if name and name not in modes and node is not None:
+            label = f"there is no mode `{name}`"
+            self.problems.error("name", node.span, label, nearest(name, modes))
+        return name
+
+
+def coefficient_of(left: Tree, state: str) -> Tree | SpecError | None:
+    """Return the factor of der(state) on the left side of a balance, None where it is 1."""
+    if isinstance(left, Application) and left.function == "der":
+        return None if _is_derivative(left, state) else _bad_balance(left, state)
+    if isinstance(left, Arithmetic) and left.operator == "*":
+        if isinstance(left.right, Application) and _is_derivative(left.right, state):
+            return left.left if not _has_derivative(left.left) else _bad_balance(left, state)
+        if isinstance(left.left, Application) and _is_derivative(left.left, state):
+            return left.right if not _has_derivative(left.right) else _bad_balance(left, state)
+    return _bad_balance(left, state)
+
+
+def _is_derivative(tree: Application, state: str) -> bool:
+    match tree:
+        case Application("der", (Name(path, _),), _):
+            return path == state
+        case _:
+            return False
+
+
+def _has_derivative(tree: Tree) -> bool:
+    return any(isinstance(part, Application) and part.function == "der" for part in walk(tree))
+
+
+def _bad_balance(left: Tree, state: str) -> SpecError:
+    problems = Problems()
+    label = f"the left side is `coefficient * der({state})` with der once"
+    problems.error("balance", left.span, label)
+    return SpecError(problems.found)

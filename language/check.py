@@ -1,0 +1,373 @@
+"""Check: names, dimensions, order and completeness of a read automaton, all problems at once."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Mapping
+
+import networkx as nx
+
+from language.automaton import coefficient_of
+from language.dimension import DimensionCheck, Kind, Scope
+from language.model import Automaton, Formula, Mode, Observer
+from language.problem import Problems, Span, SpecError, nearest
+from language.syntax import Not, Relation, Tree, names
+from language.units import NUMBER, SECOND, Dimension, product
+
+DISJOINT = {"<": (">", ">="), "<=": (">",), ">": ("<", "<="), ">=": ("<",)}
+"""Relations that exclude each other between the same two sides."""
+RESERVED_OUTPUTS = ("mode", "faults")
+
+
+def check_automaton(automaton: Automaton) -> Automaton:
+    """Return the automaton with the dimensions of its names. Raises SpecError with all problems."""
+    if automaton.model:
+        automaton = dataclasses.replace(automaton, model=check_automaton(automaton.model))
+    problems = Problems()
+    checked = _Check(automaton, problems).run()
+    problems.stop_if_any()
+    return checked
+
+
+def equation_order(mode: Mode) -> list[str]:
+    """Return the names of a mode's equations so that each comes after those that it reads.
+
+    Ties are broken by the order in the file. Raises SpecError naming an algebraic loop.
+    """
+    graph: nx.DiGraph[str] = nx.DiGraph()
+    graph.add_nodes_from(mode.equations)
+    for name, formula in mode.equations.items():
+        for read in names(formula.tree):
+            if read.path in mode.equations:
+                graph.add_edge(read.path, name)
+    place = {name: position for position, name in enumerate(mode.equations)}
+    try:
+        return list(nx.lexicographical_topological_sort(graph, key=lambda name: place[name]))
+    except nx.NetworkXUnfeasible:
+        loop = [edge[0] for edge in nx.find_cycle(graph)]
+        problems = Problems()
+        first = mode.equations[loop[0]]
+        chain = " -> ".join(f"`{name}`" for name in [*loop, loop[0]])
+        label = f"an algebraic loop in mode `{mode.name}`: {chain}"
+        hint = "each reads the one before it at the same instant; one of them has to be a state"
+        problems.error("loop", first.span, label, hint)
+        raise SpecError(problems.found) from None
+
+
+class _Check:
+    """One method per rule; the names known at each place are the scopes."""
+
+    def __init__(self, automaton: Automaton, problems: Problems) -> None:
+        self.automaton = automaton
+        self.problems = problems
+        self.names: dict[str, Kind] = {}
+        self.first: dict[str, Span] = {}
+
+    def run(self) -> Automaton:
+        automaton = self.automaton
+        self._declare()
+        self._parameters()
+        self._initials()
+        for mode in automaton.modes.values():
+            with self.problems.collecting():
+                self._mode(mode)
+        self._outputs()
+        self._sampled_ranges()
+        known = {name: kind for name, kind in self.names.items() if isinstance(kind, Dimension)}
+        return dataclasses.replace(automaton, dimensions=known)
+
+    def _declare(self) -> None:
+        automaton = self.automaton
+        for group in (automaton.parameters, automaton.inputs, automaton.states):
+            for name, thing in group.items():
+                truth = getattr(thing, "truth", False)
+                self._new(name, "truth" if truth else thing.unit.dimension, thing.span)
+        for name in _equation_names(automaton.modes.values()):
+            for mode in automaton.modes.values():
+                if name in mode.equations:
+                    self._clash(name, mode.equations[name].span)
+                    break
+
+    def _new(self, name: str, kind: Kind, span: Span) -> None:
+        self._clash(name, span)
+        self.names[name] = kind
+        self.first.setdefault(name, span)
+
+    def _clash(self, name: str, span: Span) -> None:
+        if name in self.first:
+            hint = f"it is given first at {self.first[name]}"
+            self.problems.error(
+                "duplicate", span, f"`{name}` is already the name of something", hint
+            )
+        elif name in RESERVED_OUTPUTS:
+            self.problems.error("name", span, f"`{name}` is a word of the language")
+
+    def _scope(self, groups: Iterable[Iterable[str]], place: str) -> Scope:
+        known = {name: self.names[name] for group in groups for name in group}
+        return Scope(known, frozenset(), place)
+
+    def _parameters(self) -> None:
+        automaton = self.automaton
+        scope = self._scope([automaton.parameters], "among the parameters")
+        check = DimensionCheck(scope, self.problems)
+        graph: nx.DiGraph[str] = nx.DiGraph()
+        for parameter in automaton.parameters.values():
+            if parameter.derived and not (
+                automaton.model and parameter.name in _of_model(automaton)
+            ):
+                tree = parameter.derived.tree
+                check.quantity(tree, parameter.unit.dimension, parameter.name)
+                graph.add_edges_from((read.path, parameter.name) for read in names(tree))
+        self._no_cycle(graph, {p.name: p.span for p in automaton.parameters.values()}, "derived")
+
+    def _initials(self) -> None:
+        automaton = self.automaton
+        groups = [automaton.parameters, automaton.inputs, automaton.states]
+        check = DimensionCheck(self._scope(groups, "where a state starts"), self.problems)
+        graph: nx.DiGraph[str] = nx.DiGraph()
+        for state in automaton.states.values():
+            check.quantity(state.initial.tree, state.unit.dimension, state.name)
+            reads = (read.path for read in names(state.initial.tree))
+            graph.add_edges_from((name, state.name) for name in reads if name in automaton.states)
+        self._no_cycle(graph, {s.name: s.span for s in automaton.states.values()}, "initial")
+
+    def _no_cycle(self, graph: nx.DiGraph[str], spans: Mapping[str, Span], what: str) -> None:
+        try:
+            loop = [edge[0] for edge in nx.find_cycle(graph)]
+        except nx.NetworkXNoCycle:
+            return
+        chain = " -> ".join(f"`{name}`" for name in [*loop, loop[0]])
+        self.problems.error("loop", spans[loop[0]], f"`{what}` values in a circle: {chain}")
+
+    def _mode(self, mode: Mode) -> None:
+        automaton = self.automaton
+        groups = [automaton.parameters, automaton.inputs, automaton.states]
+        known = dict(self._scope(groups, "").names)
+        place = f"in mode `{mode.name}`"
+        run = mode.run
+        modes: frozenset[str] = frozenset()
+        if run and automaton.model:
+            modes = frozenset(f"{automaton.model.name}.{name}" for name in automaton.model.modes)
+        elsewhere = {name: NUMBER for name in mode.equations if name not in known}
+        for name in equation_order(mode):
+            check = DimensionCheck(Scope({**known}, modes, place), self.problems)
+            kind = check.kind(mode.equations[name].tree)
+            known[name] = self._agreed(name, kind, mode.equations[name], elsewhere)
+        check = DimensionCheck(Scope(known, modes, place), self.problems)
+        self._flow(mode, check)
+        self._assignments(mode.update, check)
+        self._transitions(mode, check)
+        if mode.observer:
+            self._observer(mode.observer, check)
+        self._writers(mode)
+
+    def _agreed(
+        self, name: str, kind: Kind | None, formula: Formula, elsewhere: Mapping[str, Kind]
+    ) -> Kind:
+        before = self.names.get(name)
+        if kind is None:
+            return before or elsewhere.get(name, NUMBER)
+        zero = getattr(formula.tree, "is_bare_zero", False)
+        if before is None or (isinstance(before, Dimension) and before.angle is None):
+            self.names[name] = kind
+            return kind
+        if zero and before != "truth":
+            return before
+        different = (before == "truth") != (kind == "truth")
+        if not different and isinstance(before, Dimension) and isinstance(kind, Dimension):
+            exact = kind.angle is not None and kind.angle != before.angle
+            different = before.powers != kind.powers or exact
+        if different:
+            label = f"`{name}` is in `{kind}` here and in `{before}` in another mode"
+            self.problems.error("dimension", formula.span, label)
+        return before
+
+    def _flow(self, mode: Mode, check: DimensionCheck) -> None:
+        automaton = self.automaton
+        if automaton.is_sampled:
+            return
+        for name, state in automaton.states.items():
+            if name not in mode.flow:
+                label = f"state `{name}` has no balance in mode `{mode.name}`"
+                self.problems.error("missing", state.span, label, f"`der({name}) = 0` keeps it")
+        for name, balance in mode.flow.items():
+            if name not in automaton.states:
+                hint = nearest(name, automaton.states)
+                self.problems.error("name", balance.left.span, f"`{name}` is not a state", hint)
+                continue
+            with self.problems.collecting():
+                factor = coefficient_of(balance.left, name)
+                if isinstance(factor, SpecError):
+                    raise factor
+                rate = product(automaton.states[name].unit.dimension, SECOND, -1)
+                rate = Dimension(rate.powers, automaton.states[name].unit.dimension.angle)
+                kind: Kind | None = rate if factor is None else check.kind(factor)
+                if factor is not None and isinstance(kind, Dimension):
+                    kind = product(kind, rate)
+                if isinstance(kind, Dimension):
+                    check.quantity(balance.right, kind, f"the left side for {name}")
+
+    def _assignments(self, formulas: Mapping[str, Formula], check: DimensionCheck) -> None:
+        for name, formula in formulas.items():
+            state = self.automaton.states.get(name)
+            if state is None:
+                hint = nearest(name, self.automaton.states)
+                self.problems.error("name", formula.span, f"`{name}` is not a state", hint)
+            else:
+                check.quantity(formula.tree, state.unit.dimension, name)
+
+    def _transitions(self, mode: Mode, check: DimensionCheck) -> None:
+        automaton = self.automaton
+        parameters = self._scope([automaton.parameters], "in `wait`: it is a fixed time")
+        constant = DimensionCheck(parameters, self.problems)
+        for transition in mode.transitions:
+            if transition.target not in automaton.modes:
+                label = f"there is no mode `{transition.target}`"
+                hint = nearest(transition.target, automaton.modes)
+                self.problems.error("name", transition.span, label, hint)
+            check.truth(transition.when.tree, "when")
+            if transition.wait:
+                constant.quantity(transition.wait.tree, SECOND, "wait")
+                self._fixed_wait(transition.wait)
+            self._assignments(transition.reset, check)
+        for position, later in enumerate(mode.transitions):
+            for earlier in mode.transitions[:position]:
+                same = later.priority == earlier.priority
+                if same and not _complements(earlier.when.tree, later.when.tree):
+                    label = f"`{earlier.name}` and `{later.name}` can be enabled together"
+                    hint = "give them different priorities: the smallest wins"
+                    self.problems.error("priority", later.when.span, label, hint)
+
+    def _fixed_wait(self, wait: Formula) -> None:
+        for read in names(wait.tree):
+            parameter = self.automaton.parameters.get(read.path)
+            if parameter and parameter.kind != "fixed":
+                label = f"`{read.path}` is {parameter.kind}: a wait is made of fixed values"
+                self.problems.error("wait", read.span, label)
+
+    def _observer(self, observer: Observer, check: DimensionCheck) -> None:
+        automaton = self.automaton
+        for name in observer.states:
+            if name not in automaton.states:
+                self.problems.error("name", observer.span, f"`{name}` is not a state")
+        for name in (*observer.inputs, *observer.measures):
+            if name not in automaton.inputs:
+                self.problems.error("name", observer.span, f"`{name}` is not an input")
+        kinds = {name: kind for name, kind in self.names.items() if isinstance(kind, Dimension)}
+        if not all(name in kinds for name in (*observer.states, *observer.measures)):
+            return
+        for row, entries in observer.a.items():
+            for column, formula in entries.items():
+                self._entry(check, formula, _rate(kinds[row]), kinds[column])
+        for row, entries in observer.b.items():
+            for column, formula in entries.items():
+                self._entry(check, formula, _rate(kinds[row]), kinds.get(column, NUMBER))
+        for row, entries in observer.c.items():
+            for column, formula in entries.items():
+                self._entry(check, formula, kinds[row], kinds[column])
+        for row, formula in observer.f.items():
+            check.quantity(formula.tree, _loose(_rate(kinds[row])), formula.key)
+        for row, formula in observer.process_noise.items():
+            want = _rate(product(kinds[row], _loose(kinds[row])))
+            check.quantity(formula.tree, _loose(want), formula.key)
+        for row, formula in observer.measurement_noise.items():
+            want = product(kinds[row], _loose(kinds[row]))
+            check.quantity(formula.tree, _loose(want), formula.key)
+
+    def _entry(
+        self, check: DimensionCheck, formula: Formula, row: Dimension, column: Dimension
+    ) -> None:
+        check.quantity(formula.tree, _loose(product(row, column, -1)), formula.key)
+
+    def _writers(self, mode: Mode) -> None:
+        automaton = self.automaton
+        writers: dict[str, str] = {}
+        groups = (
+            ("observer", mode.observer.states if mode.observer else ()),
+            ("runs", tuple(automaton.model.states) if mode.run and automaton.model else ()),
+            ("update", tuple(mode.update)),
+        )
+        for what, written in groups:
+            for name in written:
+                if name not in automaton.states and what == "runs":
+                    label = f"the run needs a state `{name}` here, as its model has"
+                    assert mode.run
+                    self.problems.error("run", mode.run.span, label)
+                elif name in writers:
+                    label = f"`{name}` is written by `{writers[name]}` and by `{what}`"
+                    self.problems.error("writer", mode.span, label)
+                writers[name] = what
+
+    def _outputs(self) -> None:
+        automaton = self.automaton
+        equations = _equation_names(automaton.modes.values())
+        for name in automaton.outputs:
+            if name == "mode" or name in automaton.states:
+                continue
+            if name not in equations:
+                hint = nearest(name, [*equations, *automaton.states, "mode"])
+                label = f"output `{name}` is not a state, an equation or `mode`"
+                self.problems.error("name", automaton.span, label, hint)
+                continue
+            for mode in automaton.modes.values():
+                if name not in mode.equations:
+                    label = f"output `{name}` has no value in mode `{mode.name}`"
+                    self.problems.error("missing", mode.span, label)
+
+    def _sampled_ranges(self) -> None:
+        automaton = self.automaton
+        exponential = any(m.run and m.run.method == "exponential" for m in automaton.modes.values())
+        for state in automaton.states.values():
+            if exponential and state.range is None:
+                label = f"state `{state.name}` needs a `range`: method `exponential` scales with it"
+                self.problems.error("missing", state.span, label)
+
+
+def _of_model(automaton: Automaton) -> Mapping[str, object]:
+    return automaton.model.parameters if automaton.model else {}
+
+
+def _equation_names(modes: Iterable[Mode]) -> list[str]:
+    return list(dict.fromkeys(name for mode in modes for name in mode.equations))
+
+
+def _rate(dimension: Dimension) -> Dimension:
+    powers = list(dimension.powers)
+    powers[2] -= 1
+    return Dimension(tuple(powers), dimension.angle)
+
+
+def _loose(dimension: Dimension) -> Dimension:
+    """The dimension with a free angle: entries of matrices are quotients."""
+    return Dimension(dimension.powers, None)
+
+
+def _complements(left: Tree, right: Tree) -> bool:
+    """Tell whether two guards exclude each other by their form: `a < b` and `a >= b`, `not g`."""
+    if isinstance(right, Not) and _same(right.operand, left):
+        return True
+    if isinstance(left, Not) and _same(left.operand, right):
+        return True
+    if isinstance(left, Relation) and isinstance(right, Relation):
+        same = _same(left.left, right.left) and _same(left.right, right.right)
+        return same and right.operator in DISJOINT.get(left.operator, ())
+    return False
+
+
+def _same(left: Tree, right: Tree) -> bool:
+    """Tell whether two trees are written alike, wherever they stand."""
+    if type(left) is not type(right):
+        return False
+    for item in dataclasses.fields(left):
+        a, b = getattr(left, item.name), getattr(right, item.name)
+        if item.name == "span":
+            continue
+        if dataclasses.is_dataclass(a) and not isinstance(a, type) and item.name != "unit":
+            if not _same(a, b):
+                return False
+        elif isinstance(a, tuple) and a and dataclasses.is_dataclass(a[0]):
+            if len(a) != len(b) or not all(_same(x, y) for x, y in zip(a, b, strict=True)):
+                return False
+        elif a != b:
+            return False
+    return True

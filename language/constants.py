@@ -1,0 +1,120 @@
+"""Constants: the values of parameters, in float64 and exactly, and what `X_Derive` recomputes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from fractions import Fraction
+
+from language.evaluate import Scalar, evaluate
+from language.lower import (
+    constant_names,
+    constant_of,
+    expression,
+    parameter_kinds,
+    parameter_order,
+    rounded,
+)
+from language.model import Automaton, Formula
+from language.problem import Problems, SpecError
+from language.program import Assign, Block, Constant
+from language.syntax import Arithmetic, Name, Negative, Number, Power, Tree
+
+
+def parameter_constants(automaton: Automaton, problems: Problems) -> dict[str, Constant]:
+    """Return the constant of every parameter, by name. Reports one that is not finite."""
+    known = constant_names(automaton)
+    kinds = parameter_kinds(automaton)
+    values: dict[str, Scalar] = {}
+    found = {}
+    for name in parameter_order(automaton):
+        parameter = automaton.parameters[name]
+        if parameter.derived:
+            value = float(evaluate(expression(parameter.derived.tree, known), values))
+        else:
+            value = rounded(parameter.value or Fraction(0))
+        if not math.isfinite(value):
+            problems.error("value", parameter.span, f"parameter `{name}` is {value}, not finite")
+            value = 0.0
+        found[name] = constant_of(automaton, name, kinds[name], value)
+        values[found[name].name] = value
+    return found
+
+
+def derive_block(automaton: Automaton) -> Block:
+    """Return the assignments of what is derived from tunable parameters, in order."""
+    known = constant_names(automaton)
+    kinds = parameter_kinds(automaton)
+    ops = []
+    for name in parameter_order(automaton):
+        derived = automaton.parameters[name].derived
+        if derived and kinds[name] == "derived":
+            key = f"{automaton.name} {derived.key}"
+            ops.append(Assign(f"derived.{name}", expression(derived.tree, known), key))
+    return tuple(ops)
+
+
+def values_of(constants: Mapping[str, Constant]) -> dict[str, Scalar]:
+    """Return the values by the Program's names."""
+    return {constant.name: constant.value for constant in constants.values()}
+
+
+def constant_value(
+    formula: Formula, automaton: Automaton, values: Mapping[str, Scalar], what: str
+) -> float:
+    """Return a formula of parameters in float64. Raises SpecError where it is not one."""
+    problems = Problems()
+    try:
+        value = float(evaluate(expression(formula.tree, constant_names(automaton)), values))
+    except KeyError as error:
+        label = f"`{error.args[0]}` is not a parameter: {what} is made of parameters"
+        problems.error("constant", formula.span, label)
+        raise SpecError(problems.found) from None
+    if not math.isfinite(value):
+        problems.error("value", formula.span, f"this is {value}, not a finite number")
+        raise SpecError(problems.found)
+    return value
+
+
+def exact_value(formula: Formula, automaton: Automaton) -> Fraction:
+    """Return a formula of fixed parameters exactly (for times). Raises SpecError."""
+    problems = Problems()
+
+    def value(tree: Tree) -> Fraction:
+        match tree:
+            case Number(number, _, _):
+                return number
+            case Name(path, _) if path in automaton.parameters:
+                parameter = automaton.parameters[path]
+                return (
+                    value(parameter.derived.tree)
+                    if parameter.derived
+                    else parameter.value or Fraction(0)
+                )
+            case Negative(operand, _):
+                return -value(operand)
+            case Power(base, exponent, _):
+                return value(base) ** exponent
+            case Arithmetic(operator, left, right, _):
+                return _arithmetic(operator, value(left), value(right))
+            case _:
+                raise TypeError
+
+    try:
+        return value(formula.tree)
+    except (TypeError, ZeroDivisionError):
+        label = "a time is made of numbers, parameters and + - * /"
+        problems.error("wait", formula.span, label)
+        raise SpecError(problems.found) from None
+
+
+def _arithmetic(operator: str, left: Fraction, right: Fraction) -> Fraction:
+    match operator:
+        case "+":
+            return left + right
+        case "-":
+            return left - right
+        case "*":
+            return left * right
+        case _:
+            return left / right

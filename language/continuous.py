@@ -1,0 +1,148 @@
+"""Continuous: a continuous automaton as a Program that an engine moves from event to event.
+
+Entries: `init` (start values from the inputs), `equations` (the values of now), `watch` (what each
+guard is now), `jump` (one micro-step: `memory.fired` is the transition, 0 if none) and `flow`
+(states over `work.h`, up to the first change of a guard, after `work.elapsed`).
+"""
+
+from __future__ import annotations
+
+from language.constants import derive_block, parameter_constants
+from language.field import Field, at_state, by_mode, enter, field_blocks, field_variables, jump
+from language.lower import constant_names, equations
+from language.model import Automaton, Mode
+from language.motion import FLOW_HALVINGS, motion_blocks, motion_variables
+from language.problem import Problems
+from language.program import (
+    Assign,
+    Binary,
+    Block,
+    Choose,
+    Expr,
+    ModeInfo,
+    Program,
+    Ref,
+    Run,
+    TransitionInfo,
+    Variable,
+    whole,
+)
+from language.rk4 import rk4
+from language.sampled import defaults_of, transition_infos
+from language.wiring import (
+    finished,
+    initial_ops,
+    input_variables,
+    output_wires,
+    state_variables,
+)
+
+ENTRIES = ("init", "derive", "equations", "watch", "jump", "flow")
+
+
+def continuous_program(automaton: Automaton, problems: Problems) -> Program:
+    """Return the Program of a checked continuous automaton. Raises SpecError."""
+    parameters = parameter_constants(automaton, problems)
+    transitions = transition_infos(automaton, problems)
+    inputs: dict[str, Expr] = {name: Ref(f"input.{name}") for name in automaton.inputs}
+    known = constant_names(automaton)
+    field = Field(automaton, known, inputs, "memory.mode", f"{automaton.name} ")
+    method = rk4(field)
+    armed = {k: f"memory.armed_{k}" for k in range(field.widest)}
+    blocks = {
+        **field_blocks(field),
+        **method.blocks,
+        **motion_blocks(field, method, FLOW_HALVINGS, lambda mode: armed),
+    }
+    for mode in automaton.modes.values():
+        ops = equations(mode, {**known, **inputs, **_states(automaton)}, "equation.", field.prefix)
+        blocks[f"equations_{mode.name}"] = tuple(ops)
+        blocks[f"jump_{mode.name}"] = _jump(field, mode, transitions)
+    blocks.update(_entries(automaton, field, {**known, **inputs, **_states(automaton)}))
+    problems.stop_if_any()
+    modes = tuple(ModeInfo(mode.name, mode.number) for mode in automaton.modes.values())
+    variables = [
+        *input_variables(automaton, "input"),
+        *state_variables(automaton),
+        Variable("memory.mode", "whole", about="active mode"),
+        Variable("memory.fired", "whole", about="transition of this micro-step, 0: none"),
+        *(Variable(f"memory.armed_{k}", "truth") for k in range(field.widest)),
+        *(Variable(f"memory.due_{k}", "truth") for k in range(field.widest)),
+        *_reset_variables(automaton),
+        *field_variables(field),
+        *motion_variables(field, method),
+    ]
+    return finished(
+        Program(
+            name=automaton.name,
+            number="float64",
+            period=None,
+            major_step=automaton.step,
+            constants=(*parameters.values(), *method.constants),
+            variables=tuple(variables),
+            outputs=output_wires(automaton),
+            modes=modes,
+            transitions=transitions,
+            faults=(),
+            functions=(),
+            blocks=blocks,
+            defaults=defaults_of(automaton),
+        ),
+        entries=ENTRIES,
+    )
+
+
+def _states(automaton: Automaton) -> dict[str, Expr]:
+    return {name: Ref(f"state.{name}") for name in automaton.states}
+
+
+def _reset_variables(automaton: Automaton) -> list[Variable]:
+    found = {
+        name: Variable(f"work.reset_{name}", "real", str(automaton.states[name].unit.dimension))
+        for mode in automaton.modes.values()
+        for transition in mode.transitions
+        for name in transition.reset
+    }
+    return list(found.values())
+
+
+def _jump(field: Field, mode: Mode, infos: tuple[TransitionInfo, ...]) -> Block:
+    own = [info for info in infos if info.source == mode.number]
+    enabled: dict[int, Expr] = {}
+    fire: dict[int, Block] = {}
+    for k, transition in enumerate(mode.transitions):
+        guard = Ref(f"work.guard_{k}")
+        due = Ref(f"memory.due_{k}")
+        enabled[k] = Binary("and", guard, due) if own[k].timer else guard
+        number = Assign("memory.fired", whole(own[k].number), own[k].key)
+        fire[k] = (enter(field, transition), number)
+    return (Run(f"guards_{mode.name}"), *jump(field, mode, enabled, fire))
+
+
+def _entries(automaton: Automaton, field: Field, known: dict[str, Expr]) -> dict[str, Block]:
+    initial = automaton.modes[automaton.initial]
+    modes = automaton.modes.values()
+    watch = tuple(
+        (
+            mode.number,
+            (
+                Run(f"guards_{mode.name}"),
+                *(
+                    Assign(f"memory.armed_{k}", Ref(f"work.guard_{k}"))
+                    for k in range(len(mode.transitions))
+                ),
+            ),
+        )
+        for mode in modes
+    )
+    return {
+        "derive": derive_block(automaton),
+        "init": (
+            *initial_ops(automaton, known, field.prefix),
+            Assign("memory.mode", whole(initial.number)),
+        ),
+        "equations": (by_mode(field, "equations"),),
+        "watch": (*at_state(field), Choose("memory.mode", watch)),
+        "jump": (Assign("memory.fired", whole(0)), *at_state(field), by_mode(field, "jump")),
+        "flow": (by_mode(field, "move"),),
+    }

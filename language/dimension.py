@@ -1,0 +1,227 @@
+"""Dimension check: the dimension of every expression, and what does not fit (rule 20)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+from language.problem import Problems, Span, nearest
+from language.syntax import (
+    Application,
+    Arithmetic,
+    Choice,
+    Logic,
+    Name,
+    Negative,
+    Not,
+    Number,
+    Power,
+    Relation,
+    Tree,
+    Truth,
+)
+from language.units import NUMBER, Dimension, common, fits, power, product, root
+
+Truthful = Literal["truth"]
+Kind = Dimension | Truthful
+"""What an expression is: a quantity with a dimension, or a truth value."""
+
+ANGLE = Dimension(angle=1)
+SAME = {"abs": 1, "min": 2, "max": 2, "clip": 3}
+"""Functions whose arguments and value have one dimension, with their number of arguments."""
+NUMBERS = {"exp": 1, "tanh": 1, "sign": 1}
+ANGLES = {"sin": 1, "cos": 1}
+KNOWN = (*SAME, *NUMBERS, *ANGLES, "sqrt", "in", "der")
+LATER = ("floor", "tan", "atan2", "lookup", "previous", "delay", "rising", "falling", "after")
+
+
+@dataclass(frozen=True)
+class Scope:
+    """What names mean at one place: their dimensions, and the modes that `in(...)` may name."""
+
+    names: Mapping[str, Kind]
+    modes: frozenset[str] = frozenset()
+    place: str = "here"
+
+
+class DimensionCheck:
+    """Infers dimensions bottom up; reports each mistake once and goes on."""
+
+    def __init__(self, scope: Scope, problems: Problems) -> None:
+        """Check against `scope`, report into `problems`."""
+        self.scope = scope
+        self.problems = problems
+
+    def quantity(self, tree: Tree, want: Dimension, what: str) -> None:
+        """Check that an expression is a quantity that fits `want`."""
+        kind = self.kind(tree)
+        if kind == "truth":
+            self._report("type", tree.span, f"`{what}` is a quantity, this is true or false")
+        elif kind is not None and not _zero(tree) and not fits(kind, want):
+            label = f"this is in `{kind}`, `{what}` is in `{want}`"
+            self._report("dimension", tree.span, label, _angle_hint(kind, want))
+
+    def truth(self, tree: Tree, what: str) -> None:
+        """Check that an expression is true or false."""
+        kind = self.kind(tree)
+        if kind is not None and kind != "truth":
+            hint = "compare it: `x > 0`"
+            self._report("type", tree.span, f"`{what}` is a condition, this is a quantity", hint)
+
+    def kind(self, tree: Tree) -> Kind | None:
+        """Return what the expression is, None where a problem was reported inside it."""
+        match tree:
+            case Number(_, unit, _):
+                return unit.dimension
+            case Truth():
+                return "truth"
+            case Name():
+                return self._name(tree)
+            case Negative(operand, _):
+                return self._real(operand)
+            case Not(operand, _):
+                self.truth(operand, "not")
+                return "truth"
+            case Logic(operator, left, right, _):
+                self.truth(left, operator)
+                self.truth(right, operator)
+                return "truth"
+            case Arithmetic():
+                return self._arithmetic(tree)
+            case Relation():
+                return self._relation(tree)
+            case Power(base, exponent, _):
+                kind = self._real(base)
+                return None if kind is None else power(kind, exponent)
+            case Choice():
+                return self._choice(tree)
+            case Application():
+                return self._application(tree)
+
+    def _report(self, kind: str, span: Span, label: str, help: str = "") -> None:
+        self.problems.error(kind, span, label, help)
+
+    def _real(self, tree: Tree) -> Dimension | None:
+        kind = self.kind(tree)
+        if kind == "truth":
+            self._report("type", tree.span, "this is true or false, a quantity is needed")
+            return None
+        return kind
+
+    def _name(self, tree: Name) -> Kind | None:
+        if tree.path in self.scope.names:
+            return self.scope.names[tree.path]
+        hint = nearest(tree.path, self.scope.names)
+        self._report("name", tree.span, f"`{tree.path}` is not known {self.scope.place}", hint)
+        return None
+
+    def _arithmetic(self, tree: Arithmetic) -> Dimension | None:
+        left, right = self._real(tree.left), self._real(tree.right)
+        if left is None or right is None:
+            return None
+        if tree.operator in "*/":
+            return product(left, right, 1 if tree.operator == "*" else -1)
+        for part in (tree.left, tree.right):
+            if isinstance(part, Number) and part.unit.offset:
+                label = "a temperature in degC is not added or subtracted"
+                self._report("dimension", part.span, label, "write a difference in K")
+        return self._together(tree.left, left, tree.right, right, tree.span, tree.operator)
+
+    def _together(
+        self, a: Tree, left: Dimension, b: Tree, right: Dimension, span: Span, operator: str
+    ) -> Dimension | None:
+        if _zero(a):
+            return right
+        if _zero(b):
+            return left
+        if fits(left, right):
+            return common(left, right)
+        label = f"`{operator}` joins `{left}` and `{right}`"
+        self._report("dimension", span, label, _angle_hint(left, right))
+        return None
+
+    def _relation(self, tree: Relation) -> Truthful:
+        left, right = self._real(tree.left), self._real(tree.right)
+        if tree.operator in ("==", "!="):
+            label = f"`{tree.operator}` is not for real numbers"
+            self._report("type", tree.span, label, "use `<=` or `>=`")
+        elif left is not None and right is not None:
+            self._together(tree.left, left, tree.right, right, tree.span, tree.operator)
+        return "truth"
+
+    def _choice(self, tree: Choice) -> Kind | None:
+        self.truth(tree.condition, "if")
+        left, right = self.kind(tree.then), self.kind(tree.other)
+        if left is None or right is None:
+            return None
+        if isinstance(left, Dimension) and isinstance(right, Dimension):
+            return self._together(tree.then, left, tree.other, right, tree.span, "if")
+        if left != right:
+            self._report("type", tree.span, "one arm is a condition, the other a quantity")
+            return None
+        return left
+
+    def _application(self, tree: Application) -> Kind | None:
+        name, arguments = tree.function, tree.arguments
+        if name == "in":
+            return self._in(tree)
+        wanted = {**SAME, **NUMBERS, **ANGLES, "sqrt": 1}.get(name)
+        if wanted is None:
+            label = f"`{name}` is not a function that can be used here"
+            hint = "it comes with a later version" if name in LATER else nearest(name, KNOWN)
+            self._report("name", tree.span, label, hint)
+            return None
+        if len(arguments) != wanted:
+            label = f"`{name}` takes {wanted} argument(s), not {len(arguments)}"
+            self._report("arguments", tree.span, label)
+            return None
+        kinds = [self._real(argument) for argument in arguments]
+        if any(kind is None for kind in kinds):
+            return None
+        return self._function(tree, [kind for kind in kinds if kind is not None])
+
+    def _function(self, tree: Application, kinds: list[Dimension]) -> Dimension | None:
+        name, first = tree.function, kinds[0]
+        if name in SAME:
+            result: Dimension | None = first
+            for argument, kind in zip(tree.arguments[1:], kinds[1:], strict=True):
+                if result is not None:
+                    result = self._together(
+                        tree.arguments[0], result, argument, kind, tree.span, name
+                    )
+            return result
+        if name == "sqrt":
+            result = root(first)
+            if result is None:
+                self._report("dimension", tree.span, f"`{first}` has no square root")
+            return result
+        if name == "sign":
+            return NUMBER
+        fine = first.is_bare and (first.angle is None or first.angle == (name in ANGLES))
+        if not fine and not _zero(tree.arguments[0]):
+            want = "an angle" if name in ANGLES else "a number"
+            self._report("dimension", tree.span, f"`{name}` takes {want}, this is in `{first}`")
+        return NUMBER
+
+    def _in(self, tree: Application) -> Truthful:
+        name = tree.arguments[0]
+        if not isinstance(name, Name) or name.path not in self.scope.modes:
+            shown = name.path if isinstance(name, Name) else "..."
+            label = f"`in({shown})` does not name a mode of the run of this mode"
+            hint = nearest(shown, self.scope.modes)
+            self._report("name", tree.span, label, hint)
+        return "truth"
+
+
+def _zero(tree: Tree) -> bool:
+    """A bare 0 goes with any dimension."""
+    return isinstance(tree, Number) and tree.is_bare_zero
+
+
+def _angle_hint(left: Dimension, right: Dimension) -> str:
+    if left.powers != right.powers:
+        return ""
+    if left.is_bare and 0 in (left.angle, right.angle):
+        return "give the unit of the angle: `0.02 rad`, `3 deg`"
+    return "they differ in the power of the angle (rad)"

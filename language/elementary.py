@@ -1,0 +1,255 @@
+"""Elementary: sin, cos, exp and tanh in float64 as operations, for the engine and for codegen.
+
+No libm: its results depend on the CPU and on the C library. Here are only + - * /, comparisons,
+selection, abs and exact powers of two (codegen rules R5 and R6), each of which IEEE 754 defines to
+the last bit; compiled without contraction (R7), C gives the bits that Python gives.
+
+Arguments are clamped to the declared domain. NaN passes the clamp and comes out as NaN, but never
+reaches `pow2`. sin and tanh are odd and cos is even, bit for bit; sin and tanh of -0.0 are -0.0.
+The errors that `about` states, in ULP of the exact result, were measured: against mpmath by the
+test of this module, and once against libquadmath at 10^8 arguments of each function. They hold on
+the whole domain, at the zeros of sin and cos too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from language.program import (
+    Assign,
+    Call,
+    Compare,
+    Expr,
+    Function,
+    Op,
+    Ref,
+    Select,
+    Unary,
+    add,
+    divide,
+    multiply,
+    real,
+    subtract,
+)
+
+ROUND = real(1.5 * 2.0**52)
+"""Adding and subtracting it rounds |x| < 2^51 to the nearest whole number, ties to even (R6)."""
+TINY = real(2.0**-27)
+"""Below it sin x and tanh x are x to 2^-54 / 3 relative; keeps -0.0 and the subnormals."""
+
+EXP_LOWEST, EXP_HIGHEST = real(-708.0), real(709.0)
+"""Within them e^x is finite and normal, and its power of two is within -1021 and 1023."""
+PER_LN_2 = real(1.4426950408889634)
+LN_2 = real(0.6931471805598903), real(5.497923018708371e-14)
+"""ln 2 in two parts; the first is a multiple of 2^-42, so its multiples up to 2^10 are exact."""
+EXP_SERIES = (
+    0.5000000000000011,
+    0.16666666666666466,
+    0.041666666666528816,
+    0.00833333333347021,
+    0.0013888888943694578,
+    0.00019841269546225928,
+    2.4801493177744308e-05,
+    2.7557558513417143e-06,
+    2.763019225057943e-07,
+    2.5007202378603645e-08,
+)
+"""(e^r - 1 - r) / r^2, degree 9 in r, |r| <= ln 2 / 2; error of e^r 2^-57.9 relative.
+
+This and the next two: minimax by mpmath at 60 digits (Remez exchange; Lawson's weights for this
+one), the lowest coefficient rounded to double and fixed, the rest fitted anew, and so on upwards;
+the errors are those of the rounded coefficients.
+"""
+
+ANGLE = 1e5
+"""Bound of the argument of sin and cos [rad]: 63 662 quarter turns, fewer than 2^16."""
+PER_QUARTER = real(0.6366197723675814)
+QUARTER = real(1.5707963267923333), real(2.563344151689835e-12), real(-9.531611933980011e-23)
+"""pi/2 in three parts, together within 2^-127; the first two are multiples of 2^-36 and 2^-72."""
+SIN_SERIES = (
+    -0.16666666666666632,
+    0.00833333333332249,
+    -0.000198412698298578,
+    2.755731370700222e-06,
+    -2.5050760240823352e-08,
+    1.5896909130064357e-10,
+)
+"""(sin r / r - 1) / r^2, degree 5 in r^2, |r| <= pi/4; error of sin r / r 2^-58.0."""
+COS_SERIES = (
+    0.0416666666666666,
+    -0.0013888888888874474,
+    2.4801587289671533e-05,
+    -2.7557314401028414e-07,
+    2.0875729280773627e-09,
+    -1.135993421169908e-11,
+)
+"""(cos r - 1 + r^2 / 2) / r^4, degree 5 in r^2, |r| <= pi/4; error of cos r 2^-64.1."""
+
+TANH_FULL = real(20.0)
+"""tanh x rounds to 1 from x = 19.07 on."""
+TANH_SPLIT = real(0.625)
+LAMBERT_ABOVE = (675675.0, 45045.0, 594.0, 1.0)
+LAMBERT_BELOW = (2027025.0, 945945.0, 51975.0, 630.0, 1.0)
+"""x - tanh x = x z above(z) / below(z), z = x^2, within 2^-56.9 of x up to 0.625: Lambert's
+continued fraction x/(1 + z/(3 + z/(5 + ... + z/15))), whose coefficients are whole numbers."""
+
+X = Ref("work.x")
+
+
+@dataclass
+class Body:
+    """The assignments of a function, each to a local of its own, which `let` returns."""
+
+    ops: list[Op] = field(default_factory=list)
+    locals: list[str] = field(default_factory=list)
+
+    def let(self, name: str, value: Expr) -> Ref:
+        """Append `work.name = value`."""
+        self.locals.append(name)
+        self.ops.append(Assign(f"work.{name}", value))
+        return Ref(f"work.{name}")
+
+    def function(self, name: str, about: str) -> Function:
+        """Return the function; its result is the local `y`."""
+        return Function(name, tuple(self.ops), tuple(self.locals), about)
+
+
+def nearest(x: Expr) -> Expr:
+    """Return the whole number nearest to x, ties to even."""
+    return subtract(add(x, ROUND), ROUND)
+
+
+def within(x: Expr, low: Expr, high: Expr) -> Expr:
+    """Return x clamped; NaN stays NaN, unlike `clip` (codegen rule R8)."""
+    return Select(Compare(">", x, high), high, Select(Compare("<", x, low), low, x))
+
+
+def horner(coefficients: tuple[float, ...], x: Expr, rest: Expr | None = None) -> Expr:
+    """Return c0 + x (c1 + x (c2 + ... + x rest)); a last coefficient of 1 costs no product."""
+    *lower, last = coefficients
+    result: Expr = real(last) if rest is None else add(real(last), multiply(x, rest))
+    for number in reversed(lower):
+        result = add(real(number), x if result == real(1.0) else multiply(x, result))
+    return result
+
+
+def exponential() -> Function:
+    """e^x = 2^k e^r, k whole, |r| <= ln 2 / 2 (Cody & Waite 1980, Software Manual).
+
+    ln 2 has two parts; head = x - k ln2_1 is exact, r = head - tail, and the sum
+    1 + (head + (r^2 p(r) - tail)) adds the large terms last (Muller 2016, Elementary Functions).
+    x is clamped to [-708, 709]: the result is never infinite, zero or subnormal.
+    """
+    body = Body()
+    bounded = body.let("bounded", within(X, EXP_LOWEST, EXP_HIGHEST))
+    power = nearest(multiply(bounded, PER_LN_2))
+    # The comparison is for NaN: pow2 gets a whole number always.
+    exponent = body.let("exponent", Select(Compare(">", bounded, EXP_LOWEST), power, real(-1021.0)))
+    head = body.let("head", subtract(bounded, multiply(exponent, LN_2[0])))
+    tail = body.let("tail", multiply(exponent, LN_2[1]))
+    r = body.let("r", subtract(head, tail))
+    upper = body.let("upper", horner(EXP_SERIES[7:], r))
+    middle = body.let("middle", horner(EXP_SERIES[4:7], r, upper))
+    series = body.let("series", horner(EXP_SERIES[:4], r, middle))
+    curved = subtract(multiply(multiply(r, r), series), tail)
+    scaled = body.let("scaled", add(real(1.0), add(head, curved)))
+    body.let("y", multiply(Call("pow2", (exponent,)), scaled))
+    return body.function("exp", "e^x; -708 <= x <= 709, clamped; error < 0.9 ULP")
+
+
+def reduced(body: Body) -> tuple[Ref, Ref, Ref]:
+    """Return (quadrant 0 1 2 3, head, tail): x is head + tail past a multiple of pi/2.
+
+    Cody & Waite 1980, with three parts of pi/2; |head| <= pi/4. `coarse` and `fine` are
+    exact, and so is (coarse - head) - fine, the rounding error of head: by Dekker's fast two-sum
+    where |coarse| >= |fine|; else coarse - fine has at most 52 bits. Near a multiple of pi/2 the
+    rest of x may be as small as 2^-60.5 (x = 45.553...); head + tail has it to 2^-110.
+    """
+    bounded = body.let("bounded", within(X, real(-ANGLE), real(ANGLE)))
+    quarters = body.let("quarters", nearest(multiply(bounded, PER_QUARTER)))
+    # quarters / 4 - 3/8 is never near a tie: it rounds to the floor of quarters / 4.
+    turns = body.let("turns", nearest(subtract(multiply(real(0.25), quarters), real(0.375))))
+    quadrant = body.let("quadrant", subtract(quarters, multiply(real(4.0), turns)))
+    coarse = body.let("coarse", subtract(bounded, multiply(quarters, QUARTER[0])))
+    fine = body.let("fine", multiply(quarters, QUARTER[1]))
+    head = body.let("head", subtract(coarse, fine))
+    lost = body.let("lost", subtract(subtract(coarse, head), fine))
+    tail = body.let("tail", subtract(lost, multiply(quarters, QUARTER[2])))
+    return quadrant, head, tail
+
+
+def kernels(body: Body, head: Ref, tail: Ref) -> tuple[Ref, Ref]:
+    """Return (sin, cos) of head + tail, |head| <= pi/4; tail counts to first order.
+
+    Largest terms last (Muller 2016); crest = 1 - half, near cos, has the exact rounding error
+    1 - crest - half, and is the slope by which tail moves sin.
+    """
+    square = body.let("square", multiply(head, head))
+    half = body.let("half", multiply(real(0.5), square))
+    crest = body.let("crest", subtract(real(1.0), half))
+    upper = body.let("sine_upper", horner(SIN_SERIES[3:], square))
+    series = body.let("sine_series", horner(SIN_SERIES[:3], square, upper))
+    cubic = multiply(multiply(head, square), series)
+    sine = body.let("sine", add(head, add(multiply(tail, crest), cubic)))
+    upper = body.let("cosine_upper", horner(COS_SERIES[3:], square))
+    series = body.let("cosine_series", horner(COS_SERIES[:3], square, upper))
+    quartic = multiply(multiply(square, square), series)
+    lost = subtract(subtract(real(1.0), crest), half)
+    fringe = add(lost, subtract(quartic, multiply(head, tail)))
+    cosine = body.let("cosine", add(crest, fringe))
+    return sine, cosine
+
+
+def by_quadrant(quadrant: Expr, *values: Expr) -> Expr:
+    """Return the one of four values that belongs to quadrant 0, 1, 2 or 3."""
+    result = values[3]
+    for number in (2, 1, 0):
+        result = Select(Compare("<", quadrant, real(number + 0.5)), values[number], result)
+    return result
+
+
+def sine() -> Function:
+    """sin x, x clamped to [-1e5, 1e5] rad; x itself where tiny, so that sin -0.0 is -0.0."""
+    body = Body()
+    quadrant, head, tail = reduced(body)
+    sin, cos = kernels(body, head, tail)
+    turned = by_quadrant(quadrant, sin, cos, Unary("-", sin), Unary("-", cos))
+    body.let("y", Select(Compare("<", Call("abs", (X,)), TINY), X, turned))
+    return body.function("sin", "sine; |x| <= 1e5 rad, clamped; error < 0.9 ULP")
+
+
+def cosine() -> Function:
+    """cos x, x clamped to [-1e5, 1e5] rad."""
+    body = Body()
+    quadrant, head, tail = reduced(body)
+    sin, cos = kernels(body, head, tail)
+    body.let("y", by_quadrant(quadrant, cos, Unary("-", sin), Unary("-", cos), sin))
+    return body.function("cos", "cosine; |x| <= 1e5 rad, clamped; error < 0.9 ULP")
+
+
+def hyperbolic_tangent() -> Function:
+    """tanh x by Lambert's fraction below 0.625, above as 1 - 2 / (e^2x + 1) (Cody & Waite 1980).
+
+    Formed of |x| and given the sign of x; x itself where tiny, so that tanh -0.0 is -0.0.
+    """
+    body = Body()
+    size = body.let("size", Call("abs", (X,)))
+    bounded = body.let("bounded", Select(Compare(">", size, TANH_FULL), TANH_FULL, size))
+    square = body.let("square", multiply(bounded, bounded))
+    above = body.let("above", horner(LAMBERT_ABOVE, square))
+    below = body.let("below", horner(LAMBERT_BELOW, square))
+    low = subtract(bounded, divide(multiply(multiply(bounded, square), above), below))
+    power = Call("exp", (add(bounded, bounded),))
+    high = subtract(real(1.0), divide(real(2.0), add(power, real(1.0))))
+    split = Compare("<", bounded, TANH_SPLIT)
+    magnitude = body.let("magnitude", Select(split, low, high))
+    signed = Select(Compare("<", X, real(0.0)), Unary("-", magnitude), magnitude)
+    body.let("y", Select(Compare("<", size, TINY), X, signed))
+    return body.function("tanh", "hyperbolic tangent; every x; error < 1.5 ULP")
+
+
+FUNCTIONS: Mapping[str, Function] = {
+    function.name: function for function in (sine(), cosine(), exponential(), hyperbolic_tangent())
+}
+"""By name; a function that calls another one (tanh calls exp) comes after it."""

@@ -1,0 +1,120 @@
+"""Evaluate: the meaning of each elementary operation, and of a constant expression, in float64."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+
+from language.elementary import FUNCTIONS
+from language.program import (
+    Assign,
+    Binary,
+    Call,
+    Compare,
+    Expr,
+    Item,
+    Ref,
+    Select,
+    Unary,
+    Value,
+)
+
+Scalar = float | int | bool
+
+
+def divide(a: float, b: float) -> float:
+    """IEEE 754 division: x/0 is an infinity or NaN, never an exception."""
+    try:
+        return a / b
+    except ZeroDivisionError:
+        if a == 0.0 or a != a:
+            return math.nan
+        return math.copysign(math.inf, a) * math.copysign(1.0, b)
+
+
+def square_root(a: float) -> float:
+    """IEEE 754 square root: NaN below zero."""
+    return math.sqrt(a) if a >= 0.0 else (a if a == 0.0 else math.nan)
+
+
+def minimum(a: float, b: float) -> float:
+    """Return `b if b < a else a` (codegen rule R8)."""
+    return b if b < a else a
+
+
+def maximum(a: float, b: float) -> float:
+    """Return `b if b > a else a` (codegen rule R8)."""
+    return b if b > a else a
+
+
+def clip(x: float, low: float, high: float) -> float:
+    """Return x within [low, high]; NaN becomes low (codegen rule R8)."""
+    return (x if x < high else high) if x > low else low
+
+
+def sign(x: float) -> float:
+    """Return -1, 0 or 1; 0 for NaN."""
+    return 1.0 if x > 0.0 else (-1.0 if x < 0.0 else 0.0)
+
+
+def power_of_two(k: float) -> float:
+    """Return 2^k exactly, for a whole-valued k from -1022 to 1023."""
+    return math.ldexp(1.0, int(k)) if k == k else k
+
+
+ELEMENTARY: Mapping[str, Callable[..., Scalar]] = {
+    "abs": abs,
+    "sqrt": square_root,
+    "min": minimum,
+    "max": maximum,
+    "clip": clip,
+    "sign": sign,
+    "pow2": power_of_two,
+    "real": float,
+}
+OPERATIONS: Mapping[str, Callable[[Scalar, Scalar], Scalar]] = {
+    "+": lambda a, b: a + b,
+    "-": lambda a, b: a - b,
+    "*": lambda a, b: a * b,
+    "/": divide,
+    "and": lambda a, b: bool(a) and bool(b),
+    "or": lambda a, b: bool(a) or bool(b),
+    "<": lambda a, b: a < b,
+    "<=": lambda a, b: a <= b,
+    ">": lambda a, b: a > b,
+    ">=": lambda a, b: a >= b,
+    "==": lambda a, b: a == b,
+    "!=": lambda a, b: a != b,
+}
+
+
+def evaluate(expr: Expr, values: Mapping[str, Scalar]) -> Scalar:
+    """Return the value of an expression of scalars. Slow and plain: for check time only."""
+    match expr:
+        case Value(value):
+            return value
+        case Ref(name):
+            return values[name]
+        case Unary("-", operand):
+            return -evaluate(operand, values)
+        case Unary("not", operand):
+            return not evaluate(operand, values)
+        case Binary(operator, left, right) | Compare(operator, left, right):
+            return OPERATIONS[operator](evaluate(left, values), evaluate(right, values))
+        case Select(condition, then, other):
+            return evaluate(then if evaluate(condition, values) else other, values)
+        case Call(function, arguments):
+            return apply(function, [evaluate(argument, values) for argument in arguments])
+        case Item() | _:
+            raise TypeError(f"not a constant expression: {expr}")
+
+
+def apply(function: str, arguments: list[Scalar]) -> Scalar:
+    """Return the value of an elementary operation or function."""
+    if function in ELEMENTARY:
+        return ELEMENTARY[function](*arguments)
+    values: dict[str, Scalar] = {"work.x": arguments[0]}
+    for op in FUNCTIONS[function].body:
+        assert isinstance(op, Assign)
+        values[op.target] = evaluate(op.value, values)
+    return values["work.y"]

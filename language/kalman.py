@@ -1,0 +1,257 @@
+"""Kalman: a steady observer as operations - prediction over a period, correction by a gain.
+
+x(k|k-1) = Phi x(k-1) + G (B u(k-1) + f), x(k) = x(k|k-1) + L (y(k) - C x(k|k-1)); Phi = e^(A T),
+G its integral, L from the discrete Riccati equation with Van Loan's noise covariance
+(Grewal and Andrews 2001, section 4.2; Van Loan 1978).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from language.constants import constant_value
+from language.evaluate import Scalar
+from language.lower import Names, expression, tunables_of
+from language.matrix import Matrix, exponential, exponential_integral, multiply
+from language.model import Automaton, Formula, Mode, Observer
+from language.problem import Problems
+from language.program import (
+    Assign,
+    Block,
+    Constant,
+    Expr,
+    ObserverInfo,
+    Op,
+    Ref,
+    Select,
+    Variable,
+    add,
+    multiply as times,
+    real,
+    subtract,
+    total,
+)
+from language.riccati import discrete_noise, steady_gain
+
+
+@dataclass(frozen=True)
+class Kalman:
+    """The operations and numbers of one mode's observer."""
+
+    predict: Block
+    correct: Block
+    constants: tuple[Constant, ...]
+    info: ObserverInfo
+
+
+def kalman(
+    automaton: Automaton,
+    mode: Mode,
+    before: Names,
+    values: Mapping[str, Scalar],
+    problems: Problems,
+) -> Kalman | None:
+    """Return the observer of a mode; None where its numbers cannot be computed (reported).
+
+    `before` says what names are during the prediction: states now, inputs of the tick before.
+    """
+    observer = mode.observer
+    assert observer and automaton.period is not None
+    period = float(automaton.period)
+    with problems.collecting():
+        a = _matrix(automaton, values, observer.a, observer.states, observer.states, "A")
+        b = _matrix(automaton, values, observer.b, observer.states, observer.inputs, "B")
+        c = _output_matrix(automaton, values, observer)
+        q = _diagonal(automaton, values, observer.process_noise, observer.states)
+        r = _diagonal(automaton, values, observer.measurement_noise, tuple(observer.measures))
+        try:
+            phi, held = exponential(a, period), exponential_integral(a, period)
+            gain, _ = steady_gain(phi, discrete_noise(a, q, period), c, r)
+        except ValueError as error:
+            problems.error("observer", observer.span, f"the observer has no steady gain: {error}")
+            return None
+        gamma = multiply(held, b) if observer.inputs else ()
+        numbers = {"Phi": phi, "Gamma": gamma, "G": held, "L": gain, "C": c}
+        return _built(automaton, mode, observer, before, numbers, (a, b, c, q, r))
+    return None
+
+
+def observer_variables(automaton: Automaton) -> list[Variable]:
+    """Return the variables that the observers of an automaton use."""
+    found: dict[str, Variable] = {}
+    for mode in automaton.modes.values():
+        if mode.observer is None:
+            continue
+        for name in mode.observer.states:
+            unit = str(automaton.states[name].unit.dimension)
+            found[f"p{name}"] = Variable(f"work.predicted_{name}", "real", unit)
+            found[f"f{name}"] = Variable(f"work.f_{name}", "real", f"({unit})/s")
+        for name in mode.observer.measures:
+            unit = str(automaton.inputs[name].unit.dimension)
+            about = f"{name} minus its prediction, 0 where there is no new value"
+            found[f"i{name}"] = Variable(f"innovation.{name}", "real", unit, about=about)
+    return list(found.values())
+
+
+def _built(
+    automaton: Automaton,
+    mode: Mode,
+    observer: Observer,
+    before: Names,
+    numbers: Mapping[str, Matrix],
+    given: tuple[Matrix, Matrix, Matrix, Matrix, Matrix],
+) -> Kalman:
+    names = _Names(mode.name, observer)
+    depends_on = tunables_of(automaton, _formulas(observer))
+    constants = names.constants(numbers, depends_on)
+    prefix = f"{automaton.name} "
+    info = ObserverInfo(
+        mode=mode.name,
+        states=observer.states,
+        inputs=observer.inputs,
+        measures=tuple(observer.measures),
+        a=given[0],
+        b=given[1],
+        c=given[2],
+        process_noise=given[3],
+        measurement_noise=given[4],
+        period=float(automaton.period or 0),
+        solved={constant.name: constant.name for constant in constants},
+    )
+    predict = _predict(observer, names, numbers, before, prefix)
+    correct = _correct(observer, names, numbers)
+    return Kalman(predict, correct, constants, info)
+
+
+@dataclass(frozen=True)
+class _Names:
+    """Names of an observer's solved constants: `solved.<mode>_<letter>.<row>.<column>`."""
+
+    mode: str
+    observer: Observer
+
+    def of(self, letter: str, row: str, column: str) -> str:
+        return f"solved.{self.mode}_{letter}.{row}.{column}"
+
+    def sides(self, letter: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        states, measures = self.observer.states, tuple(self.observer.measures)
+        return {
+            "Phi": (states, states),
+            "Gamma": (states, self.observer.inputs),
+            "G": (states, states),
+            "L": (states, measures),
+            "C": (measures, states),
+        }[letter]
+
+    def constants(
+        self, numbers: Mapping[str, Matrix], depends_on: tuple[str, ...]
+    ) -> tuple[Constant, ...]:
+        found = []
+        for letter, matrix in numbers.items():
+            rows, columns = self.sides(letter)
+            for row, entries in zip(rows, matrix, strict=bool(matrix)):
+                for column, value in zip(columns, entries, strict=True):
+                    if value != 0.0 and not _left_out(letter, column, self.observer):
+                        name = self.of(letter, row, column)
+                        found.append(Constant(name, "solved", value, depends_on=depends_on))
+        return tuple(found)
+
+    def row(self, letter: str, matrix: Matrix, row: str, values: Mapping[str, Expr]) -> list[Expr]:
+        """Return the products of a row with values by column; 0 is left out, 1 is not multiplied."""
+        rows, columns = self.sides(letter)
+        if not matrix:
+            return []
+        return [
+            values[column]
+            if value == 1.0
+            else times(Ref(self.of(letter, row, column)), values[column])
+            for column, value in zip(columns, matrix[rows.index(row)], strict=True)
+            if value != 0.0 and column in values
+        ]
+
+
+def _left_out(letter: str, column: str, observer: Observer) -> bool:
+    return letter == "G" and column not in observer.f
+
+
+def _predict(
+    observer: Observer,
+    names: _Names,
+    numbers: Mapping[str, Matrix],
+    before: Names,
+    prefix: str,
+) -> Block:
+    state: dict[str, Expr] = {name: Ref(f"state.{name}") for name in observer.states}
+    held = {name: before[name] for name in observer.inputs}
+    ops: list[Op] = []
+    free: dict[str, Expr] = {}
+    for row, formula in observer.f.items():
+        ops.append(Assign(f"work.f_{row}", expression(formula.tree, before), prefix + formula.key))
+        free[row] = Ref(f"work.f_{row}")
+    for row in observer.states:
+        parts = names.row("Phi", numbers["Phi"], row, state)
+        parts += names.row("Gamma", numbers["Gamma"], row, held)
+        parts += names.row("G", numbers["G"], row, free)
+        ops.append(Assign(f"work.predicted_{row}", total(parts), prefix + observer.key))
+    ops += [Assign(f"state.{row}", Ref(f"work.predicted_{row}")) for row in observer.states]
+    return tuple(ops)
+
+
+def _correct(observer: Observer, names: _Names, numbers: Mapping[str, Matrix]) -> Block:
+    state: dict[str, Expr] = {name: Ref(f"state.{name}") for name in observer.states}
+    error: dict[str, Expr] = {name: Ref(f"innovation.{name}") for name in observer.measures}
+    ops: list[Op] = []
+    for name in observer.measures:
+        seen = total(names.row("C", numbers["C"], name, state))
+        fresh = Ref(f"is_new.{name}")
+        value = Select(fresh, subtract(Ref(f"input.{name}"), seen), real(0.0))
+        ops.append(Assign(f"innovation.{name}", value))
+    for row in observer.states:
+        parts = names.row("L", numbers["L"], row, error)
+        if parts:
+            ops.append(Assign(f"state.{row}", add(Ref(f"state.{row}"), total(parts))))
+    return tuple(ops)
+
+
+def _formulas(observer: Observer) -> list[Formula]:
+    rows = [*observer.a.values(), *observer.b.values(), *observer.c.values()]
+    noise = [observer.process_noise, observer.measurement_noise]
+    return [formula for row in [*rows, *noise] for formula in row.values()]
+
+
+def _matrix(
+    automaton: Automaton,
+    values: Mapping[str, Scalar],
+    entries: Mapping[str, Mapping[str, Formula]],
+    rows: tuple[str, ...],
+    columns: tuple[str, ...],
+    what: str,
+) -> Matrix:
+    def value(row: str, column: str) -> float:
+        formula = entries.get(row, {}).get(column)
+        return constant_value(formula, automaton, values, what) if formula else 0.0
+
+    return tuple(tuple(value(row, column) for column in columns) for row in rows)
+
+
+def _diagonal(
+    automaton: Automaton,
+    values: Mapping[str, Scalar],
+    entries: Mapping[str, Formula],
+    names: tuple[str, ...],
+) -> Matrix:
+    rows = {name: {name: formula} for name, formula in entries.items()}
+    return _matrix(automaton, values, rows, names, names, "noise")
+
+
+def _output_matrix(
+    automaton: Automaton, values: Mapping[str, Scalar], observer: Observer
+) -> Matrix:
+    measures = tuple(observer.measures)
+    if observer.c:
+        return _matrix(automaton, values, observer.c, measures, observer.states, "C")
+    return tuple(
+        tuple(1.0 if state == observer.measures[name] else 0.0 for state in observer.states)
+        for name in measures
+    )

@@ -1,0 +1,42 @@
+"""Load: from a name or path to a checked Automaton, and from that to its Program."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from language.automaton import read_automaton
+from language.check import check_automaton
+from language.continuous import continuous_program
+from language.document import Document, Scalar
+from language.model import Automaton
+from language.problem import Problems, Source, Span
+from language.program import Program
+from language.project import Project, read_document
+from language.sampled import sampled_program
+
+
+def automaton_of(
+    document: Document, project: Project, values: Mapping[str, Scalar] | None = None
+) -> Automaton:
+    """Return the checked automaton of a document. Raises SpecError with all problems."""
+    return check_automaton(read_automaton(document, project, values))
+
+
+def load_automaton(
+    reference: str, project: Project, values: Mapping[str, Scalar] | None = None
+) -> Automaton:
+    """Return the checked automaton of a name or path. Raises SpecError with all problems."""
+    return automaton_of(read_document(project.path_of(reference)), project, values)
+
+
+def program_of(automaton: Automaton) -> Program:
+    """Return the Program of a checked automaton. Raises SpecError."""
+    problems = Problems()
+    if automaton.is_sampled:
+        return sampled_program(automaton, problems)
+    return continuous_program(automaton, problems)
+
+
+def command_line_value(text: str, option: str = "--set") -> Scalar:
+    """Return a value given on the command line, as a scalar with a place."""
+    return Scalar(text, Span(Source(option, (text,)), 1, 1, max(1, len(text))))

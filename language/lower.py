@@ -1,0 +1,220 @@
+"""Lower: expressions and formulas of a model to expressions and operations of a Program."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from fractions import Fraction
+
+from language.automaton import coefficient_of
+from language.check import equation_order
+from language.model import Automaton, Balance, Formula, Mode
+from language.problem import SpecError
+from language.program import (
+    Assign,
+    Binary,
+    Call,
+    Compare,
+    Constant,
+    Expr,
+    Op,
+    Ref,
+    Select,
+    Unary,
+    Value,
+    divide,
+    multiply,
+    real,
+)
+from language.syntax import (
+    Application,
+    Arithmetic,
+    Choice,
+    Logic,
+    Name,
+    Negative,
+    Not,
+    Number,
+    Power,
+    Relation,
+    Tree,
+    Truth,
+    names,
+)
+
+Names = Mapping[str, Expr]
+"""What each name of the model is at one place; `in(x.y)` is looked up as `in x.y`."""
+
+
+def expression(tree: Tree, known: Names) -> Expr:
+    """Return the Program's expression of a tree: same order of operations, nothing simplified."""
+    match tree:
+        case Number(value, _, _):
+            return real(rounded(value))
+        case Truth(value, _):
+            return Value(value)
+        case Name(path, _):
+            return known[path]
+        case Negative(operand, _):
+            return Unary("-", expression(operand, known))
+        case Not(operand, _):
+            return Unary("not", expression(operand, known))
+        case Arithmetic(operator, left, right, _):
+            return Binary(operator, expression(left, known), expression(right, known))  # type: ignore[arg-type]
+        case Logic(operator, left, right, _):
+            return Binary(operator, expression(left, known), expression(right, known))  # type: ignore[arg-type]
+        case Relation(operator, left, right, _):
+            return Compare(operator, expression(left, known), expression(right, known))  # type: ignore[arg-type]
+        case Power(base, exponent, _):
+            return _power(expression(base, known), exponent)
+        case Choice(condition, then, other, _):
+            return Select(*(expression(part, known) for part in (condition, then, other)))
+        case Application("in", (Name(path, _),), _):
+            return known[f"in {path}"]
+        case Application(function, arguments, _):
+            return Call(function, tuple(expression(part, known) for part in arguments))
+
+
+def rounded(value: Fraction) -> float:
+    """Return the nearest double: one rounding from the exact value (codegen rule R4)."""
+    return value.numerator / value.denominator
+
+
+def _power(base: Expr, exponent: int) -> Expr:
+    """x^n by multiplications from the left; a negative n divides 1 by it."""
+    if exponent == 0:
+        return real(1.0)
+    result = base
+    for _ in range(abs(exponent) - 1):
+        result = multiply(result, base)
+    return divide(real(1.0), result) if exponent < 0 else result
+
+
+def rate(balance: Balance, known: Names) -> Expr:
+    """Return der(state): the right side, divided once by the coefficient."""
+    factor = coefficient_of(balance.left, balance.state)
+    if isinstance(factor, SpecError):
+        raise factor
+    right = expression(balance.right, known)
+    return right if factor is None else divide(right, expression(factor, known))
+
+
+def equations(
+    mode: Mode, known: dict[str, Expr], group: str, prefix: str, wanted: Iterable[str] | None = None
+) -> list[Op]:
+    """Return the assignments of a mode's equations in order, and make them known.
+
+    `wanted` limits them to those that these names need, directly or through others.
+    """
+    order = equation_order(mode)
+    needed = set(order) if wanted is None else closure(mode, wanted)
+    ops: list[Op] = []
+    for name in order:
+        if name in needed:
+            formula = mode.equations[name]
+            ops.append(
+                Assign(f"{group}{name}", expression(formula.tree, known), prefix + formula.key)
+            )
+            known[name] = Ref(f"{group}{name}")
+    return ops
+
+
+def closure(mode: Mode, wanted: Iterable[str]) -> set[str]:
+    """Return the equations of a mode that the wanted names need."""
+    needed: set[str] = set()
+    stack = [name for name in wanted if name in mode.equations]
+    while stack:
+        name = stack.pop()
+        if name not in needed:
+            needed.add(name)
+            reads = names(mode.equations[name].tree)
+            stack.extend(read.path for read in reads if read.path in mode.equations)
+    return needed
+
+
+def reads_of(trees: Iterable[Tree]) -> list[str]:
+    """Return the names read in some trees."""
+    return [read.path for tree in trees for read in names(tree)]
+
+
+def constant_names(automaton: Automaton) -> dict[str, Expr]:
+    """Return the parameters as what a Program reads."""
+    groups = {"fixed": "constant", "tunable": "calibration", "derived": "derived"}
+    kinds = parameter_kinds(automaton)
+    return {name: Ref(f"{groups[kind]}.{name}") for name, kind in kinds.items()}
+
+
+def parameter_kinds(automaton: Automaton) -> dict[str, str]:
+    """Return each parameter's kind: what is derived from fixed values alone is fixed."""
+    kinds: dict[str, str] = {}
+
+    def kind_of(name: str) -> str:
+        if name not in kinds:
+            parameter = automaton.parameters[name]
+            kinds[name] = parameter.kind
+            if parameter.derived:
+                reads = {kind_of(read.path) for read in names(parameter.derived.tree)}
+                kinds[name] = "fixed" if reads <= {"fixed"} else "derived"
+        return kinds[name]
+
+    for name in automaton.parameters:
+        kind_of(name)
+    return kinds
+
+
+def parameter_order(automaton: Automaton) -> list[str]:
+    """Return the parameters so that each comes after those that it is derived from."""
+    done: dict[str, None] = {}
+
+    def visit(name: str) -> None:
+        parameter = automaton.parameters[name]
+        if name not in done:
+            for read in names(parameter.derived.tree) if parameter.derived else []:
+                visit(read.path)
+            done[name] = None
+
+    for name in automaton.parameters:
+        visit(name)
+    return list(done)
+
+
+def tunables_of(automaton: Automaton, formulas: Iterable[Formula]) -> tuple[str, ...]:
+    """Return the tunable parameters that some formulas read, directly or through derived ones."""
+    found: dict[str, None] = {}
+    stack = reads_of(formula.tree for formula in formulas)
+    seen: set[str] = set()
+    while stack:
+        name = stack.pop()
+        parameter = automaton.parameters.get(name)
+        if parameter is None or name in seen:
+            continue
+        seen.add(name)
+        if parameter.kind == "tunable":
+            found[name] = None
+        if parameter.derived:
+            stack.extend(read.path for read in names(parameter.derived.tree))
+    return tuple(sorted(found))
+
+
+def constant_of(automaton: Automaton, name: str, kind: str, value: float) -> Constant:
+    """Return the Program's constant for a parameter."""
+    parameter = automaton.parameters[name]
+    groups = {"fixed": "constant", "tunable": "calibration", "derived": "derived"}
+    limits = parameter.range
+    return Constant(
+        name=f"{groups[kind]}.{name}",
+        kind=kind,  # type: ignore[arg-type]
+        value=value,
+        unit=si_text(automaton, name),
+        key=f"{automaton.name} {parameter.key}",
+        range=(rounded(limits[0]), rounded(limits[1])) if limits else None,
+    )
+
+
+def si_text(automaton: Automaton, name: str) -> str:
+    """Return the SI unit of a name, for comments: the unit as written where it is SI."""
+    things = {**automaton.parameters, **automaton.inputs, **automaton.states}
+    unit = things[name].unit if name in things else None
+    if unit and unit.factor == 1 and not unit.offset:
+        return unit.text
+    dimension = unit.dimension if unit else automaton.dimensions.get(name)
+    return str(dimension) if dimension else "1"

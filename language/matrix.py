@@ -1,0 +1,235 @@
+"""Small matrices of floats: arithmetic, the linear solve, the exponential and its integral.
+
+The results are printed into ECU C code, so their bits may depend neither on the CPU nor on a
+library: one IEEE 754 binary64 rounding per operation, products summed from left to right by plain
+loops (`sum` compensates since Python 3.12), scaling by powers of two, which is exact. Arithmetic
+lets inf and nan pass; whatever solves refuses them. A matrix is a tuple of rows, a vector is n x 1.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+Matrix = tuple[tuple[float, ...], ...]
+
+TERMS = 19
+"""Terms of a Taylor sum of (e^z - 1)/z, |z| <= 1: the rest is below 2^-60, under the rounding."""
+SWEEPS = 50
+"""Balancing settles in a few sweeps; the bound only makes its end certain. Any exponents serve."""
+WORTH = 0.95
+"""A state is scaled if that shrinks its row plus column by 5 % (Parlett and Reinsch's gamma)."""
+
+
+def multiply(a: Matrix, b: Matrix) -> Matrix:
+    """Return A B, (n, k) times (k, m) -> (n, m), summed left to right; ValueError if k differs."""
+    if len(a[0]) != len(b):
+        raise ValueError(f"multiply: {shape(a)} times {shape(b)}")
+    columns = transpose(b)
+    return tuple(tuple(_dot(row, column) for column in columns) for row in a)
+
+
+def add(a: Matrix, b: Matrix) -> Matrix:
+    """Return A + B, both (n, m); ValueError if the shapes differ."""
+    if shape(a) != shape(b):
+        raise ValueError(f"add: {shape(a)} and {shape(b)}")
+    return tuple(tuple(x + y for x, y in zip(p, q, strict=True)) for p, q in zip(a, b, strict=True))
+
+
+def subtract(a: Matrix, b: Matrix) -> Matrix:
+    """Return A - B, both (n, m); ValueError if the shapes differ."""
+    return add(a, scale(-1.0, b))
+
+
+def scale(factor: float, a: Matrix) -> Matrix:
+    """Return factor A, (n, m) -> (n, m)."""
+    return tuple(tuple(factor * x for x in row) for row in a)
+
+
+def transpose(a: Matrix) -> Matrix:
+    """Return A', (n, m) -> (m, n)."""
+    return tuple(zip(*a, strict=True))
+
+
+def identity(n: int) -> Matrix:
+    """Return I, (n, n)."""
+    return tuple(tuple(1.0 if i == j else 0.0 for j in range(n)) for i in range(n))
+
+
+def symmetrise(a: Matrix) -> Matrix:
+    """Return (A + A')/2, (n, n), symmetric to the last bit because float addition commutes."""
+    return scale(0.5, add(a, transpose(a)))
+
+
+def solve(a: Matrix, b: Matrix) -> Matrix:
+    """Return X of A X = B, (n, n) and (n, m) -> (n, m), by elimination with partial pivoting.
+
+    Gauss; Golub and Van Loan, Matrix Computations (4th ed. 2013), section 3.4. ValueError: shapes,
+    a non-finite entry, overflow, a pivot that is exactly zero. A nearly singular A is not noticed.
+    """
+    require_finite("solve: A", a)
+    require_finite("solve: B", b)
+    n = len(a)
+    if len(a[0]) != n or len(b) != n:
+        raise ValueError(f"solve: A is {shape(a)}, B is {shape(b)}")
+    rows = [[*p, *q] for p, q in zip(a, b, strict=True)]
+    for k in range(n):
+        _eliminate(rows, k)
+    for k in reversed(range(n)):
+        for column in range(n, len(rows[k])):
+            total = rows[k][column]
+            for j in range(k + 1, n):
+                total -= rows[k][j] * rows[j][column]
+            rows[k][column] = total / rows[k][k]
+    return require_finite("solve: X", tuple(tuple(row[n:]) for row in rows))
+
+
+def exponential(a: Matrix, h: float) -> Matrix:
+    """Return the transition matrix e^(A h), (n, n), of x' = A x over h [s]; h of any sign.
+
+    A (n, n): entry i j in unit_i/(unit_j s). Scaling and squaring (Higham 2005, SIAM J. Matrix
+    Anal. Appl. 26, section 2) of the balanced A h, with a Taylor sum for Pade's quotient.
+    ValueError: A not square, a non-finite entry, overflow.
+    """
+    return _transition("exponential", a, h)[0]
+
+
+def exponential_integral(a: Matrix, h: float) -> Matrix:
+    """Return the integral of e^(A s) over s from 0 to h [s], (n, n): h phi_1(A h).
+
+    Times B it is the input matrix of an input that is held. The block H of Van Loan 1978 (IEEE
+    Trans. Autom. Control 23, 395-404), doubled as there: F(2t) = F(t) + Phi(t) F(t).
+    A and errors as for `exponential`.
+    """
+    return _transition("exponential_integral", a, h)[1]
+
+
+def short_step(name: str, a: Matrix, h: float) -> tuple[Matrix, tuple[int, ...], int]:
+    """Return X = D^-1 A D h / 2^halvings with row sums below 1/2, the exponents of D, halvings.
+
+    A (n, n) in 1/s, h in s, X (n, n) a pure number; `name` opens the text of a ValueError: A not
+    square, a non-finite entry of A or A h.
+    """
+    require_finite(f"{name}: A", a)
+    if len(a[0]) != len(a):
+        raise ValueError(f"{name}: A is {shape(a)}, not square")
+    step = require_finite(f"{name}: A h", scale(h, a))
+    exponents = balancing(step)
+    balanced = shift(step, tuple(-e for e in exponents), exponents)
+    halvings = max(0, math.frexp(max(sum_of_sizes(row) for row in balanced))[1] + 1)
+    return shift(balanced, (-halvings,) * len(a), (0,) * len(a)), exponents, halvings
+
+
+def balancing(a: Matrix) -> tuple[int, ...]:
+    """Return the exponents e of D = diag(2^e) for which D^-1 A D has rows as large as its columns.
+
+    A (n, n), finite. Parlett and Reinsch 1969 (Numer. Math. 13, 293-304), radix 2, no permutation.
+    A state that only acts, or is only acted upon, has no balance: it is scaled until that is < 1.
+    """
+    work = [[abs(x) for x in row] for row in a]
+    exponents = [0] * len(a)
+    for _ in range(SWEEPS):
+        before = tuple(exponents)
+        for i in range(len(a)):
+            step = _balancing_step(work, i)
+            exponents[i] += step
+            for j in range(len(a)):
+                if j != i:
+                    work[j][i] = ldexp(work[j][i], step)
+                    work[i][j] = ldexp(work[i][j], -step)
+        if tuple(exponents) == before:
+            break
+    return tuple(exponents)
+
+
+def shift(a: Matrix, rows: tuple[int, ...], columns: tuple[int, ...]) -> Matrix:
+    """Return diag(2^rows) A diag(2^columns), (n, m), exact unless it over- or underflows."""
+    return tuple(
+        tuple(ldexp(x, r + c) for x, c in zip(row, columns, strict=True))
+        for row, r in zip(a, rows, strict=True)
+    )
+
+
+def ldexp(x: float, exponent: int) -> float:
+    """Return x 2^exponent; infinite instead of OverflowError, to be refused with its place."""
+    try:
+        return math.ldexp(x, exponent)
+    except OverflowError:
+        return math.copysign(math.inf, x)
+
+
+def require_finite(name: str, a: Matrix) -> Matrix:
+    """Return A; ValueError naming the entry if A is empty, ragged or holds inf or nan."""
+    if not a or not a[0] or any(len(row) != len(a[0]) for row in a):
+        raise ValueError(f"{name} is empty or its rows differ in length: {a!r}")
+    for i, row in enumerate(a):
+        for j, x in enumerate(row):
+            if not math.isfinite(x):
+                raise ValueError(f"{name}[{i}][{j}] is {x!r}")
+    return a
+
+
+def sum_of_sizes(values: Iterable[float]) -> float:
+    """Return |x_0| + |x_1| + ..., from left to right."""
+    total = 0.0
+    for x in values:
+        total += abs(x)
+    return total
+
+
+def shape(a: Matrix) -> str:
+    """Return the shape for messages: `(2, 3)`."""
+    return f"({len(a)}, {len(a[0]) if a else 0})"
+
+
+def _transition(name: str, a: Matrix, h: float) -> tuple[Matrix, Matrix]:
+    """Return e^(A h) and its integral: Horner's rule for phi_1, small terms first, then doubling."""
+    x, exponents, halvings = short_step(name, a, h)
+    unit = identity(len(a))
+    series = unit
+    for k in range(TERMS, 1, -1):
+        series = add(unit, scale(1.0 / k, multiply(x, series)))
+    phi = add(unit, multiply(x, series))
+    integral = scale(ldexp(h, -halvings), series)
+    for _ in range(halvings):
+        integral = add(integral, multiply(phi, integral))
+        phi = multiply(phi, phi)
+    down = tuple(-e for e in exponents)
+    return (
+        require_finite(f"{name}: result", shift(phi, exponents, down)),
+        require_finite(f"{name}: result", shift(integral, exponents, down)),
+    )
+
+
+def _balancing_step(work: list[list[float]], i: int) -> int:
+    """Return the power of two for state i: sizes in `work` (n, n), the diagonal does not count."""
+    row = sum_of_sizes(x for j, x in enumerate(work[i]) if j != i)
+    column = sum_of_sizes(other[i] for j, other in enumerate(work) if j != i)
+    if row == 0.0 or column == 0.0:
+        return max(0, math.frexp(row)[1]) - max(0, math.frexp(column)[1])
+    step = (math.frexp(row)[1] - math.frexp(column)[1]) // 2
+    scaled = ldexp(column, step) + ldexp(row, -step)
+    return step if scaled < WORTH * (column + row) else 0
+
+
+def _eliminate(rows: list[list[float]], k: int) -> None:
+    """Bring the largest entry of column k into row k and clear that column in the rows below."""
+    best = k
+    for i in range(k + 1, len(rows)):
+        if abs(rows[i][k]) > abs(rows[best][k]):
+            best = i
+    rows[k], rows[best] = rows[best], rows[k]
+    pivot = rows[k][k]
+    if pivot == 0.0:
+        raise ValueError(f"solve: A is singular, no pivot is left in column {k}")
+    for row in rows[k + 1 :]:
+        factor = row[k] / pivot
+        for j in range(k, len(row)):
+            row[j] -= factor * rows[k][j]
+
+
+def _dot(row: tuple[float, ...], column: tuple[float, ...]) -> float:
+    total = 0.0
+    for x, y in zip(row, column, strict=True):
+        total += x * y
+    return total

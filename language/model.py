@@ -1,0 +1,252 @@
+"""Model: one checked thing of the language - an automaton, a system, a scenario or a map."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Literal
+
+from language.problem import Span
+from language.syntax import Tree
+from language.units import Dimension, Unit
+
+Range = tuple[Fraction, Fraction]
+Kind = Literal["fixed", "tunable", "derived"]
+
+
+@dataclass(frozen=True)
+class Formula:
+    """An expression and the key path that it stands under."""
+
+    tree: Tree
+    key: str
+
+    @property
+    def span(self) -> Span:
+        """The place of the expression."""
+        return self.tree.span
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A value in SI (exact) or, if derived, an expression of other parameters."""
+
+    name: str
+    kind: Kind
+    unit: Unit
+    value: Fraction | None
+    derived: Formula | None
+    range: Range | None
+    key: str
+    span: Span
+
+
+@dataclass(frozen=True)
+class Input:
+    """A value from outside; `truth` inputs are true or false, the others are real."""
+
+    name: str
+    unit: Unit
+    truth: bool
+    default: Fraction | None
+    range: Range | None
+    key: str
+    span: Span
+
+
+@dataclass(frozen=True)
+class State:
+    """A continuous variable, or what a sampled automaton carries from tick to tick."""
+
+    name: str
+    unit: Unit
+    initial: Formula
+    range: Range | None
+    key: str
+    span: Span
+
+
+@dataclass(frozen=True)
+class Balance:
+    """`left = right`, where left is a coefficient times der(state)."""
+
+    state: str
+    left: Tree
+    right: Tree
+    key: str
+
+
+@dataclass(frozen=True)
+class Transition:
+    """From its mode to `target` when the guard held for `wait`, with resets."""
+
+    name: str
+    source: str
+    target: str
+    when: Formula
+    wait: Formula | None
+    priority: int | None
+    reset: Mapping[str, Formula]
+    key: str
+    span: Span
+
+
+@dataclass(frozen=True)
+class Observer:
+    """A steady Kalman filter: dx/dt = A x + B u + f, y = C x, by row and column name."""
+
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    measures: Mapping[str, str]
+    a: Mapping[str, Mapping[str, Formula]]
+    b: Mapping[str, Mapping[str, Formula]]
+    c: Mapping[str, Mapping[str, Formula]]
+    f: Mapping[str, Formula]
+    process_noise: Mapping[str, Formula]
+    measurement_noise: Mapping[str, Formula]
+    key: str
+    span: Span
+
+
+@dataclass(frozen=True)
+class Run:
+    """A mode of the model run inside the tick, following the model's own transitions."""
+
+    mode: str
+    method: Literal["rk4", "exponential"]
+    substeps: int
+    events: int
+    key: str
+    span: Span
+
+
+@dataclass(frozen=True)
+class Mode:
+    """A discrete state: what holds and what happens in it."""
+
+    name: str
+    number: int
+    equations: Mapping[str, Formula]
+    flow: Mapping[str, Balance]
+    update: Mapping[str, Formula]
+    observer: Observer | None
+    run: Run | None
+    transitions: tuple[Transition, ...]
+    key: str
+    span: Span
+
+
+@dataclass(frozen=True)
+class Automaton:
+    """A hybrid automaton: sampled if it has a period, continuous otherwise."""
+
+    name: str
+    period: Fraction | None
+    step: Fraction
+    model: Automaton | None
+    parameters: Mapping[str, Parameter]
+    inputs: Mapping[str, Input]
+    states: Mapping[str, State]
+    modes: Mapping[str, Mode]
+    initial: str
+    outputs: tuple[str, ...]
+    span: Span
+    dimensions: Mapping[str, Dimension] = field(default_factory=dict, repr=False)
+
+    @property
+    def is_sampled(self) -> bool:
+        """Tell whether the automaton ticks."""
+        return self.period is not None
+
+
+@dataclass(frozen=True)
+class Instance:
+    """A named use of an automaton in a system."""
+
+    name: str
+    automaton: Automaton
+    offset: Fraction
+    key: str
+    span: Span
+
+
+@dataclass(frozen=True)
+class SystemInput:
+    """An input of a system."""
+
+    name: str
+    unit: Unit
+    default: Fraction | None
+    span: Span
+
+
+@dataclass(frozen=True)
+class Connection:
+    """What an input of an instance reads: a system input, an output or a constant (SI)."""
+
+    target: tuple[str, str]
+    source: str | Fraction
+    span: Span
+
+
+@dataclass(frozen=True)
+class System:
+    """Instances, how they are connected, in the order in which they run at one instant."""
+
+    name: str
+    inputs: Mapping[str, SystemInput]
+    instances: Mapping[str, Instance]
+    connections: Mapping[tuple[str, str], Connection]
+    outputs: Mapping[str, str]
+    order: tuple[str, ...]
+    span: Span
+
+
+@dataclass(frozen=True)
+class Stimulus:
+    """An input over time: right-continuous steps, the first at time 0 (SI, exact)."""
+
+    steps: tuple[tuple[Fraction, Fraction], ...]
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """Inputs, initial values, horizon of a system and what is recorded of it."""
+
+    name: str
+    of: str
+    horizon: Fraction
+    initial: Mapping[str, Fraction]
+    inputs: Mapping[str, Stimulus]
+    every: Fraction
+    span: Span
+
+
+@dataclass(frozen=True)
+class Column:
+    """One signal of a recording: its columns (mean of them), target, unit and form."""
+
+    name: str
+    columns: tuple[str, ...]
+    to: str | None
+    compare: str | None
+    unit: Unit
+    scale: tuple[Fraction, Dimension]
+    sign: int
+    delay: Fraction
+    blank: Literal["refuse", "skip"]
+    time: str | None
+    span: Span
+
+
+@dataclass(frozen=True)
+class RecordingMap:
+    """How the columns of a recording become signals."""
+
+    name: str
+    time: str
+    time_unit: Unit
+    columns: Mapping[str, Column]
+    constants: Mapping[str, tuple[Fraction, Dimension]]
+    span: Span

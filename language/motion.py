@@ -1,0 +1,129 @@
+"""Motion: flow of a field over `work.h` up to the first crossing, located inside the step.
+
+A method gives three things: a block `step_<mode>` from the states to `work.end_<state>`, a block
+`series_<mode>` that fills `work.series_<state>` with a polynomial through the step, and the number
+of its terms. What is here is common: look at the guards at the end, and where one changed, halve
+the bracket on the polynomial; the upper end is kept, so the guard is true where it is committed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from language.field import Field, any_guard
+from language.model import Mode
+from language.program import (
+    Assign,
+    Block,
+    Branch,
+    Constant,
+    Expr,
+    Item,
+    Loop,
+    Op,
+    Ref,
+    Run,
+    Value,
+    Variable,
+    add,
+    multiply,
+    real,
+    subtract,
+    whole,
+)
+
+RUN_HALVINGS = 24
+"""Halvings inside a tick: 1 ms / 2^24 = 60 ps (docs/language.md, section 9)."""
+FLOW_HALVINGS = 44
+"""Halvings of a continuous automaton's step: 1 ms / 2^44 is below one ULP of a time of 1 s."""
+
+Armed = Mapping[int, str]
+
+
+@dataclass(frozen=True)
+class Method:
+    """A method of integration for one field."""
+
+    blocks: dict[str, Block]
+    terms: int
+    constants: tuple[Constant, ...]
+    variables: tuple[Variable, ...]
+
+
+def motion_blocks(
+    field: Field, method: Method, halvings: int, armed: Callable[[Mode], Armed | None]
+) -> dict[str, Block]:
+    """Return `point`, and `locate_<mode>` and `move_<mode>` of every mode."""
+    blocks = {"point": _point(field, method.terms)}
+    for mode in field.automaton.modes.values():
+        crossed = any_guard(mode, armed(mode))
+        blocks[f"locate_{mode.name}"] = _locate(field, mode, crossed, halvings)
+        blocks[f"move_{mode.name}"] = _move(field, mode, crossed)
+    return blocks
+
+
+def motion_variables(field: Field, method: Method) -> list[Variable]:
+    """Return the work variables of a motion."""
+    found = [
+        Variable("work.h", "real", "s", about="step to flow over"),
+        Variable("work.elapsed", "real", "s", about="part of the step until a crossing"),
+        Variable("work.crossed", "truth", about="a guard changed"),
+        Variable("work.s", "real", "s", about="time since the start of the step"),
+        Variable("work.low", "real", "s"),
+        Variable("work.high", "real", "s"),
+        Variable("work.halving", "whole"),
+        Variable("work.term", "whole"),
+    ]
+    for name, state in field.automaton.states.items():
+        unit = str(state.unit.dimension)
+        found.append(Variable(f"work.end_{name}", "real", unit))
+        found.append(Variable(f"work.sum_{name}", "real", f"({unit})/s"))
+        found.append(Variable(f"work.series_{name}", "real", unit, size=method.terms))
+    return [*found, *method.variables]
+
+
+def _point(field: Field, terms: int) -> Block:
+    """The polynomial x(s) = x0 + s (d0 + s (d1 + ...)) at `work.s`, by Horner's rule."""
+    s = Ref("work.s")
+    first: list[Op] = [Assign(f"work.sum_{name}", real(0.0)) for name in field.states]
+    index = subtract(whole(terms - 1), Ref("work.term"))
+    body: list[Op] = []
+    last: list[Op] = []
+    for name in field.states:
+        total = Ref(f"work.sum_{name}")
+        value = add(multiply(total, s), Item(f"work.series_{name}", index))
+        body.append(Assign(f"work.sum_{name}", value))
+        last.append(Assign(f"work.at_{name}", add(Ref(f"state.{name}"), multiply(s, total))))
+    return (*first, Loop(terms, "work.term", tuple(body)), *last)
+
+
+def _locate(field: Field, mode: Mode, crossed: Expr, halvings: int) -> Block:
+    """Halve (low, high]: a guard has changed at high, none has at low."""
+    low, high, s = Ref("work.low"), Ref("work.high"), Ref("work.s")
+    keep = [Assign(f"work.end_{name}", Ref(f"work.at_{name}")) for name in field.states]
+    body: Block = (
+        Assign("work.s", add(low, multiply(real(0.5), subtract(high, low)))),
+        Run("point"),
+        Run(f"guards_{mode.name}"),
+        Branch(crossed, (Assign("work.high", s), *keep), (Assign("work.low", s),)),
+    )
+    return (
+        Assign("work.low", real(0.0)),
+        Assign("work.high", Ref("work.h")),
+        Loop(halvings, "work.halving", body),
+        Assign("work.elapsed", high),
+    )
+
+
+def _move(field: Field, mode: Mode, crossed: Expr) -> Block:
+    ops: list[Op] = [Run(f"step_{mode.name}"), Assign("work.elapsed", Ref("work.h"))]
+    if mode.transitions:
+        ops += [Assign(f"work.at_{name}", Ref(f"work.end_{name}")) for name in field.states]
+        ops.append(Run(f"guards_{mode.name}"))
+    ops.append(Assign("work.crossed", crossed if mode.transitions else Value(False)))
+    if mode.transitions:
+        found: Block = (Run(f"series_{mode.name}"), Run(f"locate_{mode.name}"))
+        ops.append(Branch(Ref("work.crossed"), found))
+    ops += [Assign(f"state.{name}", Ref(f"work.end_{name}")) for name in field.states]
+    return tuple(ops)

@@ -1,0 +1,105 @@
+"""Observer and run: what carries the states of a sampled automaton over one tick."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal, cast
+
+from language.document import Entry, Node
+from language.model import Automaton, Formula, Observer, Run
+from language.problem import nearest
+
+if TYPE_CHECKING:
+    from language.reader import Reader
+
+OBSERVER_KEYS = ("kalman", "inputs", "A", "B", "C", "f", "measures")
+NOISE_KEYS = ("process_noise", "measurement_noise")
+RUN_KEYS = ("of", "method", "substeps", "events")
+METHODS = ("rk4", "exponential")
+MAX_SUBSTEPS = 100
+MAX_EVENTS = 100
+
+Matrix = dict[str, dict[str, Formula]]
+
+
+def read_observer(reader: Reader, node: Node, key: str) -> Observer:
+    """Read an observer with written matrices and a steady gain."""
+    table = reader.table(node, key, (*OBSERVER_KEYS, *NOISE_KEYS))
+    kalman = reader.table(table.get("kalman"), f"{key}.kalman", ("states", "gain"))
+    if "kalman" not in table.entries:
+        reader.problems.error("missing", node.span, "`kalman: {states: [...]}` is missing")
+    reader.choice(kalman.get("gain"), "gain", ("steady",), "steady")
+    states = tuple(item.text for item in reader.items(kalman.get("states"), "states"))
+    measures = {}
+    for entry in reader.named(table.get("measures"), f"{key}.measures"):
+        measures[entry.key] = reader.text(entry.node, f"measures.{entry.key}", entry.span)
+    for name in ("A", "C", "measures", *NOISE_KEYS):
+        if name not in table.entries and not (name == "C" and measures):
+            reader.problems.error("missing", node.span, f"`{name}` is missing in the observer")
+    rows, columns = set(states), set(states)
+    inputs = tuple(item.text for item in reader.items(table.get("inputs"), "inputs"))
+    return Observer(
+        states=states,
+        inputs=inputs,
+        measures=measures,
+        a=_matrix(reader, table.get("A"), f"{key}.A", rows, columns),
+        b=_matrix(reader, table.get("B"), f"{key}.B", rows, set(inputs)),
+        c=_matrix(reader, table.get("C"), f"{key}.C", set(measures), columns),
+        f=_vector(reader, table.get("f"), f"{key}.f", rows),
+        process_noise=_vector(reader, table.get("process_noise"), f"{key}.process_noise", rows),
+        measurement_noise=_vector(
+            reader, table.get("measurement_noise"), f"{key}.measurement_noise", set(measures)
+        ),
+        key=key,
+        span=node.span,
+    )
+
+
+def read_run(reader: Reader, node: Node, key: str, model: Automaton | None) -> Run:
+    """Read a run of one mode of the model."""
+    table = reader.table(node, key, RUN_KEYS)
+    of = reader.text(table.get("of"), "of", node.span)
+    name, _, mode = of.rpartition(".")
+    place = (table.get("of") or node).span
+    if model is None:
+        reader.problems.error("run", place, "a run needs `model:` at the top of the automaton")
+    elif name != model.name or mode not in model.modes:
+        known = [f"{model.name}.{known}" for known in model.modes]
+        label = f"`{of}` is not a mode of the model"
+        reader.problems.error("name", place, label, nearest(of, known))
+    method = reader.choice(table.get("method"), "method", METHODS, "rk4")
+    return Run(
+        mode=mode,
+        method=cast(Literal["rk4", "exponential"], method),
+        substeps=reader.whole(table.get("substeps"), "substeps", 1, 1, MAX_SUBSTEPS),
+        events=reader.whole(table.get("events"), "events", 4, 1, MAX_EVENTS),
+        key=key,
+        span=node.span,
+    )
+
+
+def _matrix(
+    reader: Reader, node: Node | None, key: str, rows: set[str], columns: set[str]
+) -> Matrix:
+    found = {}
+    for entry in reader.table(node, key):
+        if _known(reader, entry, key, rows):
+            found[entry.key] = _vector(reader, entry.node, f"{key}.{entry.key}", columns)
+    return found
+
+
+def _vector(reader: Reader, node: Node | None, key: str, names: set[str]) -> dict[str, Formula]:
+    found = {}
+    for entry in reader.table(node, key):
+        if _known(reader, entry, key, names):
+            formula = reader.expression(entry.node, f"{key}.{entry.key}", entry.span)
+            if formula:
+                found[entry.key] = formula
+    return found
+
+
+def _known(reader: Reader, entry: Entry, key: str, names: set[str]) -> bool:
+    if entry.key in names:
+        return True
+    label = f"`{entry.key}` is not a row or column of `{key.rpartition('.')[2]}`"
+    reader.problems.error("name", entry.span, label, nearest(entry.key, names))
+    return False

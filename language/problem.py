@@ -1,0 +1,124 @@
+"""Problems: mistakes in the user's spec or data, each with its place, collected and rendered."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Literal
+
+Severity = Literal["error", "warning"]
+
+NEAREST_CUTOFF = 0.6
+"""Similarity above which a known name is proposed for an unknown one (difflib's own default)."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """A text that spans point into: the name shown to the user and the lines of the text."""
+
+    name: str
+    lines: tuple[str, ...] = field(repr=False, default=())
+
+
+@dataclass(frozen=True)
+class Span:
+    """A place in a source: line and column count from 1, width in characters (at least 1)."""
+
+    source: Source
+    line: int
+    column: int
+    width: int = 1
+
+    def inside(self, offset: int, width: int = 1) -> Span:
+        """Return the span `offset` characters into this one."""
+        return Span(self.source, self.line, self.column + offset, max(1, width))
+
+    def __str__(self) -> str:
+        """Return `file:line:column`."""
+        return f"{self.source.name}:{self.line}:{self.column}"
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One mistake of the user: what kind, where, what is wrong, and what would help."""
+
+    kind: str
+    span: Span
+    label: str
+    help: str = ""
+    severity: Severity = "error"
+
+
+class SpecError(Exception):
+    """Raised where a stage cannot go on: carries all problems found until then."""
+
+    def __init__(self, problems: Sequence[Problem]) -> None:
+        """Keep the problems; they are rendered in one place, by the caller."""
+        super().__init__("; ".join(f"{p.span}: {p.label}" for p in problems))
+        self.problems = tuple(problems)
+
+
+class Problems:
+    """A collector: a stage reports into it and goes on as long as that makes sense."""
+
+    def __init__(self) -> None:
+        """Start empty."""
+        self.found: list[Problem] = []
+
+    def error(self, kind: str, span: Span, label: str, help: str = "") -> None:
+        """Report an error."""
+        self.found.append(Problem(kind, span, label, help))
+
+    def warning(self, kind: str, span: Span, label: str, help: str = "") -> None:
+        """Report a warning."""
+        self.found.append(Problem(kind, span, label, help, "warning"))
+
+    @property
+    def has_errors(self) -> bool:
+        """Tell whether an error (not only warnings) was reported."""
+        return any(p.severity == "error" for p in self.found)
+
+    def stop_if_any(self) -> None:
+        """Raise SpecError with everything found so far, if an error is among it."""
+        if self.has_errors:
+            raise SpecError(self.found)
+
+    @contextmanager
+    def collecting(self) -> Iterator[None]:
+        """Take the problems of a SpecError raised inside and go on."""
+        try:
+            yield
+        except SpecError as error:
+            self.found.extend(error.problems)
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """Return "did you mean `x`?" for the known name nearest to `name`, or an empty text."""
+    matches = difflib.get_close_matches(name, sorted(known), n=1, cutoff=NEAREST_CUTOFF)
+    return f"did you mean `{matches[0]}`?" if matches else ""
+
+
+def render(problem: Problem) -> str:
+    """Return the problem as `file:line:col: severity: label`, the line, carets and the help."""
+    span = problem.span
+    rows = [f"{span}: {problem.severity}: {problem.label}"]
+    if 1 <= span.line <= len(span.source.lines):
+        text = span.source.lines[span.line - 1]
+        width = max(1, min(span.width, len(text) - span.column + 1))
+        rows += [f"  {text}", "  " + " " * (span.column - 1) + "^" * width]
+    if problem.help:
+        rows.append(f"help: {problem.help}")
+    return "\n".join(rows)
+
+
+def ordered(problems: Iterable[Problem]) -> list[Problem]:
+    """Return the problems without repetitions, sorted by file, line and column."""
+    unique = dict.fromkeys(problems)
+    return sorted(unique, key=lambda p: (p.span.source.name, p.span.line, p.span.column, p.label))
+
+
+def render_all(problems: Iterable[Problem]) -> str:
+    """Return all problems rendered, sorted by place, with blank lines between."""
+    return "\n\n".join(render(problem) for problem in ordered(problems))

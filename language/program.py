@@ -1,0 +1,321 @@
+"""Program: ordered scalar operations, the one thing that the engine runs and codegen prints.
+
+Names are `group.name`; the group says what a variable is and where a back end keeps it:
+
+    constant  a fixed parameter          calibration  a tunable parameter
+    derived   follows from calibrations  solved       computed at check time, carries stamps
+    input     of this tick               before       the inputs of the tick before
+    state     carried over               equation     evaluated each tick
+    memory    mode, fired, counters ...  work         lives within one call only
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Literal
+
+ValueType = Literal["real", "truth", "whole"]
+
+
+@dataclass(frozen=True, slots=True)
+class Value:
+    """A value in the working type."""
+
+    value: float | int | bool
+
+
+@dataclass(frozen=True, slots=True)
+class Ref:
+    """The value of a variable or constant."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Item:
+    """One element of an array variable."""
+
+    name: str
+    index: Expr
+
+
+@dataclass(frozen=True, slots=True)
+class Unary:
+    """`-` of a real, `not` of a truth value."""
+
+    operator: Literal["-", "not"]
+    operand: Expr
+
+
+@dataclass(frozen=True, slots=True)
+class Binary:
+    """`+ - * /` of two reals or two whole numbers, `and or` of truth values (both evaluated)."""
+
+    operator: Literal["+", "-", "*", "/", "and", "or"]
+    left: Expr
+    right: Expr
+
+
+@dataclass(frozen=True, slots=True)
+class Compare:
+    """A relation; with a NaN it is false, except `!=`."""
+
+    operator: Literal["<", "<=", ">", ">=", "==", "!="]
+    left: Expr
+    right: Expr
+
+
+@dataclass(frozen=True, slots=True)
+class Select:
+    """`then` if the condition holds, else `other`; only the chosen one is evaluated."""
+
+    condition: Expr
+    then: Expr
+    other: Expr
+
+
+@dataclass(frozen=True, slots=True)
+class Call:
+    """An elementary operation (abs sqrt min max clip sign pow2 real) or a function."""
+
+    function: str
+    arguments: tuple[Expr, ...]
+
+
+Expr = Value | Ref | Item | Unary | Binary | Compare | Select | Call
+
+
+@dataclass(frozen=True, slots=True)
+class Assign:
+    """Set a variable; `key` cites the place in the spec."""
+
+    target: str
+    value: Expr
+    key: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Store:
+    """Set one element of an array."""
+
+    array: str
+    index: Expr
+    value: Expr
+
+
+@dataclass(frozen=True, slots=True)
+class Branch:
+    """Run one of two blocks."""
+
+    condition: Expr
+    then: Block
+    other: Block = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Choose:
+    """Run the block of the case that a whole-number variable has."""
+
+    selector: str
+    cases: tuple[tuple[int, Block], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Loop:
+    """Run a block a fixed number of times; the index counts from 0."""
+
+    count: int
+    index: str
+    body: Block
+
+
+@dataclass(frozen=True, slots=True)
+class Count:
+    """Count one up to `limit` (saturating) while the condition holds, else back to 0."""
+
+    timer: str
+    condition: Expr
+    limit: int
+    key: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class FaultBit:
+    """Set a latched fault bit."""
+
+    fault: str
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """Run a named block."""
+
+    block: str
+
+
+Op = Assign | Store | Branch | Choose | Loop | Count | FaultBit | Run
+Block = tuple[Op, ...]
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A variable with its type; `size` is the length of an array, 0 for a scalar."""
+
+    name: str
+    type: ValueType
+    unit: str = "1"
+    size: int = 0
+    about: str = ""
+
+
+@dataclass(frozen=True)
+class Constant:
+    """A value that no operation writes; solved ones list the tunables that they came from."""
+
+    name: str
+    kind: Literal["fixed", "tunable", "derived", "solved"]
+    value: float
+    unit: str = "1"
+    key: str = ""
+    depends_on: tuple[str, ...] = ()
+    range: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class ModeInfo:
+    """A mode and its number."""
+
+    name: str
+    number: int
+
+
+@dataclass(frozen=True)
+class TransitionInfo:
+    """A transition: number (from 1), modes, wait in seconds (exact) and in ticks."""
+
+    number: int
+    name: str
+    source: int
+    target: int
+    wait: Fraction
+    ticks: int
+    timer: str | None
+    key: str
+
+
+@dataclass(frozen=True)
+class Function:
+    """An elementary function as operations: parameter `x`, result in `work.y`."""
+
+    name: str
+    body: Block
+    locals: tuple[str, ...]
+    about: str
+
+
+@dataclass(frozen=True)
+class Wire:
+    """An output: its name and the variable that holds it."""
+
+    name: str
+    source: str
+    type: ValueType
+    unit: str
+
+
+@dataclass(frozen=True)
+class ObserverInfo:
+    """Numbers from which an observer's solved constants came (for reference back ends)."""
+
+    mode: str
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    measures: tuple[str, ...]
+    a: tuple[tuple[float, ...], ...]
+    b: tuple[tuple[float, ...], ...]
+    c: tuple[tuple[float, ...], ...]
+    process_noise: tuple[tuple[float, ...], ...]
+    measurement_noise: tuple[tuple[float, ...], ...]
+    period: float
+    solved: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class Program:
+    """A checked automaton as operations. `blocks` are named; the order is that of printing.
+
+    A sampled program is entered at `init` and `step`; a continuous one at `init`, `equations`,
+    `watch`, `jump` and `flow` (see language/continuous.py).
+    """
+
+    name: str
+    number: Literal["float64"]
+    period: Fraction | None
+    major_step: Fraction
+    constants: tuple[Constant, ...]
+    variables: tuple[Variable, ...]
+    outputs: tuple[Wire, ...]
+    modes: tuple[ModeInfo, ...]
+    transitions: tuple[TransitionInfo, ...]
+    faults: tuple[str, ...]
+    functions: tuple[Function, ...]
+    blocks: Mapping[str, Block]
+    run_modes: tuple[ModeInfo, ...] = ()
+    observers: tuple[ObserverInfo, ...] = ()
+    defaults: Mapping[str, float | bool] = field(default_factory=dict)
+
+    @property
+    def inputs(self) -> tuple[Variable, ...]:
+        """The variables that come from outside."""
+        return tuple(v for v in self.variables if v.name.startswith("input."))
+
+    def mode_name(self, number: int) -> str:
+        """Return the name of the mode with a number."""
+        return next(mode.name for mode in self.modes if mode.number == number)
+
+
+def short(name: str) -> str:
+    """Return a variable's name without its group."""
+    return name.partition(".")[2]
+
+
+def real(value: float) -> Value:
+    """Return a real literal."""
+    return Value(float(value))
+
+
+def whole(value: int) -> Value:
+    """Return a whole-number literal."""
+    return Value(int(value))
+
+
+def add(left: Expr, right: Expr) -> Binary:
+    """Return left + right."""
+    return Binary("+", left, right)
+
+
+def subtract(left: Expr, right: Expr) -> Binary:
+    """Return left - right."""
+    return Binary("-", left, right)
+
+
+def multiply(left: Expr, right: Expr) -> Binary:
+    """Return left * right."""
+    return Binary("*", left, right)
+
+
+def divide(left: Expr, right: Expr) -> Binary:
+    """Return left / right."""
+    return Binary("/", left, right)
+
+
+def total(parts: list[Expr]) -> Expr:
+    """Return the sum from left to right, 0 for no parts."""
+    if not parts:
+        return real(0.0)
+    result = parts[0]
+    for part in parts[1:]:
+        result = add(result, part)
+    return result

@@ -1,0 +1,186 @@
+"""Project: where specs are found by name, and how a document is read with what it extends."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+from importlib import resources
+from pathlib import Path
+
+from language.document import Document, Entry, Scalar, Table, parse, read_text
+from language.overlay import lay, without
+from language.problem import Problems, Source, Span, SpecError, nearest
+
+KINDS = ("automaton", "system", "scenario", "map", "variant")
+LATER_KINDS = ("study", "test", "effect", "calibration")
+HEAD = re.compile(rf"^({'|'.join(KINDS + LATER_KINDS)}):\s*([^\s#]+)", re.MULTILINE)
+VERSION = "1"
+
+
+@dataclass(frozen=True)
+class Project:
+    """A folder whose `spec/` is searched first, before the specs that are shipped."""
+
+    root: Path
+    files: list[Path] = field(default_factory=list, repr=False)
+
+    @cached_property
+    def index(self) -> dict[str, list[Path]]:
+        """Files by the name of what they hold, those of the project first."""
+        own: dict[str, list[Path]] = {}
+        for path in _yaml_files(self.root / "spec"):
+            for name in _names_in(path):
+                own.setdefault(name, []).append(path)
+        shipped = Path(str(resources.files("spec")))
+        if shipped.resolve() != (self.root / "spec").resolve():
+            for path in _yaml_files(shipped):
+                for name in _names_in(path):
+                    own.setdefault(name, [path])
+        return own
+
+    def path_of(self, reference: str, span: Span | None = None) -> Path:
+        """Return the file of a name or path. Raises SpecError for none or several."""
+        if reference.endswith((".yaml", ".yml")) or os.sep in reference:
+            base = Path(span.source.name).parent if span else Path()
+            beside = base / reference
+            return beside if beside.exists() else Path(reference)
+        found = self.index.get(reference, [])
+        if len(found) == 1:
+            return found[0]
+        place = span or Span(Source("command line", (reference,)), 1, 1, len(reference))
+        problems = Problems()
+        if found:
+            files = ", ".join(shown(path) for path in found)
+            problems.error("name", place, f"`{reference}` is defined twice", f"in {files}")
+        else:
+            hint = nearest(reference, self.index) or "a name of a spec below spec/, or a path"
+            problems.error("name", place, f"there is no spec named `{reference}`", hint)
+        raise SpecError(problems.found)
+
+
+def shown(path: Path) -> str:
+    """Return a path as it is shown: relative to the working directory where that is shorter."""
+    try:
+        relative = os.path.relpath(path)
+    except ValueError:
+        return str(path)
+    return relative if not relative.startswith("..") else str(path)
+
+
+def read_document(path: Path) -> Document:
+    """Read one file and its head. Raises SpecError."""
+    source, text = read_text(path, shown(path))
+    return document_of(source, text)
+
+
+def document_of(source: Source, text: str) -> Document:
+    """Return the document of a text: `language: 1`, then one kind and its name."""
+    root = parse(source, text)
+    problems = Problems()
+    _check_version(root, problems)
+    heads = [entry for entry in root if entry.key in KINDS + LATER_KINDS]
+    if not heads:
+        first = next(iter(root), None)
+        span = first.span if first else root.span
+        label = "the file does not say what it holds"
+        problems.error("form", span, label, f"one of the keys {', '.join(KINDS)} with a name")
+    elif len(heads) > 1:
+        label = f"one file holds one thing: `{heads[0].key}` is given too"
+        problems.error("form", heads[1].span, label)
+    elif heads[0].key in LATER_KINDS:
+        label = f"`{heads[0].key}` files are not read by this version"
+        problems.error("form", heads[0].span, label)
+    elif not isinstance(heads[0].node, Scalar):
+        problems.error("form", heads[0].span, f"`{heads[0].key}` is followed by a name")
+    problems.stop_if_any()
+    head = heads[0]
+    assert isinstance(head.node, Scalar)
+    return Document(head.key, head.node.text, head.node.span, root, source)
+
+
+def expanded(document: Document, project: Project) -> Document:
+    """Return a variant laid over its base, as a document of the base's kind."""
+    return _expanded(document, project, ())
+
+
+def layered(base: Document, over: Document, project: Project, problems: Problems) -> Document:
+    """Return `base` with the variant `over` laid over it.
+
+    The variant must extend the base or something that the base was made from.
+    """
+    assert over.kind == "variant"
+    wanted = _extends(over)
+    if wanted.text not in lineage(base, project):
+        label = f"variant `{over.name}` extends `{wanted.text}`, not `{base.name}`"
+        problems.error("variant", wanted.span, label)
+    problems.stop_if_any()
+    body = without(over.root, "language", "variant", "extends")
+    root = lay(expanded(base, project).root, body, problems)
+    problems.stop_if_any()
+    return Document(expanded(base, project).kind, base.name, base.name_span, root, over.source)
+
+
+def lineage(document: Document, project: Project) -> list[str]:
+    """Return the names of a document and of everything that it extends."""
+    names = [document.name]
+    while document.kind == "variant" and len(names) <= len(project.index):
+        document = read_document(project.path_of(_extends(document).text, _extends(document).span))
+        names.append(document.name)
+    return names
+
+
+def _expanded(document: Document, project: Project, seen: tuple[str, ...]) -> Document:
+    if document.kind != "variant":
+        return document
+    extends = _extends(document)
+    problems = Problems()
+    if extends.text in (*seen, document.name):
+        problems.error("variant", extends.span, f"`{extends.text}` extends itself")
+    problems.stop_if_any()
+    base = read_document(project.path_of(extends.text, extends.span))
+    base = _expanded(base, project, (*seen, document.name))
+    over = without(document.root, "language", "variant", "extends")
+    root = lay(base.root, over, problems)
+    problems.stop_if_any()
+    entries = dict(root.entries)
+    name = Scalar(document.name, document.name_span)
+    entries[base.kind] = Entry(base.kind, document.name_span, name)
+    tree = Table(entries, document.root.span)
+    return Document(base.kind, document.name, document.name_span, tree, document.source)
+
+
+def _extends(document: Document) -> Scalar:
+    node = document.root.get("extends")
+    if isinstance(node, Scalar):
+        return node
+    problems = Problems()
+    problems.error("form", document.name_span, "a variant says what it `extends`")
+    raise SpecError(problems.found)
+
+
+def _check_version(root: Table, problems: Problems) -> None:
+    first = next(iter(root), None)
+    node = root.get("language")
+    if node is None:
+        span = first.span if first else root.span
+        problems.error(
+            "version", span, "`language: 1` is missing", "it is the first line of a spec"
+        )
+    elif not isinstance(node, Scalar) or node.text != VERSION:
+        problems.error("version", node.span, "this version of the language is not known: use 1")
+
+
+def _yaml_files(folder: Path) -> Iterator[Path]:
+    if folder.is_dir():
+        yield from sorted(folder.rglob("*.yaml"))
+
+
+def _names_in(path: Path) -> list[str]:
+    try:
+        text = path.read_text("utf-8", errors="replace")[:65536]
+    except OSError:
+        return []
+    return [match.group(2).strip("'\"") for match in HEAD.finditer(text)]

@@ -1,0 +1,202 @@
+"""Reader: the helpers with which every kind of document is read into its model."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from fractions import Fraction
+
+from language.document import Entry, Items, Node, Scalar, Table
+from language.model import Formula, Range
+from language.problem import Problems, Source, Span, SpecError, nearest
+from language.syntax import Negative, Number, Tree, parse_expression
+from language.units import NO_UNIT, SYMBOLS, Unit, UnitError, fits, parse_unit
+
+NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,30}")
+GRAMMAR_WORDS = frozenset(
+    ["if", "then", "else", "and", "or", "not", "true", "false", "der", "in", "after", "rising", "falling", "delay", "previous", "column", "time", "abs", "sqrt", "min", "max", "clip", "sign", "floor", "sin", "cos", "tan", "exp", "tanh", "atan2", "lookup", "remove", "like"]
+)
+YAML_WORDS = frozenset(["on", "off", "yes", "no", "y", "n", "null"])
+C_WORDS = frozenset(
+    ["auto", "break", "case", "char", "const", "continue", "default", "do", "double", "enum", "extern", "float", "for", "goto", "inline", "int", "long", "register", "restrict", "return", "short", "signed", "sizeof", "static", "struct", "switch", "typedef", "union", "unsigned", "void", "volatile", "while", "bool", "asm"]
+)
+NOWHERE = Span(Source(""), 0, 0)
+"""The place of an absent mapping: nothing is ever reported there."""
+TEXT_KEYS = frozenset({"about", "req"})
+"""Keys that go on anything and have no influence."""
+
+
+def check_name(name: str, span: Span, problems: Problems) -> None:
+    """Report a name that is not one: docs/language.md, section 2."""
+    if not NAME.fullmatch(name):
+        hint = "a letter, then at most 30 letters, digits or `_`"
+        problems.error("name", span, f"`{name}` is not a name", hint)
+    elif name in GRAMMAR_WORDS:
+        problems.error("name", span, f"`{name}` is a word of the language")
+    elif name.lower() in YAML_WORDS:
+        label = f"`{name}` means something else to other YAML tools"
+        problems.error("name", span, label)
+    elif name in C_WORDS:
+        label = f"`{name}` is a word of C, and generated code keeps the names of the model"
+        problems.error("name", span, label)
+
+
+class Reader:
+    """Reads parts of a document, reporting what is wrong into one collector."""
+
+    def __init__(self, problems: Problems) -> None:
+        """Report into `problems`."""
+        self.problems = problems
+
+    def table(self, node: Node | None, what: str, allowed: Iterable[str] | None = None) -> Table:
+        """Return a mapping with known keys only; an empty one where the node is absent."""
+        if node is None:
+            return Table({}, NOWHERE)
+        if not isinstance(node, Table):
+            if not (isinstance(node, Scalar) and node.text == ""):
+                self.problems.error("form", node.span, f"`{what}` is a mapping")
+            return Table({}, node.span)
+        known = None if allowed is None else {*allowed, *TEXT_KEYS}
+        kept: dict[str, Entry] = {}
+        for entry in node:
+            if known is None or entry.key in known:
+                kept[entry.key] = entry
+            else:
+                self._unknown_key(entry, what, known)
+        return Table(kept, node.span)
+
+    def _unknown_key(self, entry: Entry, what: str, known: set[str]) -> None:
+        hint = nearest(entry.key, known)
+        cut_off = isinstance(entry.node, Scalar) and not entry.node.text
+        if re.search(r"[() ]", entry.key) or (cut_off and not hint):
+            hint = "in `{...}` YAML ends a value at a comma: quote a value that has one"
+        if not hint:
+            hint = f"known here: {', '.join(sorted(known - TEXT_KEYS))}"
+        label = f"`{entry.key}` is not a key of `{what}`"
+        self.problems.error("unknown-key", entry.span, label, hint)
+
+    def named(self, node: Node | None, what: str) -> Iterator[Entry]:
+        """Iterate over the named things of a mapping, names checked."""
+        for entry in self.table(node, what):
+            check_name(entry.key, entry.span, self.problems)
+            yield entry
+
+    def scalar(self, node: Node | None, what: str, span: Span) -> Scalar | None:
+        """Return a scalar, or report that it is missing or something else."""
+        if node is None:
+            self.problems.error("missing", span, f"`{what}` is missing")
+        elif not isinstance(node, Scalar):
+            self.problems.error("form", node.span, f"`{what}` is a single value")
+        else:
+            return node
+        return None
+
+    def text(self, node: Node | None, what: str, span: Span) -> str:
+        """Return the text of a scalar, or an empty text with a problem reported."""
+        scalar = self.scalar(node, what, span)
+        return scalar.text if scalar else ""
+
+    def items(self, node: Node | None, what: str) -> list[Scalar]:
+        """Return the scalars of a list."""
+        if node is None:
+            return []
+        if not isinstance(node, Items):
+            self.problems.error("form", node.span, f"`{what}` is a list")
+            return []
+        for item in node.nodes:
+            if not isinstance(item, Scalar):
+                self.problems.error("form", item.span, f"an item of `{what}` is a single value")
+        return [item for item in node.nodes if isinstance(item, Scalar)]
+
+    def choice(self, node: Node | None, what: str, allowed: Iterable[str], default: str) -> str:
+        """Return one of the allowed words."""
+        if node is None:
+            return default
+        text = self.text(node, what, node.span)
+        known = list(allowed)
+        if text and text not in known:
+            label = f"`{text}` is not one of {', '.join(known)}"
+            self.problems.error("choice", node.span, label, nearest(text, known))
+            return default
+        return text or default
+
+    def whole(self, node: Node | None, what: str, default: int, low: int, high: int) -> int:
+        """Return an integer between low and high."""
+        if node is None:
+            return default
+        text = self.text(node, what, node.span)
+        if not re.fullmatch(r"-?(0|[1-9]\d{0,8})", text) or not low <= int(text) <= high:
+            label = f"`{what}` is a whole number from {low} to {high}"
+            self.problems.error("number", node.span, label)
+            return default
+        return int(text)
+
+    def unit(self, node: Node | None) -> Unit:
+        """Return a unit, `1` where there is none."""
+        if node is None:
+            return NO_UNIT
+        text = self.text(node, "unit", node.span)
+        try:
+            return parse_unit(text) if text else NO_UNIT
+        except UnitError as error:
+            symbols = re.findall(r"[A-Za-z]+", text)
+            wrong = next((symbol for symbol in symbols if symbol not in SYMBOLS), "")
+            self.problems.error("unit", node.span, str(error), nearest(wrong, SYMBOLS))
+            return NO_UNIT
+
+    def expression(self, node: Node | None, key: str, span: Span) -> Formula | None:
+        """Return an expression, or None with the problem reported."""
+        scalar = self.scalar(node, key.rpartition(".")[2], span)
+        if scalar is None:
+            return None
+        try:
+            return Formula(parse_expression(scalar), key)
+        except SpecError as error:
+            self.problems.found.extend(error.problems)
+            return None
+
+    def quantity(self, node: Node | None, what: str, span: Span, unit: Unit | None) -> Quantity:
+        """Return a literal in SI and its unit; a bare number is in `unit` where one is given."""
+        formula = self.expression(node, what, span)
+        literal = _literal(formula.tree) if formula else None
+        if formula and literal is None:
+            label = f"`{what}` is a number with a unit, not an expression"
+            self.problems.error("number", formula.span, label)
+        if literal is None:
+            return Fraction(0), unit or NO_UNIT
+        value, own = literal
+        if unit is None:
+            return value, own
+        if own is NO_UNIT:
+            return value * unit.factor + unit.offset, unit
+        if not fits(own.dimension, unit.dimension):
+            label = f"`{own.text}` does not fit the unit `{unit.text}`"
+            self.problems.error("dimension", formula.span if formula else span, label)
+        return value, own
+
+    def range(self, node: Node | None, unit: Unit) -> Range | None:
+        """Return `[low, high]` in SI."""
+        bounds = self.items(node, "range")
+        if node is None:
+            return None
+        if len(bounds) != 2:
+            self.problems.error("form", node.span, "a range is `[low, high]`")
+            return None
+        low, high = (self.quantity(item, "range", item.span, unit)[0] for item in bounds)
+        if low >= high:
+            self.problems.error("range", node.span, "the range is empty: low is not below high")
+            return None
+        return low, high
+
+
+Quantity = tuple[Fraction, Unit]
+
+
+def _literal(tree: Tree) -> tuple[Fraction, Unit] | None:
+    match tree:
+        case Number(value, unit, _):
+            return value, unit
+        case Negative(Number(value, unit, _), _):
+            return 2 * unit.offset - value if unit.offset else -value, unit
+        case _:
+            return None

@@ -1,0 +1,87 @@
+"""RK4: the classical Runge-Kutta method (Kutta 1901) with a cubic Hermite polynomial inside.
+
+Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.1 table 1.2 and II.6 (6.7).
+"""
+
+from __future__ import annotations
+
+from language.field import Field, at_state
+from language.motion import Method
+from language.program import (
+    Assign,
+    Block,
+    Expr,
+    Op,
+    Ref,
+    Run,
+    Store,
+    Variable,
+    add,
+    divide,
+    multiply,
+    real,
+    subtract,
+    whole,
+)
+
+TERMS = 3
+
+
+def rk4(field: Field) -> Method:
+    """Return the method for a field."""
+    blocks: dict[str, Block] = {}
+    for name in field.automaton.modes:
+        blocks[f"step_{name}"] = _step(field, name)
+        blocks[f"series_{name}"] = _series(field, name)
+    variables = [
+        Variable(f"work.k{stage}_{name}", "real", f"({state.unit.dimension})/s")
+        for stage in (1, 2, 3, 4)
+        for name, state in field.automaton.states.items()
+    ]
+    slopes = [
+        Variable(f"work.slope_{name}", "real", f"({state.unit.dimension})/s")
+        for name, state in field.automaton.states.items()
+    ]
+    return Method(blocks, TERMS, (), (*variables, *slopes))
+
+
+def _step(field: Field, mode: str) -> Block:
+    h = Ref("work.h")
+    fractions: tuple[Expr, ...] = (multiply(real(0.5), h), multiply(real(0.5), h), h)
+    ops: list[Op] = [*at_state(field)]
+    for stage in (1, 2, 3, 4):
+        ops.append(Run(f"rates_{mode}"))
+        ops += [Assign(f"work.k{stage}_{name}", Ref(f"work.rate_{name}")) for name in field.states]
+        if stage < 4:
+            part = fractions[stage - 1]
+            for name in field.states:
+                moved = add(Ref(f"state.{name}"), multiply(part, Ref(f"work.k{stage}_{name}")))
+                ops.append(Assign(f"work.at_{name}", moved))
+    for name in field.states:
+        ops.append(Assign(f"work.end_{name}", _end(name)))
+    return tuple(ops)
+
+
+def _end(name: str) -> Expr:
+    """x + h/6 (k1 + 2 k2 + 2 k3 + k4)."""
+    k1, k2, k3, k4 = (Ref(f"work.k{stage}_{name}") for stage in (1, 2, 3, 4))
+    inner = add(add(add(k1, multiply(real(2.0), k2)), multiply(real(2.0), k3)), k4)
+    return add(Ref(f"state.{name}"), multiply(divide(Ref("work.h"), real(6.0)), inner))
+
+
+def _series(field: Field, mode: str) -> Block:
+    """The cubic through both ends with the rates f0 = k1 at the start and f1 at the end."""
+    h = Ref("work.h")
+    ops: list[Op] = [Assign(f"work.at_{name}", Ref(f"work.end_{name}")) for name in field.states]
+    ops.append(Run(f"rates_{mode}"))
+    for name in field.states:
+        f0, f1 = Ref(f"work.k1_{name}"), Ref(f"work.rate_{name}")
+        slope, series = Ref(f"work.slope_{name}"), f"work.series_{name}"
+        rise = subtract(Ref(f"work.end_{name}"), Ref(f"state.{name}"))
+        ops.append(Assign(slope.name, divide(rise, h)))
+        second = subtract(subtract(multiply(real(3.0), slope), multiply(real(2.0), f0)), f1)
+        third = subtract(add(f0, f1), multiply(real(2.0), slope))
+        ops.append(Store(series, whole(0), f0))
+        ops.append(Store(series, whole(1), divide(second, h)))
+        ops.append(Store(series, whole(2), divide(third, multiply(h, h))))
+    return tuple(ops)

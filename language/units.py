@@ -1,0 +1,168 @@
+"""Units: a unit's text to its factor, dimension and power of the angle, exactly."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cache
+
+import pint
+
+SYMBOLS: dict[str, tuple[str, int]] = {
+    # symbol: (definition in pint's words, power of the angle)
+    **dict.fromkeys(("m", "mm", "cm", "km", "kg", "s", "ms", "us", "A", "V", "W", "kW"), ("", 0)),
+    **dict.fromkeys(("N", "kN", "mN", "J", "kJ", "Pa", "kPa", "MPa", "bar", "Hz", "kHz"), ("", 0)),
+    **dict.fromkeys(("kV", "mV", "mA", "Wh", "kWh", "K", "L"), ("", 0)),
+    "g": ("gram", 0),
+    "h": ("hour", 0),
+    "min": ("minute", 0),
+    "degC": ("kelvin", 0),
+    "percent": ("percent", 0),
+    "rad": ("radian", 1),
+    "mrad": ("milliradian", 1),
+    "deg": ("degree", 1),
+    "rev": ("turn", 1),
+    "rpm": ("turn / minute", 1),
+}
+CELSIUS_OFFSET = Fraction(27315, 100)
+"""0 degC in kelvin."""
+BASE = ("meter", "kilogram", "second", "ampere", "kelvin")
+BASE_SYMBOLS = ("m", "kg", "s", "A", "K")
+
+UNIT = re.compile(r"(1/)?[A-Za-z]+(\^-?\d)?([*/][A-Za-z]+(\^-?\d)?)*")
+PIECE = re.compile(r"([*/]?)([A-Za-z]+)(?:\^(-?\d))?")
+
+
+@dataclass(frozen=True)
+class Dimension:
+    """Exponents of m, kg, s, A, K; `angle` is the power of the angle, None where it is free."""
+
+    powers: tuple[int, ...] = (0, 0, 0, 0, 0)
+    angle: int | None = 0
+
+    @property
+    def is_number(self) -> bool:
+        """Tell whether this is a pure number: no dimension and no angle."""
+        return not any(self.powers) and self.angle == 0
+
+    @property
+    def is_bare(self) -> bool:
+        """Tell whether there is no dimension, whatever the angle."""
+        return not any(self.powers)
+
+    def __str__(self) -> str:
+        """Return the dimension in SI symbols, for problems: `kg*m^2/s^2`, `rad/s`, `1`."""
+        parts = list(zip(BASE_SYMBOLS, self.powers, strict=True))
+        parts.insert(0, ("rad", self.angle or 0))
+        over = [_power(name, power) for name, power in parts if power > 0]
+        under = [_power(name, -power) for name, power in parts if power < 0]
+        return "*".join(over or ["1"]) + "".join(f"/{name}" for name in under)
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit: value in SI = factor * value + offset."""
+
+    text: str
+    factor: Fraction
+    dimension: Dimension
+    offset: Fraction = Fraction(0)
+
+
+class UnitError(ValueError):
+    """The text is not a unit; the message says why."""
+
+
+NUMBER = Dimension()
+SECOND = Dimension((0, 0, 1, 0, 0))
+NO_UNIT = Unit("1", Fraction(1), NUMBER)
+
+
+def _power(name: str, power: int) -> str:
+    return name if power == 1 else f"{name}^{power}"
+
+
+@cache
+def _registry() -> pint.UnitRegistry:
+    return pint.UnitRegistry(non_int_type=Fraction)
+
+
+@cache
+def _symbol(symbol: str) -> tuple[Fraction, tuple[int, ...], int]:
+    definition, angle = SYMBOLS[symbol]
+    quantity = _registry().Quantity(Fraction(1), definition or symbol).to_base_units()
+    exponents = dict(quantity.unit_items())
+    powers = tuple(int(exponents.get(name, 0)) for name in BASE)
+    return Fraction(quantity.magnitude), powers, angle
+
+
+@cache
+def parse_unit(text: str) -> Unit:
+    """Return the unit written as `N*m*s/rad`, `1/s`, `kg*m^2`. Raises UnitError."""
+    if text == "1":
+        return NO_UNIT
+    if not UNIT.fullmatch(text):
+        raise UnitError(f"`{text}` is not written as a unit")
+    body = text.removeprefix("1/")
+    sign = -1 if body != text else 1
+    factor, powers, angle = Fraction(1), [0] * len(BASE), 0
+    for operator, symbol, exponent in PIECE.findall(body):
+        if symbol not in SYMBOLS:
+            raise UnitError(f"`{symbol}` is not a unit")
+        power = int(exponent or 1) * (-1 if operator == "/" else sign)
+        sign = 1
+        value, base, turn = _symbol(symbol)
+        factor *= value**power
+        powers = [old + power * new for old, new in zip(powers, base, strict=True)]
+        angle += power * turn
+    offset = CELSIUS_OFFSET if text == "degC" else Fraction(0)
+    return Unit(text, factor, Dimension(tuple(powers), angle), offset)
+
+
+def product(a: Dimension, b: Dimension, sign: int = 1) -> Dimension:
+    """Return the dimension of a * b (sign 1) or a / b (sign -1), with rule 20's angle power.
+
+    A factor that is a pure number keeps the power of the other; of two quantities with
+    dimensions, or one and an angle, the result is free; angles alone multiply exactly.
+    """
+    powers = tuple(x + sign * y for x, y in zip(a.powers, b.powers, strict=True))
+    if b.is_number:
+        return a
+    if a.is_number:
+        return Dimension(powers, None if b.angle is None else sign * b.angle)
+    if a.is_bare and b.is_bare and a.angle is not None and b.angle is not None:
+        return Dimension(powers, a.angle + sign * b.angle)
+    return Dimension(powers, None)
+
+
+def power(a: Dimension, exponent: int) -> Dimension:
+    """Return the dimension of a^exponent."""
+    if a.is_number or exponent == 1:
+        return a
+    powers = tuple(exponent * x for x in a.powers)
+    exact = a.angle is not None and a.is_bare
+    return Dimension(powers, exponent * (a.angle or 0) if exact else None)
+
+
+def root(a: Dimension) -> Dimension | None:
+    """Return the dimension of sqrt(a), or None where a power is odd."""
+    odd_angle = a.angle is not None and a.angle % 2 != 0
+    if any(x % 2 for x in a.powers) or odd_angle:
+        return None
+    return Dimension(tuple(x // 2 for x in a.powers), None if a.angle is None else a.angle // 2)
+
+
+def fits(a: Dimension, b: Dimension) -> bool:
+    """Tell whether two quantities may be added, compared, assigned: rule 20."""
+    return a.powers == b.powers and (a.angle is None or b.angle is None or a.angle == b.angle)
+
+
+def common(a: Dimension, b: Dimension) -> Dimension:
+    """Return the dimension of a sum of two that fit: the exact power of the angle wins."""
+    return b if a.angle is None else a
+
+
+def unit_range(low: Fraction, high: Fraction, unit: Unit) -> tuple[Fraction, Fraction]:
+    """Return a range given in `unit` in SI."""
+    return unit.factor * low + unit.offset, unit.factor * high + unit.offset

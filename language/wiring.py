@@ -1,0 +1,228 @@
+"""Wiring: variables, outputs and start values that every Program has, and the last clean-up."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Iterator, Mapping
+
+from language.elementary import FUNCTIONS
+from language.lower import expression
+from language.model import Automaton
+from language.program import (
+    Assign,
+    Binary,
+    Block,
+    Branch,
+    Call,
+    Choose,
+    Compare,
+    Count,
+    Expr,
+    Function,
+    Item,
+    Loop,
+    Op,
+    Program,
+    Ref,
+    Run,
+    Select,
+    Store,
+    Unary,
+    ValueType,
+    Variable,
+    Wire,
+)
+from language.syntax import names
+
+
+def input_variables(automaton: Automaton, group: str) -> list[Variable]:
+    """Return the inputs of an automaton as variables of a group."""
+    return [
+        Variable(
+            f"{group}.{name}",
+            "truth" if thing.truth else "real",
+            str(thing.unit.dimension),
+            about=thing.key if group == "input" else "",
+        )
+        for name, thing in automaton.inputs.items()
+    ]
+
+
+def state_variables(automaton: Automaton) -> list[Variable]:
+    """Return the states and equations of an automaton as variables."""
+    found = [
+        Variable(f"state.{name}", "real", str(thing.unit.dimension))
+        for name, thing in automaton.states.items()
+    ]
+    equations = dict.fromkeys(n for mode in automaton.modes.values() for n in mode.equations)
+    for name in equations:
+        dimension = automaton.dimensions.get(name)
+        kind: ValueType = "real" if dimension else "truth"
+        found.append(Variable(f"equation.{name}", kind, str(dimension or "1")))
+    return found
+
+
+def output_wires(automaton: Automaton) -> tuple[Wire, ...]:
+    """Return the outputs in the order of the file."""
+    found = []
+    for name in automaton.outputs:
+        if name == "mode":
+            found.append(Wire("mode", "memory.mode", "whole", "1"))
+            continue
+        if name in automaton.states:
+            unit = str(automaton.states[name].unit.dimension)
+            found.append(Wire(name, f"state.{name}", "real", unit))
+            continue
+        dimension = automaton.dimensions.get(name)
+        kind: ValueType = "real" if dimension else "truth"
+        found.append(Wire(name, f"equation.{name}", kind, str(dimension or "1")))
+    return tuple(found)
+
+
+def initial_ops(automaton: Automaton, known: Mapping[str, Expr], prefix: str) -> list[Op]:
+    """Return the start values, each after those that it reads."""
+    done: dict[str, Op] = {}
+
+    def visit(name: str) -> None:
+        if name in done:
+            return
+        state = automaton.states[name]
+        for read in names(state.initial.tree):
+            if read.path in automaton.states:
+                visit(read.path)
+        value = expression(state.initial.tree, known)
+        done[name] = Assign(f"state.{name}", value, prefix + state.initial.key)
+
+    for name in automaton.states:
+        visit(name)
+    return list(done.values())
+
+
+def finished(program: Program, entries: tuple[str, ...]) -> Program:
+    """Return the program with only what its entries use: blocks, constants, variables, functions."""
+    blocks = _reached(program.blocks, entries)
+    used = {name for block in blocks.values() for name in _names(block)}
+    used |= {wire.source for wire in program.outputs}
+    constants = [c for c in program.constants if c.name in used]
+    while True:
+        needed = {name for c in constants if c.kind == "solved" for name in c.depends_on}
+        more = {f"calibration.{name}" for name in needed} - {c.name for c in constants}
+        if not more:
+            break
+        constants += [c for c in program.constants if c.name in more]
+    functions = _functions(used)
+    kept = ("input.", "is_new.")
+    variables = [v for v in program.variables if v.name in used or v.name.startswith(kept)]
+    variables = _without_idle_before(program, variables, blocks)
+    return dataclasses.replace(
+        program,
+        constants=tuple(constants),
+        variables=tuple(variables),
+        functions=functions,
+        blocks=blocks,
+    )
+
+
+def walk(block: Block) -> Iterator[Op]:
+    """Yield every operation of a block, those inside others too."""
+    for op in block:
+        yield op
+        match op:
+            case Branch(_, then, other):
+                yield from walk(then)
+                yield from walk(other)
+            case Choose(_, cases):
+                for _, case_block in cases:
+                    yield from walk(case_block)
+            case Loop(_, _, body):
+                yield from walk(body)
+
+
+def _without_idle_before(
+    program: Program, variables: list[Variable], blocks: dict[str, Block]
+) -> list[Variable]:
+    """Leave out the memory of inputs that nobody reads."""
+    if "remember" not in blocks:
+        return variables
+    reading = {n for name, b in blocks.items() if name != "remember" for n in _names(b)}
+    kept = tuple(op for op in blocks["remember"] if isinstance(op, Assign) and op.target in reading)
+    blocks["remember"] = kept
+    targets = {op.target for op in kept if isinstance(op, Assign)}
+    return [v for v in variables if not v.name.startswith("before.") or v.name in targets]
+
+
+def _reached(blocks: Mapping[str, Block], entries: tuple[str, ...]) -> dict[str, Block]:
+    seen: set[str] = set()
+    stack = [entry for entry in entries if entry in blocks]
+    while stack:
+        name = stack.pop()
+        if name not in seen:
+            seen.add(name)
+            stack += [op.block for op in walk(blocks[name]) if isinstance(op, Run)]
+    return {name: block for name, block in blocks.items() if name in seen}
+
+
+def _functions(used: set[str]) -> tuple[Function, ...]:
+    wanted = {name.removeprefix("call ") for name in used if name.startswith("call ")}
+    stack = [name for name in wanted if name in FUNCTIONS]
+    found: set[str] = set()
+    while stack:
+        name = stack.pop()
+        if name not in found:
+            found.add(name)
+            calls = _names(FUNCTIONS[name].body)
+            stack += [
+                c.removeprefix("call ") for c in calls if c.removeprefix("call ") in FUNCTIONS
+            ]
+    return tuple(function for name, function in FUNCTIONS.items() if name in found)
+
+
+def _names(block: Block) -> Iterator[str]:
+    """Yield the variables and constants that a block reads or writes, and `call <function>`."""
+    for op in walk(block):
+        match op:
+            case Assign(target, value, _):
+                yield target
+                yield from expr_names(value)
+            case Store(array, index, value):
+                yield array
+                yield from expr_names(index)
+                yield from expr_names(value)
+            case Branch(condition, _, _):
+                yield from expr_names(condition)
+            case Choose(selector, _):
+                yield selector
+            case Loop(_, index, _):
+                yield index
+            case Count(timer, condition, _, _):
+                yield timer
+                yield from expr_names(condition)
+            case _:
+                yield "memory.faults"
+
+
+def expr_names(expr: Expr) -> Iterator[str]:
+    """Yield the variables and constants that an expression reads, and `call <function>`."""
+    match expr:
+        case Ref(name):
+            yield name
+        case Item(name, index):
+            yield name
+            yield from expr_names(index)
+        case Unary(_, operand):
+            yield from expr_names(operand)
+        case Binary(_, left, right) | Compare(_, left, right):
+            yield from expr_names(left)
+            yield from expr_names(right)
+        case Select(condition, then, other):
+            for part in (condition, then, other):
+                yield from expr_names(part)
+        case Call(function, arguments):
+            yield f"call {function}"
+            for argument in arguments:
+                yield from expr_names(argument)
+
+
+def reads(blocks: Iterable[Block]) -> set[str]:
+    """Return every name that some blocks read or write."""
+    return {name for block in blocks for name in _names(block)}

@@ -1,0 +1,1 @@
+"""Runs the engine and the compiled code side by side, bit for bit."""

@@ -1,0 +1,150 @@
+"""Compare: the interpreter and the compiled C of one automaton, tick by tick, bit by bit.
+
+The process that interprets loads no compiled code of ours: the C runs as a program of its own.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from codegen.build import FLAGS, executable, fed, observed, run_executable
+from engine.interpreter import Stepper
+from language.program import Program, short
+
+CANONICAL_NAN = struct.pack("<d", math.nan)
+
+
+@dataclass(frozen=True)
+class Difference:
+    """The first value that differs: where, and both bit patterns."""
+
+    tick: int
+    time: float
+    mode: str
+    signal: str
+    engine: str
+    compiled: str
+
+    def __str__(self) -> str:
+        """Return one line."""
+        where = f"t = {self.time:.9g} s (tick {self.tick}), mode `{self.mode}`"
+        return f"{where}: `{self.signal}` is {self.engine} in the engine, {self.compiled} in C"
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """How many ticks and values were compared, how many differ, and the first that does."""
+
+    program: str
+    ticks: int
+    values: int
+    differing: int
+    transitions: int
+    first: Difference | None
+
+    @property
+    def is_equal(self) -> bool:
+        """Tell whether no bit differs."""
+        return self.differing == 0
+
+
+@dataclass
+class Tape:
+    """What one instance read and carried in each tick of the interpreter."""
+
+    program: Program
+    start: float = 0.0
+    inputs: list[bytes] = field(default_factory=list)
+    values: list[bytes] = field(default_factory=list)
+    transitions: int = 0
+
+    def __post_init__(self) -> None:
+        """Prepare the layout of the records."""
+        self._fed = tuple(variable.name for variable in fed(self.program))
+        self._observed = observed(self.program)
+        self._names = tuple(item.name for item in self._observed)
+        kinds = "".join("d" if item.kind == "real" else "q" for item in self._observed)
+        self._input = struct.Struct(f"<{len(self._fed)}d")
+        self._value = struct.Struct(f"<{kinds}")
+
+    def record(self, stepper: Stepper) -> None:
+        """Keep the inputs and values of the tick that was just done."""
+        self.inputs.append(self._input.pack(*[float(stepper.get(n)) for n in self._fed]))
+        self.values.append(self._value.pack(*[stepper.get(n) for n in self._names]))
+        self.transitions += stepper.get("memory.fired") != 0
+
+    def unpack(self, record: bytes) -> tuple[float | int, ...]:
+        """Return the values of a record."""
+        return self._value.unpack(record)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of the values of a record."""
+        return self._names
+
+    @property
+    def size(self) -> int:
+        """The bytes of a record of values."""
+        return self._value.size
+
+
+def compare(tape: Tape, flags: Sequence[str] = FLAGS) -> Verdict:
+    """Compile the tape's program, run it on the tape's inputs and compare every value.
+
+    Raises ToolMissing, BuildError.
+    """
+    with executable(tape.program, flags) as target:
+        output = run_executable(target, b"".join(tape.inputs))
+    size, ticks = tape.size, len(tape.values)
+    differing, first = 0, None
+    if len(output) != size * ticks:
+        raise ValueError(f"C wrote {len(output)} bytes, {size * ticks} were expected")
+    for tick in range(ticks):
+        ours, theirs = tape.values[tick], output[tick * size : (tick + 1) * size]
+        if ours == theirs:
+            continue
+        different = _different(ours, theirs)
+        differing += len(different)
+        if different and first is None:
+            first = _difference(tape, tick, different[0], theirs)
+    return Verdict(
+        tape.program.name, ticks, ticks * len(tape.names), differing, tape.transitions, first
+    )
+
+
+def _different(ours: bytes, theirs: bytes) -> list[int]:
+    """Return the positions that differ; all NaNs are one (codegen rule R10)."""
+    found = []
+    for position in range(len(ours) // 8):
+        a, b = ours[position * 8 : position * 8 + 8], theirs[position * 8 : position * 8 + 8]
+        if a != b and _canonical(a) != _canonical(b):
+            found.append(position)
+    return found
+
+
+def _canonical(word: bytes) -> bytes:
+    value = struct.unpack("<d", word)[0]
+    return CANONICAL_NAN if value != value else word
+
+
+def _difference(tape: Tape, tick: int, position: int, theirs: bytes) -> Difference:
+    ours = tape.values[tick]
+    values, other = tape.unpack(ours), tape.unpack(theirs)
+    mode = values[tape.names.index("memory.mode")]
+    period = float(tape.program.period or 0)
+    return Difference(
+        tick=tick,
+        time=tape.start + tick * period,
+        mode=tape.program.mode_name(int(mode)),
+        signal=short(tape.names[position]),
+        engine=_shown(values[position], ours, position),
+        compiled=_shown(other[position], theirs, position),
+    )
+
+
+def _shown(value: float | int, record: bytes, position: int) -> str:
+    bits = record[position * 8 : position * 8 + 8][::-1].hex()
+    return f"{value!r} (0x{bits})"

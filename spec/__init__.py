@@ -1,0 +1,1 @@
+"""Holds the YAML that travels with the package: systems, scenarios, effects."""
