@@ -155,7 +155,7 @@ def exponential() -> Function:
     curved = subtract(multiply(multiply(r, r), series), tail)
     scaled = body.let("scaled", add(real(1.0), add(head, curved)))
     body.let("y", multiply(Call("pow2", (exponent,)), scaled))
-    return body.function("exp", "e^x; -708 <= x <= 709, clamped; error < 0.9 ULP")
+    return body.function("exp", "e^x; -708 <= x <= 709, clamped; error < 0.95 ULP")
 
 
 def reduced(body: Body) -> tuple[Ref, Ref, Ref]:
@@ -216,7 +216,7 @@ def sine() -> Function:
     sin, cos = kernels(body, head, tail)
     turned = by_quadrant(quadrant, sin, cos, Unary("-", sin), Unary("-", cos))
     body.let("y", Select(Compare("<", Call("abs", (X,)), TINY), X, turned))
-    return body.function("sin", "sine; |x| <= 1e5 rad, clamped; error < 0.9 ULP")
+    return body.function("sin", "sine; |x| <= 1e5 rad, clamped; error < 0.85 ULP")
 
 
 def cosine() -> Function:
@@ -225,7 +225,7 @@ def cosine() -> Function:
     quadrant, head, tail = reduced(body)
     sin, cos = kernels(body, head, tail)
     body.let("y", by_quadrant(quadrant, cos, Unary("-", sin), Unary("-", cos), sin))
-    return body.function("cos", "cosine; |x| <= 1e5 rad, clamped; error < 0.9 ULP")
+    return body.function("cos", "cosine; |x| <= 1e5 rad, clamped; error < 0.85 ULP")
 
 
 def hyperbolic_tangent() -> Function:
@@ -246,7 +246,7 @@ def hyperbolic_tangent() -> Function:
     magnitude = body.let("magnitude", Select(split, low, high))
     signed = Select(Compare("<", X, real(0.0)), Unary("-", magnitude), magnitude)
     body.let("y", Select(Compare("<", size, TINY), X, signed))
-    return body.function("tanh", "hyperbolic tangent; every x; error < 1.5 ULP")
+    return body.function("tanh", "hyperbolic tangent; every x; error < 1.4 ULP")
 
 
 FUNCTIONS: Mapping[str, Function] = {

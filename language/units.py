@@ -30,6 +30,15 @@ CELSIUS_OFFSET = Fraction(27315, 100)
 BASE = ("meter", "kilogram", "second", "ampere", "kelvin")
 BASE_SYMBOLS = ("m", "kg", "s", "A", "K")
 
+MECHANICAL = {
+    (2, 1, -2): "N*m",
+    (2, 1, -1): "N*m*s",
+    (1, 1, -2): "N",
+    (2, 1, -3): "W",
+    (-1, 1, -2): "Pa",
+}
+"""How dimensions of mechanics are shown: powers of m, kg, s."""
+
 UNIT = re.compile(r"(1/)?[A-Za-z]+(\^-?\d)?([*/][A-Za-z]+(\^-?\d)?)*")
 PIECE = re.compile(r"([*/]?)([A-Za-z]+)(?:\^(-?\d))?")
 
@@ -52,7 +61,11 @@ class Dimension:
         return not any(self.powers)
 
     def __str__(self) -> str:
-        """Return the dimension in SI symbols, for problems: `kg*m^2/s^2`, `rad/s`, `1`."""
+        """Return the dimension in SI symbols: `N*m`, `kg*m^2`, `rad/s`, `1`."""
+        known = MECHANICAL.get(self.powers[:3])
+        if known and not any(self.powers[3:]):
+            angle = self.angle or 0
+            return known + {0: "", 1: "*rad", -1: "/rad"}.get(angle, f"*rad^{angle}")
         parts = list(zip(BASE_SYMBOLS, self.powers, strict=True))
         parts.insert(0, ("rad", self.angle or 0))
         over = [_power(name, power) for name, power in parts if power > 0]

@@ -38,6 +38,7 @@ class Difference:
 class Verdict:
     """How many ticks and values were compared, how many differ, and the first that does."""
 
+    name: str
     program: str
     ticks: int
     values: int
@@ -56,6 +57,7 @@ class Tape:
     """What one instance read and carried in each tick of the interpreter."""
 
     program: Program
+    name: str
     start: float = 0.0
     inputs: list[bytes] = field(default_factory=list)
     values: list[bytes] = field(default_factory=list)
@@ -111,6 +113,7 @@ def compare(tape: Tape, flags: Sequence[str] = FLAGS) -> Verdict:
         if different and first is None:
             first = _difference(tape, tick, different[0], theirs)
     return Verdict(
+        tape.name,
         tape.program.name, ticks, ticks * len(tape.names), differing, tape.transitions, first
     )
 

@@ -1,0 +1,205 @@
+"""Recording: a measured file as channels, each value with its own exact time stamp."""
+
+from __future__ import annotations
+
+import csv
+import gzip
+import math
+import zlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+
+from language.model import Column, RecordingMap
+from language.problem import Problems, Source, Span, nearest
+from language.project import shown
+
+MAX_BYTES = 512 * 1024 * 1024
+"""Largest recording read, unpacked."""
+DECIMALS = frozenset("0123456789+-.eE")
+MAX_PROBLEMS = 20
+"""After so many problems of values the rest is not looked at."""
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One signal: time stamps [s], exact and increasing, and values in SI, both (n_samples,)."""
+
+    column: Column
+    times: tuple[Fraction, ...]
+    values: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Recording:
+    """The channels that a map takes from a file, by the name in the map."""
+
+    name: str
+    channels: dict[str, Channel]
+    end: Fraction
+
+
+def read_recording(path: Path, mapping: RecordingMap, used: Sequence[str]) -> Recording:
+    """Read the used channels of a CSV file (also gzipped). Raises SpecError with all problems."""
+    source = Source(shown(path))
+    lines = _read_lines(path, source)
+    source = Source(source.name, tuple(lines))
+    rows = _Rows(source)
+    problems = Problems()
+    columns = [mapping.columns[name] for name in used]
+    wanted = [name for column in columns for name in column.columns]
+    wanted += [column.time for column in columns if column.time]
+    rows.require([mapping.time, *wanted], mapping, problems)
+    problems.stop_if_any()
+    clock = rows.times(mapping.time, mapping, problems)
+    channels = {}
+    for column in columns:
+        channels[column.name] = rows.channel(column, clock, mapping, problems)
+    problems.stop_if_any()
+    return Recording(path.name, channels, max(time for time in clock if time is not None))
+
+
+def _read_lines(path: Path, source: Source) -> list[str]:
+    problems = Problems()
+    place = Span(source, 1, 1)
+    try:
+        if path.stat().st_size > MAX_BYTES:
+            problems.error("huge", place, f"the recording is larger than {MAX_BYTES} bytes")
+            problems.stop_if_any()
+        data = path.read_bytes()
+        if path.suffix == ".gz":
+            data = gzip.decompress(data)
+        text = data.decode("utf-8-sig")
+    except OSError as error:
+        reason = error.strerror or str(error)
+        problems.error("unreadable", place, f"the recording cannot be read: {reason}")
+    except (zlib.error, EOFError) as error:
+        problems.error("unreadable", place, f"the recording cannot be unpacked: {error}")
+    except UnicodeDecodeError:
+        problems.error("binary", place, "this is not a text file", "a recording is CSV, or CSV.gz")
+    problems.stop_if_any()
+    if "\0" in text:
+        problems.error("binary", place, "this is not a text file", "a recording is CSV, or CSV.gz")
+    elif not text.strip():
+        problems.error("empty", place, "the recording is empty")
+    problems.stop_if_any()
+    return text.splitlines()
+
+
+class _Rows:
+    """The cells of a CSV text, each with its place."""
+
+    def __init__(self, source: Source) -> None:
+        self.source = source
+        reader = csv.reader(source.lines)
+        self.head = [cell.strip() for cell in next(reader)]
+        self.rows: list[tuple[int, list[str]]] = []
+        for row in reader:
+            if row:
+                self.rows.append((reader.line_num, row))
+
+    def require(self, names: Sequence[str], mapping: RecordingMap, problems: Problems) -> None:
+        head = Span(self.source, 1, 1, max(1, len(self.source.lines[0])))
+        for name in dict.fromkeys(names):
+            if name not in self.head:
+                label = f"there is no column `{name}`, which map `{mapping.name}` reads"
+                problems.error("column", head, label, nearest(name, self.head))
+            elif self.head.count(name) > 1:
+                problems.error("column", head, f"there are two columns `{name}`")
+        if not self.rows:
+            problems.error("empty", head, "the recording has a head line and no values")
+
+    def cells(self, name: str) -> Iterator[tuple[int, list[str], int, str]]:
+        """Yield line, row, position and text of every cell of a column."""
+        position = self.head.index(name)
+        for line, row in self.rows:
+            yield line, row, position, row[position].strip() if position < len(row) else ""
+
+    def span(self, line: int, row: Sequence[str], position: int) -> Span:
+        column = 1 + sum(len(cell) + 1 for cell in row[:position])
+        width = len(row[position]) if position < len(row) else 1
+        return Span(self.source, line, column, max(1, width))
+
+    def times(
+        self, name: str, mapping: RecordingMap, problems: Problems
+    ) -> list[Fraction | None]:
+        """Return the time stamps of a column [s]; None where it is blank."""
+        found: list[Fraction | None] = []
+        last: Fraction | None = None
+        main = name == mapping.time
+        for line, row, position, text in self.cells(name):
+            if len(problems.found) >= MAX_PROBLEMS:
+                break
+            value = _exact(text)
+            if value is not None:
+                value = value * mapping.time_unit.factor
+            elif main or text:
+                label = f"the time stamp `{text}` is not a number" if text else "no time stamp"
+                problems.error("time", self.span(line, row, position), label)
+            if value is not None and last is not None and value <= last:
+                label = f"the time stamp {text} is not above the one before, {float(last):.9g}"
+                hint = "sort the recording, and remove repeated rows"
+                problems.error("time", self.span(line, row, position), label, hint)
+            last = value if value is not None else last
+            found.append(value)
+        return found
+
+    def channel(
+        self,
+        column: Column,
+        clock: list[Fraction | None],
+        mapping: RecordingMap,
+        problems: Problems,
+    ) -> Channel:
+        stamps = self.times(column.time, mapping, problems) if column.time else clock
+        values = [self._values(name, column, problems) for name in column.columns]
+        times: list[Fraction] = []
+        kept: list[float] = []
+        scale = float(column.scale[0]) * column.sign
+        for stamp, *cells in zip(stamps, *values, strict=False):
+            if stamp is None or any(cell is None for cell in cells):
+                continue
+            total = 0.0
+            for cell in cells:
+                total += cell or 0.0
+            times.append(stamp + column.delay)
+            kept.append(total / len(cells) * scale)
+        if not times and not problems.has_errors:
+            place = Span(self.source, 1, 1, max(1, len(self.source.lines[0])))
+            problems.error("empty", place, f"column `{column.columns[0]}` has no values")
+        return Channel(column, tuple(times), tuple(kept))
+
+    def _values(self, name: str, column: Column, problems: Problems) -> list[float | None]:
+        factor, offset = float(column.unit.factor), float(column.unit.offset)
+        found: list[float | None] = []
+        for line, row, position, text in self.cells(name):
+            if len(problems.found) >= MAX_PROBLEMS:
+                break
+            value: float | None = None
+            if text or column.blank == "refuse":
+                value = _real(text)
+                if value is None or not math.isfinite(value):
+                    label = f"`{text}` in column `{name}` is not a finite number"
+                    hint = "" if text else "`blank: skip` in the map leaves empty cells out"
+                    problems.error("value", self.span(line, row, position), label, hint)
+            found.append(None if value is None else value * factor + offset)
+        return found
+
+
+def _exact(text: str) -> Fraction | None:
+    if not text or not DECIMALS.issuperset(text) or len(text) > 40:
+        return None
+    try:
+        value = Fraction(text)
+    except (ValueError, ZeroDivisionError):
+        return None
+    return value if abs(value) < 10**12 else None
+
+
+def _real(text: str) -> float | None:
+    try:
+        return float(text)
+    except ValueError:
+        return None
+

@@ -1,0 +1,237 @@
+"""Replay: a recording through a sampled automaton that ticks at its own period."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.interpreter import Interpreter, Stepper
+from engine.recording import Channel, Recording
+from engine.trajectory import Event, Trajectory
+from language.map import column_dimension
+from language.model import Automaton, RecordingMap
+from language.problem import Problems, SpecError, nearest
+from language.program import Program
+from language.units import fits
+
+MAX_TICKS = 20_000_000
+"""Most ticks of one replay."""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """An output against a column of the recording, at the ticks with a new value."""
+
+    output: str
+    rms: float
+    largest: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Replay:
+    """What came out of a replay: a trajectory per tick with the inputs that were read.
+
+    `innovation_rms` is the root mean square of the one-step innovation per measured input, over
+    the ticks that had a new value while an observer was active.
+    """
+
+    trajectory: Trajectory
+    innovation_rms: Mapping[str, float]
+    comparisons: tuple[Comparison, ...]
+
+
+def used_columns(automaton: Automaton, mapping: RecordingMap) -> tuple[list[str], list[str]]:
+    """Return the columns of a map that an automaton reads or compares, and those left out.
+
+    Raises SpecError: an input without a column, a wrong dimension, an unknown output.
+    """
+    problems = Problems()
+    used, left_out = [], []
+    fed = set(mapping.constants)
+    for column in mapping.columns.values():
+        if column.compare is not None:
+            if column.compare not in automaton.outputs:
+                label = f"`{column.compare}` is not an output of `{automaton.name}`"
+                problems.error(
+                    "name", column.span, label, nearest(column.compare, automaton.outputs)
+                )
+            used.append(column.name)
+            continue
+        thing = automaton.inputs.get(column.to or "")
+        if thing is None:
+            left_out.append(column.name)
+            continue
+        if not fits(column_dimension(column), thing.unit.dimension):
+            label = f"column `{column.name}` is in `{column_dimension(column)}`"
+            hint = f"input `{thing.name}` is in `{thing.unit.dimension}`"
+            problems.error("dimension", column.span, label, hint)
+        if thing.name in fed:
+            problems.error("duplicate", column.span, f"input `{thing.name}` is fed twice")
+        fed.add(thing.name)
+        used.append(column.name)
+    for name, thing in automaton.inputs.items():
+        if name not in fed and thing.default is None:
+            label = f"map `{mapping.name}` gives no value for input `{name}` of `{automaton.name}`"
+            problems.error("missing", mapping.span, label, nearest(name, left_out))
+    problems.stop_if_any()
+    return used, left_out
+
+
+def replay(
+    automaton: Automaton,
+    program: Program,
+    recording: Recording,
+    mapping: RecordingMap,
+    build: Callable[[Program], Stepper] = Interpreter,
+    ticked: Callable[[Stepper], None] | None = None,
+) -> Replay:
+    """Tick through a recording: inputs held, a channel without a new value has innovation 0.
+
+    The first tick is where every input has had a value; tick k is k periods later.
+    """
+    assert program.period is not None
+    stepper = build(program)
+    feeds = [c for c in recording.channels.values() if c.column.to is not None]
+    start = max(channel.times[0] for channel in feeds) if feeds else Fraction(0)
+    count = int((recording.end - start) // program.period) + 1
+    if count > MAX_TICKS or count < 1:
+        problems = Problems()
+        label = f"the recording spans {count} ticks of {program.period} s; 1 to {MAX_TICKS} is fine"
+        problems.error("range", mapping.span, label)
+        raise SpecError(problems.found)
+    cursors = [_Cursor(channel, f"input.{channel.column.to}") for channel in feeds]
+    _set_constants(automaton, program, mapping, stepper)
+    keep = _Kept(program, [cursor.target for cursor in cursors])
+    for tick in range(count):
+        time = start + tick * program.period
+        for cursor in cursors:
+            cursor.advance(time, stepper, program)
+        stepper.run("step")
+        keep.row(time, stepper)
+        if ticked:
+            ticked(stepper)
+    trajectory = keep.trajectory(automaton.name)
+    compared = [c for c in recording.channels.values() if c.column.compare is not None]
+    return Replay(
+        trajectory,
+        keep.innovation_rms(),
+        tuple(_compared(channel, trajectory, start, program) for channel in compared),
+    )
+
+
+class _Cursor:
+    """A channel and how far it has been read."""
+
+    def __init__(self, channel: Channel, target: str) -> None:
+        self.channel = channel
+        self.target = target
+        self.position = 0
+
+    def advance(self, time: Fraction, stepper: Stepper, program: Program) -> None:
+        """Latch the latest value with a stamp up to `time`; tell whether there was a new one."""
+        times, position = self.channel.times, self.position
+        while position < len(times) and times[position] <= time:
+            position += 1
+        is_new = position > self.position
+        if is_new:
+            stepper.set(self.target, self.channel.values[position - 1])
+        self.position = position
+        flag = f"is_new.{self.target.partition('.')[2]}"
+        if any(variable.name == flag for variable in program.variables):
+            stepper.set(flag, is_new)
+
+
+def _set_constants(
+    automaton: Automaton, program: Program, mapping: RecordingMap, stepper: Stepper
+) -> None:
+    for name, value in program.defaults.items():
+        stepper.set(f"input.{name}", value)
+    for name, (number, _) in mapping.constants.items():
+        if name in automaton.inputs:
+            stepper.set(f"input.{name}", float(number))
+
+
+class _Kept:
+    """Rows of what each tick gave."""
+
+    def __init__(self, program: Program, fed: Sequence[str]) -> None:
+        self.program = program
+        self.names = {f"in.{name.partition('.')[2]}": name for name in fed}
+        self.names.update({wire.name: wire.source for wire in program.outputs})
+        self.names.setdefault("mode", "memory.mode")
+        variables = {variable.name: variable for variable in program.variables}
+        self.kinds = {name: variables[source].type for name, source in self.names.items()}
+        self.units = {name: variables[source].unit for name, source in self.names.items()}
+        self.innovations = [n for n in variables if n.startswith("innovation.")]
+        observing = {info.mode for info in program.observers}
+        self.observing = {m.number for m in program.modes if m.name in observing}
+        self.times: list[Fraction] = []
+        self.rows: list[tuple[Any, ...]] = []
+        self.squares = dict.fromkeys(self.innovations, 0.0)
+        self.counts = dict.fromkeys(self.innovations, 0)
+        self.events: list[Event] = []
+        self.mode: int | None = None
+
+    def row(self, time: Fraction, stepper: Stepper) -> None:
+        self.times.append(time)
+        self.rows.append(tuple([stepper.get(source) for source in self.names.values()]))
+        fired = stepper.get("memory.fired")
+        if self.mode in self.observing:
+            for name in self.innovations:
+                if stepper.get(f"is_new.{name.partition('.')[2]}"):
+                    self.squares[name] += stepper.get(name) ** 2
+                    self.counts[name] += 1
+        if fired:
+            info = self.program.transitions[fired - 1]
+            names = self.program.mode_name
+            modes = names(info.source), names(info.target)
+            self.events.append(Event(float(time), 0, self.program.name, info.name, *modes))
+        self.mode = stepper.get("memory.mode")
+
+    def innovation_rms(self) -> dict[str, float]:
+        return {
+            name.partition(".")[2]: math.sqrt(self.squares[name] / self.counts[name])
+            for name in self.innovations
+            if self.counts[name]
+        }
+
+    def trajectory(self, name: str) -> Trajectory:
+        columns = list(zip(*self.rows, strict=True))
+        signals: dict[str, NDArray[Any]] = {}
+        for (key, kind), values in zip(self.kinds.items(), columns, strict=True):
+            signals[key] = np.array(values, dtype=np.float64 if kind == "real" else np.int64)
+        return Trajectory(
+            name=name,
+            times=np.array([float(time) for time in self.times]),
+            signals=signals,
+            units=self.units,
+            modes={"mode": {mode.number: mode.name for mode in self.program.modes}},
+            events=tuple(self.events),
+        )
+
+
+def _compared(
+    channel: Channel, trajectory: Trajectory, start: Fraction, program: Program
+) -> Comparison:
+    """Compare an output with a column at the ticks in which the column has a new value."""
+    assert program.period is not None and channel.column.compare is not None
+    output = trajectory.signals[channel.column.compare]
+    differences = []
+    for time, value in zip(channel.times, channel.values, strict=True):
+        tick = math.ceil((time - start) / program.period)
+        if 0 <= tick < len(output):
+            differences.append(float(output[tick]) - value)
+    array = np.array(differences or [math.nan])
+    return Comparison(
+        channel.column.compare,
+        float(np.sqrt(np.mean(array**2))),
+        float(np.max(np.abs(array))),
+        trajectory.units[channel.column.compare],
+    )

@@ -1,0 +1,108 @@
+"""Map reader: how the columns of a recording become signals."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Literal, cast
+
+from language.document import Document, Entry, Table
+from language.model import Column, RecordingMap
+from language.problem import Problems
+from language.project import Project, expanded
+from language.reader import Reader
+from language.scenario import constant
+from language.units import NO_UNIT, NUMBER, SECOND, Dimension, fits, product
+
+MAP_KEYS = ("language", "map", "time", "columns", "constants")
+COLUMN_KEYS = (
+    "column mean to compare unit scale sign delay hold blank time".split()  # noqa: SIM905
+)
+
+
+def read_map(document: Document, project: Project) -> RecordingMap:
+    """Read a map. Raises SpecError with all problems."""
+    document = expanded(document, project)
+    problems = Problems()
+    if document.kind != "map":
+        label = f"`{document.name}` is a {document.kind}, not a map"
+        problems.error("form", document.name_span, label)
+    problems.stop_if_any()
+    found = _MapReader(problems).read(document)
+    problems.stop_if_any()
+    return found
+
+
+class _MapReader(Reader):
+    """The sections of a map."""
+
+    def read(self, document: Document) -> RecordingMap:
+        tree = self.table(document.root, f"map {document.name}", MAP_KEYS)
+        at = document.name_span
+        time = self.table(tree.get("time"), "time", ("column", "unit"))
+        unit = self.unit(time.get("unit"))
+        if not fits(unit.dimension, SECOND):
+            self.problems.error("unit", time.span if time.entries else at, "the unit of `time` is a time")
+        constants: dict[str, tuple[Fraction, Dimension]] = {}
+        for entry in self.named(tree.get("constants"), "constants"):
+            value, own = self.quantity(entry.node, entry.key, entry.span, None)
+            constants[entry.key] = value, own.dimension
+        columns = [self._column(entry) for entry in self.table(tree.get("columns"), "columns")]
+        if not columns:
+            self.problems.error("missing", at, "a map has at least one column in `columns`")
+        return RecordingMap(
+            name=document.name,
+            time=self.text(time.get("column"), "time.column", at),
+            time_unit=unit,
+            columns={column.name: column for column in columns},
+            constants=constants,
+            span=at,
+        )
+
+    def _column(self, entry: Entry) -> Column:
+        what = f"columns.{entry.key}"
+        table = self.table(entry.node, what, COLUMN_KEYS)
+        names = [item.text for item in self.items(table.get("mean"), f"{what}.mean")]
+        column = table.get("column")
+        if not names:
+            names = [self.text(column, "column", entry.span) if column else entry.key]
+        elif column:
+            self.problems.error("form", entry.span, "`column` and `mean` exclude each other")
+        to, compare = table.get("to"), table.get("compare")
+        if (to is None) == (compare is None):
+            label = "a column has `to` (an input) or `compare` (an output)"
+            self.problems.error("missing", entry.span, label)
+        self.choice(table.get("hold"), "hold", ("previous",), "previous")
+        blank = self.choice(table.get("blank"), "blank", ("refuse", "skip"), "refuse")
+        delay = table.get("delay")
+        shift, unit = (
+            self.quantity(delay, "delay", delay.span, None) if delay else (Fraction(0), NO_UNIT)
+        )
+        if delay and (not fits(unit.dimension, SECOND) or shift < 0):
+            self.problems.error("unit", delay.span, "`delay` is a time of at least 0 s")
+        time = table.get("time")
+        return Column(
+            name=entry.key,
+            columns=tuple(names),
+            to=self.text(to, "to", entry.span) if to else None,
+            compare=self.text(compare, "compare", entry.span) if compare else None,
+            unit=self.unit(table.get("unit")),
+            scale=self._scale(table),
+            sign=self.whole(table.get("sign"), "sign", 1, -1, 1) or 1,
+            delay=shift,
+            blank=cast(Literal["refuse", "skip"], blank),
+            time=self.text(time, "time", entry.span) if time else None,
+            span=entry.span,
+        )
+
+    def _scale(self, table: Table) -> tuple[Fraction, Dimension]:
+        node = table.get("scale")
+        formula = self.expression(node, "scale", node.span) if node else None
+        if formula:
+            with self.problems.collecting():
+                return constant(formula.tree)
+        return Fraction(1), NUMBER
+
+
+def column_dimension(column: Column) -> Dimension:
+    """Return the dimension of what a column gives: its unit times its scale."""
+    return product(column.unit.dimension, column.scale[1])

@@ -1,0 +1,190 @@
+"""API: what the command line does, as functions. Specs are named or given by path."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from codegen.source import c_files
+from engine.recording import Recording, read_recording
+from engine.replay import Replay, used_columns
+from engine.replay import replay as replay_recording
+from engine.simulate import simulate as simulate_system
+from engine.trajectory import Trajectory
+from language.document import Scalar
+from language.load import automaton_of, command_line_value, program_of
+from language.map import read_map
+from language.model import Automaton, RecordingMap, Scenario, System
+from language.problem import Problem, Problems, SpecError
+from language.program import Program
+from language.project import Project, expanded, layered, read_document
+from language.scenario import read_scenario
+from language.system import read_system
+from lockstep.compare import Tape, Verdict, compare
+
+Values = Mapping[str, str]
+"""Parameter values as text with units, by `parameter` or `instance.parameter`."""
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """A system with a scenario, checked."""
+
+    system: System
+    scenario: Scenario
+
+
+@dataclass(frozen=True)
+class Replayed:
+    """A replay with its lock-step verdict (None if C was not asked for)."""
+
+    result: Replay
+    verdict: Verdict | None
+    left_out: tuple[str, ...]
+    recording: Recording = field(repr=False)
+
+
+def check(reference: str, root: Path | None = None) -> list[Problem]:
+    """Return all problems of a spec; an empty list means that it is fine."""
+    project = Project(root or Path())
+    try:
+        document = read_document(project.path_of(reference))
+        base = expanded(document, project)
+        if base.kind == "automaton":
+            program_of(automaton_of(document, project))
+        elif base.kind == "system":
+            for instance in read_system(document, project).instances.values():
+                program_of(instance.automaton)
+        elif base.kind == "map":
+            read_map(document, project)
+        else:
+            _check_scenario(reference, project)
+    except SpecError as error:
+        return list(error.problems)
+    return []
+
+
+def load(system: str, scenario: str, values: Values | None = None, root: Path | None = None) -> Loaded:
+    """Return a system with a scenario. Raises SpecError with all problems."""
+    project = Project(root or Path())
+    read = read_system(read_document(project.path_of(system)), project, _scalars(values))
+    document = read_document(project.path_of(scenario))
+    return Loaded(read, read_scenario(document, project, read))
+
+
+def simulate(
+    system: str,
+    scenario: str,
+    values: Values | None = None,
+    root: Path | None = None,
+    *,
+    reference: bool = False,
+) -> Trajectory:
+    """Return the trajectory of a system through a scenario; by scipy and filterpy if asked."""
+    loaded = load(system, scenario, values, root)
+    if reference:
+        from engine.reference import reference as simulate_reference  # scipy only where asked for
+
+        return simulate_reference(loaded.system, loaded.scenario)
+    return simulate_system(loaded.system, loaded.scenario)
+
+
+def program(reference: str, values: Values | None = None, root: Path | None = None) -> Program:
+    """Return the Program of an automaton. Raises SpecError."""
+    project = Project(root or Path())
+    document = read_document(project.path_of(reference))
+    return program_of(automaton_of(document, project, _scalars(values)))
+
+
+def generate(reference: str, values: Values | None = None, root: Path | None = None) -> dict[str, str]:
+    """Return the C files of a sampled automaton by name. Raises SpecError."""
+    return c_files(program(reference, values, root))
+
+
+def lockstep(
+    system: str, scenario: str, values: Values | None = None, root: Path | None = None
+) -> tuple[Trajectory, list[Verdict]]:
+    """Simulate, then run the C of every sampled instance on the same inputs and compare bits.
+
+    Raises SpecError, ToolMissing.
+    """
+    loaded = load(system, scenario, values, root)
+    tapes: dict[str, Tape] = {}
+
+    def ticked(name: str, used: Program, stepper: object) -> None:
+        if name not in tapes:
+            start = float(loaded.system.instances[name].offset)
+            tapes[name] = Tape(used, name=name, start=start)
+        tapes[name].record(stepper)  # type: ignore[arg-type]
+
+    trajectory = simulate_system(loaded.system, loaded.scenario, ticked=ticked)
+    return trajectory, [compare(tape) for tape in tapes.values()]
+
+
+def replay(
+    estimator: str,
+    recording: Path,
+    map: str,
+    variant: str | None = None,
+    values: Values | None = None,
+    root: Path | None = None,
+    *,
+    compiled: bool = True,
+) -> Replayed:
+    """Replay a recording through a sampled automaton, in lock-step with its C.
+
+    Raises SpecError, ToolMissing.
+    """
+    automaton, used = _estimator(estimator, variant, values, root)
+    mapping = _map(map, root)
+    columns, left_out = used_columns(automaton, mapping)
+    read = read_recording(recording, mapping, columns)
+    tape = Tape(used, name=automaton.name)
+    result = replay_recording(automaton, used, read, mapping, ticked=tape.record)
+    tape.start = float(result.trajectory.times[0])
+    verdict = compare(tape) if compiled else None
+    return Replayed(result, verdict, tuple(left_out), read)
+
+
+def _estimator(
+    reference: str, variant: str | None, values: Values | None, root: Path | None
+) -> tuple[Automaton, Program]:
+    project = Project(root or Path())
+    document = read_document(project.path_of(reference))
+    if variant:
+        over = read_document(project.path_of(variant))
+        problems = Problems()
+        if over.kind != "variant":
+            label = f"`{over.name}` is a {over.kind}, not a variant"
+            problems.error("form", over.name_span, label)
+        problems.stop_if_any()
+        document = layered(document, over, project, problems)
+    automaton = automaton_of(document, project, _scalars(values))
+    if not automaton.is_sampled:
+        problems = Problems()
+        label = f"`{automaton.name}` is continuous: only a sampled automaton reads a recording"
+        problems.error("form", automaton.span, label, "give it a `period`")
+        raise SpecError(problems.found)
+    return automaton, program_of(automaton)
+
+
+def _map(reference: str, root: Path | None) -> RecordingMap:
+    project = Project(root or Path())
+    return read_map(read_document(project.path_of(reference)), project)
+
+
+def _check_scenario(reference: str, project: Project) -> None:
+    document = read_document(project.path_of(reference))
+    node = expanded(document, project).root.get("of")
+    if isinstance(node, Scalar):
+        system = read_system(read_document(project.path_of(node.text, node.span)), project)
+        read_scenario(document, project, system)
+        return
+    problems = Problems()
+    problems.error("missing", document.name_span, "a scenario says what system it is `of`")
+    raise SpecError(problems.found)
+
+
+def _scalars(values: Values | None) -> dict[str, Scalar]:
+    return {name: command_line_value(text) for name, text in (values or {}).items()}

@@ -1,0 +1,40 @@
+"""Demo: the tip-out of the paper, both estimators beside the plant, in lock-step with their C."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rich.console import Console
+
+from engine.plot import Line, Panel, picture
+from modewright import api, show
+from modewright.files import write_files
+
+SYSTEM, SCENARIO = "ev_driveline", "tip_out"
+WINDOW = (0.45, 1.15)
+"""The part of the scenario in which the gap is crossed [s]."""
+
+
+def run(folder: Path, console: Console) -> bool:
+    """Run the demo, print its tables, write `tip_out.png`; tell whether no bit differs."""
+    console.print("Tip-out of an EV driveline with backlash, 30 -> -20 N*m at 0.4785 s")
+    trajectory, verdicts = api.lockstep(SYSTEM, SCENARIO)
+    torque = [
+        Line("plant.T_hs", "plant"),
+        Line("est.T_hs", "estimator, 1 kHz"),
+        Line("simple.T_hs", "simplified, 100 Hz", dashed=True),
+    ]
+    gap = [
+        Line("plant.theta_b", "plant", 1e3),
+        Line("est.theta_b", "estimator, 1 kHz", 1e3, dashed=True),
+    ]
+    panels = [Panel("half-shaft torque [N*m]", torque), Panel("position in the gap [mrad]", gap)]
+    bands = {"plant": "plant.mode", "1 kHz": "est.mode", "100 Hz": "simple.mode"}
+    title = "Tip-out: contact is lost, the gap is crossed, the estimators follow"
+    path = folder / "tip_out.png"
+    write_files({path: picture(trajectory, panels, bands, title, span=WINDOW)})
+    console.print(show.events_table(trajectory.events))
+    console.print()
+    show.print_verdicts(console, verdicts)
+    console.print(f"\npicture: {path}", highlight=False, soft_wrap=True)
+    return trajectory.stopped is None and all(verdict.is_equal for verdict in verdicts)

@@ -1,0 +1,73 @@
+"""Exits: what each exit code means, and how an exception becomes one."""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+
+import click
+
+from codegen.build import ToolMissing
+from language.problem import SpecError, ordered, render_all
+from modewright.files import OutputError
+
+DONE, PROBLEMS, USAGE, TOOL, DEFECT, INTERRUPTED = 0, 1, 2, 3, 4, 130
+EXIT_CODES = """Exit codes: 0 done; 1 the spec or data has problems, a check failed, lock-step
+differs; 2 wrong usage; 3 a tool is missing (its install line is printed); 4 a defect of
+modewright (one line and a report file); 130 interrupted."""
+
+
+def exit_code(run: Callable[[], object]) -> int:
+    """Run a command line and return its exit code; every message goes to stderr."""
+    try:
+        code = run()
+        return code if isinstance(code, int) else DONE
+    except click.UsageError as error:
+        error.show()
+        return USAGE
+    except (KeyboardInterrupt, click.Abort):
+        print("interrupted", file=sys.stderr)
+        return INTERRUPTED
+    except click.exceptions.Exit as error:
+        return error.exit_code
+    except SpecError as error:
+        report(error)
+        return PROBLEMS
+    except OutputError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return PROBLEMS
+    except ToolMissing as error:
+        print(f"error: {error}", file=sys.stderr)
+        return TOOL
+    except BrokenPipeError:
+        sys.stderr.close()
+        return DONE
+    except Exception as error:
+        print(f"error: a defect of modewright: {_first_line(error)}", file=sys.stderr)
+        print(f"a report is in {_write_report()}", file=sys.stderr)
+        return DEFECT
+
+
+def report(error: SpecError) -> None:
+    """Print the problems and their number."""
+    problems = ordered(error.problems)
+    count = sum(problem.severity == "error" for problem in problems)
+    print(render_all(problems), file=sys.stderr)
+    print(f"\n{count} {'problem' if count == 1 else 'problems'}", file=sys.stderr)
+
+
+def _first_line(error: Exception) -> str:
+    text = str(error).strip().split("\n")[0]
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__
+
+
+def _write_report() -> Path:
+    text = f"command: {' '.join(sys.argv)}\npython: {sys.version}\n\n{traceback.format_exc()}"
+    with tempfile.NamedTemporaryFile(
+        "w", prefix="modewright-report-", suffix=".txt", delete=False
+    ) as file:
+        file.write(text)
+    return Path(file.name)

@@ -1,0 +1,49 @@
+"""Generated: the committed C of a project, one folder per folder of specs, guarded."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from codegen.source import c_files
+from language.load import automaton_of, program_of
+from language.project import Project, expanded, read_document
+
+LIBRARY = ("ha_math.h", "ha_math.c")
+
+
+def generated_files(root: Path) -> dict[Path, bytes]:
+    """Return every file that belongs below `generated/`. Raises SpecError."""
+    project = Project(root)
+    found: dict[Path, bytes] = {}
+    for path in spec_files(root):
+        document = read_document(path)
+        if expanded(document, project).kind != "automaton":
+            continue
+        automaton = automaton_of(document, project)
+        if not automaton.is_sampled:
+            continue
+        folder = root / "generated" / path.parent.relative_to(root / "spec")
+        for name, text in c_files(program_of(automaton)).items():
+            found[folder / name] = text.encode()
+    return found
+
+
+def spec_files(root: Path) -> Iterator[Path]:
+    """Yield the specs of a project in the order of their paths."""
+    yield from sorted((root / "spec").rglob("*.yaml"))
+
+
+def stale_files(root: Path) -> list[str]:
+    """Return what is missing, different or left over below `generated/`, one line each."""
+    wanted = generated_files(root)
+    present = {path for path in (root / "generated").rglob("*.[ch]") if path.is_file()}
+    lines = []
+    for path, data in wanted.items():
+        name = path.relative_to(root)
+        if path not in present:
+            lines.append(f"{name}: missing")
+        elif path.read_bytes() != data:
+            lines.append(f"{name}: differs from what the specs give")
+    lines += [f"{path.relative_to(root)}: left over" for path in sorted(present - set(wanted))]
+    return lines

@@ -1,0 +1,28 @@
+"""Replay picture: measured speeds, estimated half-shaft torque and mode of a replay."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from engine.plot import Line, Panel, picture
+from engine.trajectory import Trajectory
+from modewright.api import Replayed
+
+
+def replay_picture(replayed: Replayed, title: str, form: str = "png") -> bytes:
+    """Return the picture: one panel per unit of what was measured, one per unit of the outputs."""
+    trajectory = replayed.result.trajectory
+    panels = [*_panels(trajectory, measured=True), *_panels(trajectory, measured=False)]
+    return picture(trajectory, panels, {"mode": "mode"}, title, form)
+
+
+def _panels(trajectory: Trajectory, *, measured: bool) -> list[Panel]:
+    by_unit: dict[str, list[str]] = {}
+    for name, values in trajectory.signals.items():
+        if values.dtype == np.float64 and name.startswith("in.") == measured:
+            by_unit.setdefault(trajectory.units[name], []).append(name)
+    word = "measured" if measured else "estimated"
+    return [
+        Panel(f"{word} [{unit}]", [Line(name, name.removeprefix("in.")) for name in names])
+        for unit, names in by_unit.items()
+    ]
