@@ -17,7 +17,22 @@ from codegen.source import c_files, render
 from language.program import Program, Variable
 
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-fast-math", "-fno-math-errno")
-WARNINGS = ["-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wfloat-conversion", "-Wdouble-promotion", "-Wshadow", "-Wundef", "-Wstrict-prototypes", "-Wmissing-prototypes", "-Wcast-qual", "-Wswitch-default", "-Wswitch-enum", "-Wvla"]
+WARNINGS = [
+    "-Wall",
+    "-Wextra",
+    "-Wpedantic",
+    "-Wconversion",
+    "-Wfloat-conversion",
+    "-Wdouble-promotion",
+    "-Wshadow",
+    "-Wundef",
+    "-Wstrict-prototypes",
+    "-Wmissing-prototypes",
+    "-Wcast-qual",
+    "-Wswitch-default",
+    "-Wswitch-enum",
+    "-Wvla",
+]
 SECONDS = 120
 """Longest compilation or run before it is given up."""
 

@@ -63,6 +63,7 @@ def read_recording(path: Path, mapping: RecordingMap, used: Sequence[str]) -> Re
 def _read_lines(path: Path, source: Source) -> list[str]:
     problems = Problems()
     place = Span(source, 1, 1)
+    text = ""
     try:
         if path.stat().st_size > MAX_BYTES:
             problems.error("huge", place, f"the recording is larger than {MAX_BYTES} bytes")
@@ -121,9 +122,7 @@ class _Rows:
         width = len(row[position]) if position < len(row) else 1
         return Span(self.source, line, column, max(1, width))
 
-    def times(
-        self, name: str, mapping: RecordingMap, problems: Problems
-    ) -> list[Fraction | None]:
+    def times(self, name: str, mapping: RecordingMap, problems: Problems) -> list[Fraction | None]:
         """Return the time stamps of a column [s]; None where it is blank."""
         found: list[Fraction | None] = []
         last: Fraction | None = None
@@ -202,4 +201,3 @@ def _real(text: str) -> float | None:
         return float(text)
     except ValueError:
         return None
-

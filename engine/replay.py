@@ -9,11 +9,10 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from engine.interpreter import Interpreter, Stepper
 from engine.recording import Channel, Recording
-from engine.trajectory import Event, Trajectory
+from engine.trajectory import Event, Trajectory, Values, column_array
 from language.map import column_dimension
 from language.model import Automaton, RecordingMap
 from language.problem import Problems, SpecError, nearest
@@ -204,9 +203,9 @@ class _Kept:
 
     def trajectory(self, name: str) -> Trajectory:
         columns = list(zip(*self.rows, strict=True))
-        signals: dict[str, NDArray[Any]] = {}
+        signals: dict[str, Values] = {}
         for (key, kind), values in zip(self.kinds.items(), columns, strict=True):
-            signals[key] = np.array(values, dtype=np.float64 if kind == "real" else np.int64)
+            signals[key] = column_array(kind, values)
         return Trajectory(
             name=name,
             times=np.array([float(time) for time in self.times]),

@@ -12,7 +12,7 @@ import numpy as np
 
 from engine.continuous import ContinuousRun, Stopped
 from engine.interpreter import Interpreter, Stepper
-from engine.trajectory import Event, Trajectory
+from engine.trajectory import Event, Trajectory, column_array
 from language.load import program_of
 from language.model import Automaton, Formula, Instance, Scenario, Stimulus, System
 from language.problem import Source, Span
@@ -220,8 +220,7 @@ class _Simulation:
         columns = list(zip(*self.rows, strict=True)) if self.rows else [()] * len(self.columns)
         signals = {}
         for (key, (_, wire)), values in zip(self.columns.items(), columns, strict=True):
-            kind = np.float64 if wire.type == "real" else np.int64
-            signals[key] = np.array(values, dtype=kind)
+            signals[key] = column_array(wire.type, values)
         return Trajectory(
             name=self.scenario.name,
             times=np.array([float(time) for time in self.times]),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,3 +53,10 @@ class Trajectory:
         columns = [values.tolist() for values in (self.times, *self.signals.values())]
         writer.writerows(zip(*columns, strict=True))
         return text.getvalue()
+
+
+def column_array(kind: str, values: Sequence[float | int | bool]) -> Values:
+    """Return the values of one signal (n_samples,): doubles for reals, else whole numbers."""
+    if kind == "real":
+        return np.array(values, dtype=np.float64)
+    return np.array(values, dtype=np.int64)

@@ -220,7 +220,7 @@ class _AutomatonReader(Reader):
     def _modes(self, tree: Table) -> dict[str, Mode]:
         templates = self.table(tree.get("templates"), "templates")
         root = tree
-        modes = {}
+        modes: dict[str, Mode] = {}
         for entry in self.named(tree.get("modes"), "modes"):
             table = entry.node if isinstance(entry.node, Table) else Table({}, entry.span)
             table = self._like(table, templates)

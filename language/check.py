@@ -5,17 +5,16 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Mapping
 
-import networkx as nx
-
 from language.automaton import coefficient_of
 from language.dimension import DimensionCheck, Kind, Scope
+from language.guards import report_overlaps
 from language.model import Automaton, Formula, Mode, Observer
+from language.order import equation_order, report_circle
 from language.problem import Problems, Span, SpecError, nearest
-from language.syntax import Not, Relation, Tree, names
+from language.syntax import Tree, names
 from language.units import NUMBER, SECOND, Dimension, product
+from language.witness import report_refiring
 
-DISJOINT = {"<": (">", ">="), "<=": (">",), ">": ("<", "<="), ">=": ("<",)}
-"""Relations that exclude each other between the same two sides."""
 RESERVED_OUTPUTS = ("mode", "faults")
 
 
@@ -26,32 +25,12 @@ def check_automaton(automaton: Automaton) -> Automaton:
     problems = Problems()
     checked = _Check(automaton, problems).run()
     problems.stop_if_any()
+    for mode in checked.modes.values():
+        report_overlaps(checked, mode, problems)
+    if not checked.is_sampled:
+        report_refiring(checked, problems)
+    problems.stop_if_any()
     return checked
-
-
-def equation_order(mode: Mode) -> list[str]:
-    """Return the names of a mode's equations so that each comes after those that it reads.
-
-    Ties are broken by the order in the file. Raises SpecError naming an algebraic loop.
-    """
-    graph: nx.DiGraph[str] = nx.DiGraph()
-    graph.add_nodes_from(mode.equations)
-    for name, formula in mode.equations.items():
-        for read in names(formula.tree):
-            if read.path in mode.equations:
-                graph.add_edge(read.path, name)
-    place = {name: position for position, name in enumerate(mode.equations)}
-    try:
-        return list(nx.lexicographical_topological_sort(graph, key=lambda name: place[name]))
-    except nx.NetworkXUnfeasible:
-        loop = [edge[0] for edge in nx.find_cycle(graph)]
-        problems = Problems()
-        first = mode.equations[loop[0]]
-        chain = " -> ".join(f"`{name}`" for name in [*loop, loop[0]])
-        label = f"an algebraic loop in mode `{mode.name}`: {chain}"
-        hint = "each reads the one before it at the same instant; one of them has to be a state"
-        problems.error("loop", first.span, label, hint)
-        raise SpecError(problems.found) from None
 
 
 class _Check:
@@ -110,34 +89,24 @@ class _Check:
         automaton = self.automaton
         scope = self._scope([automaton.parameters], "among the parameters")
         check = DimensionCheck(scope, self.problems)
-        graph: nx.DiGraph[str] = nx.DiGraph()
+        trees: dict[str, Tree] = {}
         for parameter in automaton.parameters.values():
-            if parameter.derived and not (
-                automaton.model and parameter.name in _of_model(automaton)
-            ):
-                tree = parameter.derived.tree
-                check.quantity(tree, parameter.unit.dimension, parameter.name)
-                graph.add_edges_from((read.path, parameter.name) for read in names(tree))
-        self._no_cycle(graph, {p.name: p.span for p in automaton.parameters.values()}, "derived")
+            if parameter.derived and parameter.name not in _of_model(automaton):
+                trees[parameter.name] = parameter.derived.tree
+                what = f"the unit of {parameter.name}"
+                check.quantity(parameter.derived.tree, parameter.unit.dimension, what)
+        spans = {name: thing.span for name, thing in automaton.parameters.items()}
+        report_circle(trees, spans, "derived", self.problems)
 
     def _initials(self) -> None:
         automaton = self.automaton
         groups = [automaton.parameters, automaton.inputs, automaton.states]
         check = DimensionCheck(self._scope(groups, "where a state starts"), self.problems)
-        graph: nx.DiGraph[str] = nx.DiGraph()
         for state in automaton.states.values():
             check.quantity(state.initial.tree, state.unit.dimension, state.name)
-            reads = (read.path for read in names(state.initial.tree))
-            graph.add_edges_from((name, state.name) for name in reads if name in automaton.states)
-        self._no_cycle(graph, {s.name: s.span for s in automaton.states.values()}, "initial")
-
-    def _no_cycle(self, graph: nx.DiGraph[str], spans: Mapping[str, Span], what: str) -> None:
-        try:
-            loop = [edge[0] for edge in nx.find_cycle(graph)]
-        except nx.NetworkXNoCycle:
-            return
-        chain = " -> ".join(f"`{name}`" for name in [*loop, loop[0]])
-        self.problems.error("loop", spans[loop[0]], f"`{what}` values in a circle: {chain}")
+        trees = {name: state.initial.tree for name, state in automaton.states.items()}
+        spans = {name: state.span for name, state in automaton.states.items()}
+        report_circle(trees, spans, "initial", self.problems)
 
     def _mode(self, mode: Mode) -> None:
         automaton = self.automaton
@@ -230,13 +199,6 @@ class _Check:
                 constant.quantity(transition.wait.tree, SECOND, "wait")
                 self._fixed_wait(transition.wait)
             self._assignments(transition.reset, check)
-        for position, later in enumerate(mode.transitions):
-            for earlier in mode.transitions[:position]:
-                same = later.priority == earlier.priority
-                if same and not _complements(earlier.when.tree, later.when.tree):
-                    label = f"`{earlier.name}` and `{later.name}` can be enabled together"
-                    hint = "give them different priorities: the smallest wins"
-                    self.problems.error("priority", later.when.span, label, hint)
 
     def _fixed_wait(self, wait: Formula) -> None:
         for read in names(wait.tree):
@@ -340,34 +302,3 @@ def _rate(dimension: Dimension) -> Dimension:
 def _loose(dimension: Dimension) -> Dimension:
     """The dimension with a free angle: entries of matrices are quotients."""
     return Dimension(dimension.powers, None)
-
-
-def _complements(left: Tree, right: Tree) -> bool:
-    """Tell whether two guards exclude each other by their form: `a < b` and `a >= b`, `not g`."""
-    if isinstance(right, Not) and _same(right.operand, left):
-        return True
-    if isinstance(left, Not) and _same(left.operand, right):
-        return True
-    if isinstance(left, Relation) and isinstance(right, Relation):
-        same = _same(left.left, right.left) and _same(left.right, right.right)
-        return same and right.operator in DISJOINT.get(left.operator, ())
-    return False
-
-
-def _same(left: Tree, right: Tree) -> bool:
-    """Tell whether two trees are written alike, wherever they stand."""
-    if type(left) is not type(right):
-        return False
-    for item in dataclasses.fields(left):
-        a, b = getattr(left, item.name), getattr(right, item.name)
-        if item.name == "span":
-            continue
-        if dataclasses.is_dataclass(a) and not isinstance(a, type) and item.name != "unit":
-            if not _same(a, b):
-                return False
-        elif isinstance(a, tuple) and a and dataclasses.is_dataclass(a[0]):
-            if len(a) != len(b) or not all(_same(x, y) for x, y in zip(a, b, strict=True)):
-                return False
-        elif a != b:
-            return False
-    return True

@@ -121,20 +121,7 @@ def _jump(field: Field, mode: Mode, infos: tuple[TransitionInfo, ...]) -> Block:
 
 def _entries(automaton: Automaton, field: Field, known: dict[str, Expr]) -> dict[str, Block]:
     initial = automaton.modes[automaton.initial]
-    modes = automaton.modes.values()
-    watch = tuple(
-        (
-            mode.number,
-            (
-                Run(f"guards_{mode.name}"),
-                *(
-                    Assign(f"memory.armed_{k}", Ref(f"work.guard_{k}"))
-                    for k in range(len(mode.transitions))
-                ),
-            ),
-        )
-        for mode in modes
-    )
+    watch = tuple((mode.number, _watch(mode)) for mode in automaton.modes.values())
     return {
         "derive": derive_block(automaton),
         "init": (
@@ -146,3 +133,9 @@ def _entries(automaton: Automaton, field: Field, known: dict[str, Expr]) -> dict
         "jump": (Assign("memory.fired", whole(0)), *at_state(field), by_mode(field, "jump")),
         "flow": (by_mode(field, "move"),),
     }
+
+
+def _watch(mode: Mode) -> Block:
+    guards = range(len(mode.transitions))
+    armed = [Assign(f"memory.armed_{k}", Ref(f"work.guard_{k}")) for k in guards]
+    return (Run(f"guards_{mode.name}"), *armed)

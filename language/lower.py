@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping
 from fractions import Fraction
 
 from language.automaton import coefficient_of
-from language.check import equation_order
 from language.model import Automaton, Balance, Formula, Mode
+from language.order import equation_order
 from language.problem import SpecError
 from language.program import (
     Assign,
@@ -40,6 +40,7 @@ from language.syntax import (
     Truth,
     names,
 )
+from language.units import Unit
 
 Names = Mapping[str, Expr]
 """What each name of the model is at one place; `in(x.y)` is looked up as `in x.y`."""
@@ -212,9 +213,16 @@ def constant_of(automaton: Automaton, name: str, kind: str, value: float) -> Con
 
 def si_text(automaton: Automaton, name: str) -> str:
     """Return the SI unit of a name, for comments: the unit as written where it is SI."""
-    things = {**automaton.parameters, **automaton.inputs, **automaton.states}
-    unit = things[name].unit if name in things else None
+    unit = _unit_of(automaton, name)
     if unit and unit.factor == 1 and not unit.offset:
         return unit.text
     dimension = unit.dimension if unit else automaton.dimensions.get(name)
     return str(dimension) if dimension else "1"
+
+
+def _unit_of(automaton: Automaton, name: str) -> Unit | None:
+    if name in automaton.parameters:
+        return automaton.parameters[name].unit
+    if name in automaton.inputs:
+        return automaton.inputs[name].unit
+    return automaton.states[name].unit if name in automaton.states else None

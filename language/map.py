@@ -41,7 +41,9 @@ class _MapReader(Reader):
         time = self.table(tree.get("time"), "time", ("column", "unit"))
         unit = self.unit(time.get("unit"))
         if not fits(unit.dimension, SECOND):
-            self.problems.error("unit", time.span if time.entries else at, "the unit of `time` is a time")
+            self.problems.error(
+                "unit", time.span if time.entries else at, "the unit of `time` is a time"
+            )
         constants: dict[str, tuple[Fraction, Dimension]] = {}
         for entry in self.named(tree.get("constants"), "constants"):
             value, own = self.quantity(entry.node, entry.key, entry.span, None)

@@ -14,11 +14,80 @@ from language.units import NO_UNIT, SYMBOLS, Unit, UnitError, fits, parse_unit
 
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,30}")
 GRAMMAR_WORDS = frozenset(
-    ["if", "then", "else", "and", "or", "not", "true", "false", "der", "in", "after", "rising", "falling", "delay", "previous", "column", "time", "abs", "sqrt", "min", "max", "clip", "sign", "floor", "sin", "cos", "tan", "exp", "tanh", "atan2", "lookup", "remove", "like"]
+    [
+        "if",
+        "then",
+        "else",
+        "and",
+        "or",
+        "not",
+        "true",
+        "false",
+        "der",
+        "in",
+        "after",
+        "rising",
+        "falling",
+        "delay",
+        "previous",
+        "column",
+        "time",
+        "abs",
+        "sqrt",
+        "min",
+        "max",
+        "clip",
+        "sign",
+        "floor",
+        "sin",
+        "cos",
+        "tan",
+        "exp",
+        "tanh",
+        "atan2",
+        "lookup",
+        "remove",
+        "like",
+    ]
 )
 YAML_WORDS = frozenset(["on", "off", "yes", "no", "y", "n", "null"])
 C_WORDS = frozenset(
-    ["auto", "break", "case", "char", "const", "continue", "default", "do", "double", "enum", "extern", "float", "for", "goto", "inline", "int", "long", "register", "restrict", "return", "short", "signed", "sizeof", "static", "struct", "switch", "typedef", "union", "unsigned", "void", "volatile", "while", "bool", "asm"]
+    [
+        "auto",
+        "break",
+        "case",
+        "char",
+        "const",
+        "continue",
+        "default",
+        "do",
+        "double",
+        "enum",
+        "extern",
+        "float",
+        "for",
+        "goto",
+        "inline",
+        "int",
+        "long",
+        "register",
+        "restrict",
+        "return",
+        "short",
+        "signed",
+        "sizeof",
+        "static",
+        "struct",
+        "switch",
+        "typedef",
+        "union",
+        "unsigned",
+        "void",
+        "volatile",
+        "while",
+        "bool",
+        "asm",
+    ]
 )
 NOWHERE = Span(Source(""), 0, 0)
 """The place of an absent mapping: nothing is ever reported there."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from dataclasses import dataclass
 from fractions import Fraction
@@ -144,7 +145,7 @@ Tree = (
 
 def parse_expression(scalar: Scalar) -> Tree:
     """Parse an expression. Raises SpecError with the place inside the text."""
-    tree = _parse(scalar, "expression")
+    tree: Tree = _parse(scalar, "expression")
     return tree
 
 
@@ -343,3 +344,13 @@ def children(tree: Tree) -> tuple[Tree, ...]:
             return arguments
         case _:
             return ()
+
+
+def form(part: object) -> object:
+    """Return what a tree says without its places: two trees written alike have equal forms."""
+    if isinstance(part, tuple):
+        return tuple(form(item) for item in part)
+    if dataclasses.is_dataclass(part):
+        kept = [item.name for item in dataclasses.fields(part) if item.name != "span"]
+        return (type(part).__name__, *(form(getattr(part, name)) for name in kept))
+    return part

@@ -55,7 +55,7 @@ class _SystemReader(Reader):
         self._unused_overrides(instances)
         self.problems.stop_if_any()
         connections = self._connections(tree, inputs, instances)
-        self._unconnected(connections, instances, document.name_span)
+        self._unconnected(connections, instances)
         outputs = self._outputs(tree, instances)
         order = self._order(connections, instances, document.name_span)
         return System(
@@ -170,14 +170,13 @@ class _SystemReader(Reader):
         self,
         connections: Mapping[tuple[str, str], Connection],
         instances: Mapping[str, Instance],
-        span: Span,
     ) -> None:
         for instance in instances.values():
             for name, thing in instance.automaton.inputs.items():
                 if (instance.name, name) not in connections and thing.default is None:
                     label = f"input `{instance.name}.{name}` is not connected"
                     hint = "connect it, or give it a `default` in the automaton"
-                    self.problems.error("missing", instance.span or span, label, hint)
+                    self.problems.error("missing", instance.span, label, hint)
 
     def _outputs(self, tree: Table, instances: Mapping[str, Instance]) -> dict[str, str]:
         found = {}

@@ -30,7 +30,7 @@ CELSIUS_OFFSET = Fraction(27315, 100)
 BASE = ("meter", "kilogram", "second", "ampere", "kelvin")
 BASE_SYMBOLS = ("m", "kg", "s", "A", "K")
 
-MECHANICAL = {
+MECHANICAL: dict[tuple[int, ...], str] = {
     (2, 1, -2): "N*m",
     (2, 1, -1): "N*m*s",
     (1, 1, -2): "N",
@@ -97,7 +97,7 @@ def _power(name: str, power: int) -> str:
 
 
 @cache
-def _registry() -> pint.UnitRegistry:
+def _registry() -> pint.UnitRegistry[Fraction]:
     return pint.UnitRegistry(non_int_type=Fraction)
 
 
@@ -106,7 +106,7 @@ def _symbol(symbol: str) -> tuple[Fraction, tuple[int, ...], int]:
     definition, angle = SYMBOLS[symbol]
     quantity = _registry().Quantity(Fraction(1), definition or symbol).to_base_units()
     exponents = dict(quantity.unit_items())
-    powers = tuple(int(exponents.get(name, 0)) for name in BASE)
+    powers = tuple(int(str(exponents.get(name, 0))) for name in BASE)
     return Fraction(quantity.magnitude), powers, angle
 
 

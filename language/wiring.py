@@ -147,7 +147,7 @@ def _without_idle_before(
     reading = {n for name, b in blocks.items() if name != "remember" for n in _names(b)}
     kept = tuple(op for op in blocks["remember"] if isinstance(op, Assign) and op.target in reading)
     blocks["remember"] = kept
-    targets = {op.target for op in kept if isinstance(op, Assign)}
+    targets = {op.target for op in kept}
     return [v for v in variables if not v.name.startswith("before.") or v.name in targets]
 
 

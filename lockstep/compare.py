@@ -114,7 +114,12 @@ def compare(tape: Tape, flags: Sequence[str] = FLAGS) -> Verdict:
             first = _difference(tape, tick, different[0], theirs)
     return Verdict(
         tape.name,
-        tape.program.name, ticks, ticks * len(tape.names), differing, tape.transitions, first
+        tape.program.name,
+        ticks,
+        ticks * len(tape.names),
+        differing,
+        tape.transitions,
+        first,
     )
 
 

@@ -8,8 +8,7 @@ from pathlib import Path
 
 from codegen.source import c_files
 from engine.recording import Recording, read_recording
-from engine.replay import Replay, used_columns
-from engine.replay import replay as replay_recording
+from engine.replay import Replay, replay as replay_recording, used_columns
 from engine.simulate import simulate as simulate_system
 from engine.trajectory import Trajectory
 from language.document import Scalar
@@ -65,7 +64,9 @@ def check(reference: str, root: Path | None = None) -> list[Problem]:
     return []
 
 
-def load(system: str, scenario: str, values: Values | None = None, root: Path | None = None) -> Loaded:
+def load(
+    system: str, scenario: str, values: Values | None = None, root: Path | None = None
+) -> Loaded:
     """Return a system with a scenario. Raises SpecError with all problems."""
     project = Project(root or Path())
     read = read_system(read_document(project.path_of(system)), project, _scalars(values))
@@ -97,7 +98,9 @@ def program(reference: str, values: Values | None = None, root: Path | None = No
     return program_of(automaton_of(document, project, _scalars(values)))
 
 
-def generate(reference: str, values: Values | None = None, root: Path | None = None) -> dict[str, str]:
+def generate(
+    reference: str, values: Values | None = None, root: Path | None = None
+) -> dict[str, str]:
     """Return the C files of a sampled automaton by name. Raises SpecError."""
     return c_files(program(reference, values, root))
 

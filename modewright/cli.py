@@ -79,7 +79,9 @@ def simulate(
     """Simulate a system: `modewright simulate ev_driveline -s tip_out --plot tip_out.png`."""
     require_writable(out, plot)
     trajectory = api.simulate(system, scenario, _values(sets), reference=reference)
-    bands = {name.removesuffix(".mode"): name for name in trajectory.modes if name in trajectory.signals}
+    bands = {
+        name.removesuffix(".mode"): name for name in trajectory.modes if name in trajectory.signals
+    }
     files: dict[Path, bytes] = {}
     if out:
         files[out] = trajectory.csv().encode()
@@ -141,7 +143,9 @@ def replay(
 @app.command(epilog=EXIT_CODES)
 def generate(
     automaton: Annotated[str | None, typer.Argument(help="a sampled automaton")] = None,
-    out: Annotated[Path, typer.Option("--out", "-o", help="folder to write to")] = Path("generated"),
+    out: Annotated[Path, typer.Option("--out", "-o", help="folder to write to")] = Path(
+        "generated"
+    ),
     sets: Sets = None,
     every: Annotated[bool, typer.Option("--all", help="all of spec/ into generated/")] = False,
     only_check: Annotated[
@@ -181,7 +185,9 @@ def explain(
 
 @app.command(name="demo", epilog=EXIT_CODES)
 def run_demo(
-    out: Annotated[Path, typer.Option("--out", "-o", help="folder for the picture")] = Path("build"),
+    out: Annotated[Path, typer.Option("--out", "-o", help="folder for the picture")] = Path(
+        "build"
+    ),
 ) -> None:
     """Simulate the tip-out of the paper, compare engine and C, draw the picture."""
     _make_folder(out)

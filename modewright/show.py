@@ -25,7 +25,9 @@ def print_json(value: Mapping[str, Any]) -> None:
 
 def events_table(events: Sequence[Event]) -> Table:
     """Return a table of transitions."""
-    table = Table("time [s]", "automaton", "from", "to", box=None, pad_edge=False, header_style="bold")
+    table = Table(
+        "time [s]", "automaton", "from", "to", box=None, pad_edge=False, header_style="bold"
+    )
     for event in events[:MOST_EVENTS]:
         table.add_row(f"{event.time:.9f}", event.instance, event.source, event.target)
     if len(events) > MOST_EVENTS:
@@ -124,7 +126,9 @@ def print_replay(console: Console, replayed: Replayed) -> None:
         console.print("no transitions")
     for name, rms in result.innovation_rms.items():
         unit = result.trajectory.units[f"in.{name}"]
-        console.print(f"RMS of the one-step innovation of {name}: {rms:.4g} {unit}", highlight=False)
+        console.print(
+            f"RMS of the one-step innovation of {name}: {rms:.4g} {unit}", highlight=False
+        )
     for found in result.comparisons:
         text = f"{found.output} against the recording: RMS {found.rms:.4g} {found.unit}"
         console.print(f"{text}, largest {found.largest:.4g} {found.unit}", highlight=False)

@@ -1,0 +1,198 @@
+"""Witness: values of states and inputs that show what two guards can do together.
+
+A search over fixed sample points and the boundaries of the guards. What it finds is true, for the
+guards are evaluated at the very values shown; that it finds nothing proves nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from language.constants import parameter_constants, values_of
+from language.evaluate import Scalar, evaluate
+from language.lower import constant_names, equations, expression
+from language.model import Automaton, Mode, Range, Transition
+from language.problem import Problems
+from language.program import Assign, Expr, Ref
+from language.syntax import Name, Relation, Tree, names, walk
+
+SAMPLES = 64
+"""Points of the search; a guard of one or two linear relations is met within a few."""
+DEFAULT_RANGE = (-10.0, 10.0)
+"""Searched where a state or input gives no range, in SI."""
+PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37)
+SHOWN_DIGITS = 4
+
+Point = dict[str, Scalar]
+
+
+class WitnessSearch:
+    """The sample points of one automaton, and what its guards are there."""
+
+    def __init__(self, automaton: Automaton) -> None:
+        """Take the parameters' present values."""
+        self.automaton = automaton
+        self.known: dict[str, Expr] = {
+            **constant_names(automaton),
+            **{name: Ref(f"input.{name}") for name in automaton.inputs},
+            **{name: Ref(f"state.{name}") for name in automaton.states},
+        }
+        self.constants = values_of(parameter_constants(automaton, Problems()))
+
+    def both(self, first: Transition, second: Transition) -> Point | None:
+        """Return values at which two guards of one mode hold together, if some are found."""
+        mode = self.automaton.modes[first.source]
+        for point in self._points([first.when.tree, second.when.tree], mode):
+            if self._holds(first, mode, point) and self._holds(second, mode, point):
+                return point
+        return None
+
+    def refires(self, out: Transition, back: Transition) -> Point | None:
+        """Return values at which `out` and `back` fire in turn for ever, if some are found."""
+        here, there = self.automaton.modes[out.source], self.automaton.modes[out.target]
+        for start in self._points([out.when.tree, back.when.tree], there):
+            if not self._holds(out, here, start):
+                continue
+            arrived = self._reset(out, here, start)
+            if arrived is None or not self._holds(back, there, arrived):
+                continue
+            returned = self._reset(back, there, arrived)
+            if returned is not None and self._holds(out, here, returned):
+                return start
+        return None
+
+    def shown(self, point: Point, trees: list[Tree]) -> str:
+        """Return the values of the names that some trees read, directly or through equations."""
+        wanted = self._read(trees)
+        texts = [
+            f"{name} = {float(value):.{SHOWN_DIGITS}g}"
+            for name, value in ((n.partition(".")[2], v) for n, v in point.items())
+            if name in wanted
+        ]
+        return ", ".join(texts)
+
+    def _read(self, trees: list[Tree]) -> set[str]:
+        found: set[str] = set()
+        stack = [read.path for tree in trees for read in names(tree)]
+        while stack:
+            name = stack.pop()
+            if name not in found:
+                found.add(name)
+                for mode in self.automaton.modes.values():
+                    if name in mode.equations:
+                        stack += [read.path for read in names(mode.equations[name].tree)]
+        return found
+
+    def _points(self, guards: list[Tree], mode: Mode) -> Iterator[Point]:
+        """Yield the sample points, each also moved onto every boundary that a guard names."""
+        boundaries = [
+            part for guard in guards for part in walk(guard) if isinstance(part, Relation)
+        ]
+        for index in range(1, SAMPLES + 1):
+            point = self._sample(index)
+            for boundary in boundaries:
+                moved = self._on_boundary(boundary, point, mode)
+                if moved is not None:
+                    yield moved
+            yield point
+
+    def _sample(self, index: int) -> Point:
+        ranges: dict[str, Range | None] = {}
+        point: Point = {}
+        for name, thing in self.automaton.inputs.items():
+            ranges[f"input.{name}"] = thing.range
+        for name, state in self.automaton.states.items():
+            ranges[f"state.{name}"] = state.range
+        for position, (name, limits) in enumerate(ranges.items()):
+            low, high = (float(limits[0]), float(limits[1])) if limits else DEFAULT_RANGE
+            fraction = _radical_inverse(index, PRIMES[position % len(PRIMES)])
+            point[name] = low + fraction * (high - low)
+        for name, thing in self.automaton.inputs.items():
+            if thing.truth:
+                point[f"input.{name}"] = index % 2 == 0
+            elif thing.default is not None:
+                point[f"input.{name}"] = float(thing.default)
+        return point
+
+    def _on_boundary(self, relation: Relation, point: Point, mode: Mode) -> Point | None:
+        for side, other in ((relation.left, relation.right), (relation.right, relation.left)):
+            if isinstance(side, Name) and side.path in self.automaton.states:
+                value = self._value(other, mode, point)
+                if value is not None:
+                    return {**point, f"state.{side.path}": value}
+        return None
+
+    def _holds(self, transition: Transition, mode: Mode, point: Point) -> bool:
+        return bool(self._value(transition.when.tree, mode, point))
+
+    def _reset(self, transition: Transition, mode: Mode, point: Point) -> Point | None:
+        after = dict(point)
+        for name, formula in transition.reset.items():
+            value = self._value(formula.tree, mode, point)
+            if value is None:
+                return None
+            after[f"state.{name}"] = value
+        return after
+
+    def _value(self, tree: Tree, mode: Mode, point: Point) -> Scalar | None:
+        known = dict(self.known)
+        values: dict[str, Scalar] = {**self.constants, **point}
+        try:
+            for op in equations(mode, known, "equation.", "", [n.path for n in names(tree)]):
+                assert isinstance(op, Assign)
+                values[op.target] = evaluate(op.value, values)
+            return evaluate(expression(tree, known), values)
+        except (KeyError, OverflowError):
+            return None
+
+
+def report_refiring(automaton: Automaton, problems: Problems) -> None:
+    """Report transitions that fire for ever at one instant, with a witness (rules 9 and 12)."""
+    search = WitnessSearch(automaton)
+    seen: set[frozenset[str]] = set()
+    for mode in automaton.modes.values():
+        for out in mode.transitions:
+            for back in automaton.modes[out.target].transitions:
+                pair = frozenset({out.key, back.key})
+                if back.target != mode.name or out.wait or back.wait or pair in seen:
+                    continue
+                point = search.refires(out, back)
+                if point is not None:
+                    seen.add(pair)
+                    _report(search, out, back, point, problems)
+
+
+def _report(
+    search: WitnessSearch,
+    out: Transition,
+    back: Transition,
+    point: Mapping[str, Scalar],
+    problems: Problems,
+) -> None:
+    values = search.shown(dict(point), [out.when.tree, back.when.tree])
+    path = f"`{out.source}` -> `{out.target}` -> `{back.target}`"
+    label = f"this fires again at the same instant, for ever: {path}"
+    hint = f"at {values}; write the direction of motion too, like `x >= limit and v > 0 m/s`"
+    states = search.automaton.states
+    bare = next((t for t in (back, out) if _has_boundary(t.when.tree, states)), back)
+    problems.error("refire", bare.when.span, label, hint)
+
+
+def _has_boundary(guard: Tree, states: Mapping[str, object]) -> bool:
+    """Tell whether a guard holds where a state sits exactly on a limit: `x >= limit`."""
+    for part in walk(guard):
+        if isinstance(part, Relation) and part.operator in ("<=", ">="):
+            sides = (part.left, part.right)
+            if any(isinstance(side, Name) and side.path in states for side in sides):
+                return True
+    return False
+
+
+def _radical_inverse(index: int, base: int) -> float:
+    """Return the van der Corput number of an index in a base, in [0, 1)."""
+    result, scale = 0.0, 1.0 / base
+    while index > 0:
+        index, digit = divmod(index, base)
+        result += digit * scale
+        scale /= base
+    return result
