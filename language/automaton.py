@@ -23,7 +23,7 @@ from language.overlay import lay, without
 from language.problem import Problems, SpecError, nearest
 from language.project import Project, expanded, read_document
 from language.reader import Reader
-from language.syntax import Application, Arithmetic, Name, Tree, parse_balance, walk
+from language.syntax import Application, Arithmetic, Broken, Name, Tree, parse_balance, walk
 from language.units import SECOND, Unit, fits, parse_unit
 
 COMMON_KEYS = ("language", "automaton", "parameters", "inputs", "states", "equations")
@@ -37,18 +37,20 @@ DEFAULT_STEP = Fraction(1, 1000)
 Values = Mapping[str, Scalar]
 
 
-def read_automaton(document: Document, project: Project, values: Values | None = None) -> Automaton:
-    """Read an automaton or variant with some parameter values replaced. Raises SpecError."""
+def read_automaton(
+    document: Document, project: Project, values: Values | None, problems: Problems
+) -> Automaton:
+    """Read an automaton or variant with some parameter values replaced.
+
+    Problems of form are reported and reading goes on; SpecError where there is nothing to read.
+    """
     document = expanded(document, project)
-    problems = Problems()
     if document.kind != "automaton":
         label = f"`{document.name}` is a {document.kind}, not an automaton"
         problems.error("form", document.name_span, label)
     problems.stop_if_any()
     tree, model = _with_model(document.root, project, values or {}, problems)
-    automaton = _AutomatonReader(problems).read(document, tree, model)
-    problems.stop_if_any()
-    return automaton
+    return _AutomatonReader(problems).read(document, tree, model)
 
 
 def _with_model(
@@ -68,7 +70,7 @@ def _with_model(
     kept = {key: value for key, value in values.items() if key not in passed}
     root = _with(base.root, "parameters", laid)
     changed = Document(base.kind, base.name, base.name_span, root, base.source)
-    model = read_automaton(changed, project, passed)
+    model = read_automaton(changed, project, passed, problems)
     rest = without(own, *shared)
     return _set_values(_with(tree, "parameters", rest), rest, kept, known, problems), model
 
@@ -124,7 +126,7 @@ class _AutomatonReader(Reader):
             states=self._states(tree),
             modes=modes,
             initial=initial,
-            outputs=tuple(item.text for item in self.items(tree.get("outputs"), "outputs")),
+            outputs={item.text: item.span for item in self.items(tree.get("outputs"), "outputs")},
             span=document.name_span,
         )
         self._check_sections(tree)
@@ -227,6 +229,7 @@ class _AutomatonReader(Reader):
             modes[entry.key] = self._mode(entry, table, root, len(modes))
         if not modes:
             self.problems.error("missing", self.at, "an automaton has at least one mode in `modes`")
+            self.problems.stop_if_any()
         numbers: dict[int, str] = {}
         for mode in modes.values():
             if mode.number in numbers:
@@ -289,9 +292,11 @@ class _AutomatonReader(Reader):
             scalar = self.scalar(entry.node, f"{key}.{entry.key}", entry.span)
             if scalar is None:
                 continue
+            left: Tree = Broken(scalar.span)
+            right: Tree = left
             with self.problems.collecting():
                 left, right = parse_balance(scalar)
-                found[entry.key] = Balance(entry.key, left, right, f"{key}.{entry.key}")
+            found[entry.key] = Balance(entry.key, left, right, f"{key}.{entry.key}")
         return found
 
     def _transitions(self, node: Node | None, source: str) -> list[Transition]:

@@ -11,26 +11,34 @@ from language.guards import report_overlaps
 from language.model import Automaton, Formula, Mode, Observer
 from language.order import equation_order, report_circle
 from language.problem import Problems, Span, SpecError, nearest
-from language.syntax import Tree, names
+from language.syntax import Broken, Tree, names
 from language.units import NUMBER, SECOND, Dimension, product
 from language.witness import report_refiring
 
 RESERVED_OUTPUTS = ("mode", "faults")
 
 
-def check_automaton(automaton: Automaton) -> Automaton:
-    """Return the automaton with the dimensions of its names. Raises SpecError with all problems."""
+def check_automaton(automaton: Automaton, problems: Problems) -> Automaton:
+    """Return a read automaton with the dimensions of its names. Raises SpecError.
+
+    All problems are reported, with those that `problems` holds already.
+    """
     if automaton.model:
-        automaton = dataclasses.replace(automaton, model=check_automaton(automaton.model))
-    problems = Problems()
-    checked = _Check(automaton, problems).run()
+        automaton = dataclasses.replace(automaton, model=_declared(automaton.model, problems))
+    checked = _declared(automaton, problems)
     problems.stop_if_any()
     for mode in checked.modes.values():
         report_overlaps(checked, mode, problems)
     if not checked.is_sampled:
         report_refiring(checked, problems)
+    if checked.model:
+        check_automaton(checked.model, problems)
     problems.stop_if_any()
     return checked
+
+
+def _declared(automaton: Automaton, problems: Problems) -> Automaton:
+    return _Check(automaton, problems).run()
 
 
 class _Check:
@@ -112,16 +120,15 @@ class _Check:
         automaton = self.automaton
         groups = [automaton.parameters, automaton.inputs, automaton.states]
         known = dict(self._scope(groups, "").names)
-        place = f"in mode `{mode.name}`"
+        place = "here"
         run = mode.run
         modes: frozenset[str] = frozenset()
         if run and automaton.model:
             modes = frozenset(f"{automaton.model.name}.{name}" for name in automaton.model.modes)
-        elsewhere = {name: NUMBER for name in mode.equations if name not in known}
         for name in equation_order(mode):
             check = DimensionCheck(Scope({**known}, modes, place), self.problems)
             kind = check.kind(mode.equations[name].tree)
-            known[name] = self._agreed(name, kind, mode.equations[name], elsewhere)
+            known[name] = self._agreed(name, kind, mode.equations[name])
         check = DimensionCheck(Scope(known, modes, place), self.problems)
         self._flow(mode, check)
         self._assignments(mode.update, check)
@@ -130,12 +137,11 @@ class _Check:
             self._observer(mode.observer, check)
         self._writers(mode)
 
-    def _agreed(
-        self, name: str, kind: Kind | None, formula: Formula, elsewhere: Mapping[str, Kind]
-    ) -> Kind:
+    def _agreed(self, name: str, kind: Kind | None, formula: Formula) -> Kind | None:
+        """Return what a name is, and report where two modes disagree on it."""
         before = self.names.get(name)
         if kind is None:
-            return before or elsewhere.get(name, NUMBER)
+            return before
         zero = getattr(formula.tree, "is_bare_zero", False)
         if before is None or (isinstance(before, Dimension) and before.angle is None):
             self.names[name] = kind
@@ -165,6 +171,8 @@ class _Check:
                 self.problems.error("name", balance.left.span, f"`{name}` is not a state", hint)
                 continue
             with self.problems.collecting():
+                if isinstance(balance.left, Broken):
+                    continue
                 factor = coefficient_of(balance.left, name)
                 if isinstance(factor, SpecError):
                     raise factor
@@ -263,18 +271,18 @@ class _Check:
     def _outputs(self) -> None:
         automaton = self.automaton
         equations = _equation_names(automaton.modes.values())
-        for name in automaton.outputs:
+        for name, span in automaton.outputs.items():
             if name == "mode" or name in automaton.states:
                 continue
             if name not in equations:
                 hint = nearest(name, [*equations, *automaton.states, "mode"])
                 label = f"output `{name}` is not a state, an equation or `mode`"
-                self.problems.error("name", automaton.span, label, hint)
+                self.problems.error("name", span, label, hint)
                 continue
             for mode in automaton.modes.values():
                 if name not in mode.equations:
                     label = f"output `{name}` has no value in mode `{mode.name}`"
-                    self.problems.error("missing", mode.span, label)
+                    self.problems.error("missing", span, label)
 
     def _sampled_ranges(self) -> None:
         automaton = self.automaton

@@ -10,6 +10,7 @@ from language.problem import Problems, Span, nearest
 from language.syntax import (
     Application,
     Arithmetic,
+    Broken,
     Choice,
     Logic,
     Name,
@@ -40,7 +41,7 @@ LATER = ("floor", "tan", "atan2", "lookup", "previous", "delay", "rising", "fall
 class Scope:
     """What names mean at one place: their dimensions, and the modes that `in(...)` may name."""
 
-    names: Mapping[str, Kind]
+    names: Mapping[str, Kind | None]
     modes: frozenset[str] = frozenset()
     place: str = "here"
 
@@ -72,6 +73,8 @@ class DimensionCheck:
     def kind(self, tree: Tree) -> Kind | None:
         """Return what the expression is, None where a problem was reported inside it."""
         match tree:
+            case Broken():
+                return None
             case Number(_, unit, _):
                 return unit.dimension
             case Truth():

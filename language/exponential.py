@@ -74,7 +74,7 @@ def exponential(
         if not norm <= LARGEST_NORM:
             label = f"mode `{name}` is too fast for one step: |A h| = {norm:.3g} is above 4"
             needed = math.ceil(norm / LARGEST_NORM) if math.isfinite(norm) else "more"
-            problems.error("step", span, label, f"`substeps: {needed}` times as many as now")
+            problems.error("step", span, label, f"{needed} times as many `substeps` are enough")
             norm = LARGEST_NORM
         terms = max(terms, taylor_terms(norm))
         numbers = _numbers(a, h)

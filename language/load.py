@@ -19,7 +19,8 @@ def automaton_of(
     document: Document, project: Project, values: Mapping[str, Scalar] | None = None
 ) -> Automaton:
     """Return the checked automaton of a document. Raises SpecError with all problems."""
-    return check_automaton(read_automaton(document, project, values))
+    problems = Problems()
+    return check_automaton(read_automaton(document, project, values, problems), problems)
 
 
 def load_automaton(

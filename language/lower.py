@@ -28,6 +28,7 @@ from language.program import (
 from language.syntax import (
     Application,
     Arithmetic,
+    Broken,
     Choice,
     Logic,
     Name,
@@ -49,6 +50,8 @@ Names = Mapping[str, Expr]
 def expression(tree: Tree, known: Names) -> Expr:
     """Return the Program's expression of a tree: same order of operations, nothing simplified."""
     match tree:
+        case Broken():
+            raise TypeError(f"{tree.span}: an expression with a problem is not lowered")
         case Number(value, _, _):
             return real(rounded(value))
         case Truth(value, _):

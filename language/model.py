@@ -150,7 +150,7 @@ class Automaton:
     states: Mapping[str, State]
     modes: Mapping[str, Mode]
     initial: str
-    outputs: tuple[str, ...]
+    outputs: Mapping[str, Span]
     span: Span
     dimensions: Mapping[str, Dimension] = field(default_factory=dict, repr=False)
 

@@ -9,7 +9,7 @@ from fractions import Fraction
 from language.document import Entry, Items, Node, Scalar, Table
 from language.model import Formula, Range
 from language.problem import Problems, Source, Span, SpecError, nearest
-from language.syntax import Negative, Number, Tree, parse_expression
+from language.syntax import COMMA_HINT, Broken, Negative, Number, Tree, parse_expression
 from language.units import NO_UNIT, SYMBOLS, Unit, UnitError, fits, parse_unit
 
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,30}")
@@ -98,7 +98,7 @@ TEXT_KEYS = frozenset({"about", "req"})
 def check_name(name: str, span: Span, problems: Problems) -> None:
     """Report a name that is not one: docs/language.md, section 2."""
     if not NAME.fullmatch(name):
-        hint = "a letter, then at most 30 letters, digits or `_`"
+        hint = COMMA_HINT if ")" in name else "a letter, then at most 30 letters, digits or `_`"
         problems.error("name", span, f"`{name}` is not a name", hint)
     elif name in GRAMMAR_WORDS:
         problems.error("name", span, f"`{name}` is a word of the language")
@@ -138,7 +138,7 @@ class Reader:
         hint = nearest(entry.key, known)
         cut_off = isinstance(entry.node, Scalar) and not entry.node.text
         if re.search(r"[() ]", entry.key) or (cut_off and not hint):
-            hint = "in `{...}` YAML ends a value at a comma: quote a value that has one"
+            hint = COMMA_HINT
         if not hint:
             hint = f"known here: {', '.join(sorted(known - TEXT_KEYS))}"
         label = f"`{entry.key}` is not a key of `{what}`"
@@ -222,13 +222,13 @@ class Reader:
             return Formula(parse_expression(scalar), key)
         except SpecError as error:
             self.problems.found.extend(error.problems)
-            return None
+            return Formula(Broken(scalar.span), key)
 
     def quantity(self, node: Node | None, what: str, span: Span, unit: Unit | None) -> Quantity:
         """Return a literal in SI and its unit; a bare number is in `unit` where one is given."""
         formula = self.expression(node, what, span)
         literal = _literal(formula.tree) if formula else None
-        if formula and literal is None:
+        if formula and literal is None and not isinstance(formula.tree, Broken):
             label = f"`{what}` is a number with a unit, not an expression"
             self.problems.error("number", formula.span, label)
         if literal is None:

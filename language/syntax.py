@@ -19,6 +19,7 @@ from language.units import NO_UNIT, SYMBOLS, Unit, UnitError, parse_unit
 DECIMAL = re.compile(r"(0|[1-9]\d*)(\.\d+)?([eE][-+]?\d+)?")
 MAX_TEXT = 2000
 """Longest expression read; longer ones want an equation of their own."""
+COMMA_HINT = "in `{...}` YAML ends a value at a comma: quote a value that has one"
 MAX_POWER = 8
 MAX_EXPONENT = 308
 """Largest decimal exponent of a literal: beyond it a double overflows."""
@@ -128,8 +129,16 @@ class Application:
     span: Span
 
 
+@dataclass(frozen=True)
+class Broken:
+    """An expression that could not be read; its problem is reported already."""
+
+    span: Span
+
+
 Tree = (
-    Number
+    Broken
+    | Number
     | Truth
     | Name
     | Negative
@@ -216,12 +225,15 @@ def _explain(
     if start == "balance" and "=" not in text:
         return span, "a balance is `coefficient * der(x) = ...`", ""
     if ended or not text.strip():
-        return place, "the expression ends too early", ""
+        hint = COMMA_HINT if text.count("(") > text.count(")") else ""
+        return place, "the expression ends too early", hint
     rest = text[column - 1 :]
     if found in ("<", "<=", ">", ">=", "==", "!="):
         return place, "one relation only", "write `a < b and b < c`"
     if rest.startswith("="):
         return place, "`=` is not part of an expression", "equality is written `==`"
+    if text.count("(") > text.count(")"):
+        return place, "a `(` is not closed", COMMA_HINT
     hint = "there is no implied multiplication" if re.match(r"[A-Za-z0-9(]", rest) else ""
     return place, f"`{rest.split(' ')[0][:20]}` was not expected here", hint
 
@@ -233,7 +245,8 @@ def _unit(text: str, span: Span) -> Unit:
         problems = Problems()
         unknown = re.findall(r"[A-Za-z]+", text)
         wrong = next((symbol for symbol in unknown if symbol not in SYMBOLS), "")
-        problems.error("unit", span, str(error), nearest(wrong, SYMBOLS))
+        hint = nearest(wrong, SYMBOLS) or "a product is written with `*`: `2 * x`"
+        problems.error("unit", span, str(error), hint)
         raise SpecError(problems.found) from None
 
 

@@ -7,9 +7,8 @@ from fractions import Fraction
 
 import networkx as nx
 
-from language.automaton import read_automaton
-from language.check import check_automaton
 from language.document import Document, Entry, Scalar, Table
+from language.load import automaton_of
 from language.model import Automaton, Connection, Instance, System, SystemInput
 from language.problem import Problems, Span, nearest
 from language.project import Project, expanded, read_document
@@ -89,11 +88,11 @@ class _SystemReader(Reader):
         self.problems.stop_if_any()
         assert of is not None
         document = read_document(self.project.path_of(of.text, of.span))
-        plain = check_automaton(read_automaton(document, self.project, values))
+        plain = automaton_of(document, self.project, values)
         mine = self._overrides_of(entry.key, plain)
         automaton = plain
         if mine:
-            automaton = check_automaton(read_automaton(document, self.project, {**values, **mine}))
+            automaton = automaton_of(document, self.project, {**values, **mine})
         return Instance(entry.key, automaton, offset, key, entry.span)
 
     def _overrides_of(self, instance: str, automaton: Automaton) -> dict[str, Scalar]:

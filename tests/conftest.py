@@ -1,0 +1,34 @@
+"""Options, fixtures and hypothesis profiles of all tests."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+from hypothesis import settings
+
+settings.register_profile("ci", derandomize=True, max_examples=50, deadline=None)
+settings.register_profile("verify", max_examples=1000, deadline=None)
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add our options to pytest."""
+    parser.addoption("--update", action="store_true", help="rewrite golden files")
+    parser.addoption("--recordings", default=None, help="folder of the real recordings")
+
+
+@pytest.fixture
+def update(request: pytest.FixtureRequest) -> bool:
+    """Tell whether golden files are to be rewritten."""
+    return bool(request.config.getoption("--update"))
+
+
+@pytest.fixture
+def recordings(request: pytest.FixtureRequest) -> Path:
+    """Return the folder of the real recordings; the test is skipped where there is none."""
+    named = request.config.getoption("--recordings") or os.environ.get("MODEWRIGHT_RECORDINGS")
+    if not named:
+        pytest.skip("no recordings: give --recordings DIR or MODEWRIGHT_RECORDINGS")
+    return Path(str(named))
