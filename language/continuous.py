@@ -28,8 +28,9 @@ from language.program import (
     whole,
 )
 from language.rk4 import rk4
-from language.sampled import defaults_of, transition_infos
+from language.transition import transition_infos
 from language.wiring import (
+    defaults_of,
     finished,
     initial_ops,
     input_variables,

@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Iterable, Iterator, Mapping
 
 from language.elementary import FUNCTIONS
-from language.lower import expression
+from language.lower import expression, rounded
 from language.model import Automaton
 from language.program import (
     Assign,
@@ -96,6 +96,15 @@ def initial_ops(automaton: Automaton, known: Mapping[str, Expr], prefix: str) ->
     for name in automaton.states:
         visit(name)
     return list(done.values())
+
+
+def defaults_of(automaton: Automaton) -> dict[str, float | bool]:
+    """Return the values of inputs that nothing is connected to."""
+    found: dict[str, float | bool] = {}
+    for name, thing in automaton.inputs.items():
+        if thing.default is not None:
+            found[name] = bool(thing.default) if thing.truth else rounded(thing.default)
+    return found
 
 
 def finished(program: Program, entries: tuple[str, ...]) -> Program:

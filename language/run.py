@@ -1,0 +1,158 @@
+"""Run: a mode of the model inside a tick, following the model's own located transitions.
+
+Blocks: those of the model's field and motion, `switch_<mode>` (one of its transitions), and for a
+mode of ours that runs, `run_<mode>`: the period, segment by segment, at most `events` jumps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from language.evaluate import Scalar
+from language.exponential import exponential
+from language.field import (
+    Field,
+    by_mode,
+    enter,
+    field_blocks,
+    field_variables,
+    jump,
+)
+from language.lower import constant_names, rounded, tunables_of
+from language.model import Automaton, Formula, Mode, Run as ModelRun
+from language.motion import RUN_HALVINGS, Method, motion_blocks, motion_variables
+from language.problem import Problems
+from language.program import (
+    Assign,
+    Block,
+    Branch,
+    Compare,
+    Constant,
+    Expr,
+    FaultBit,
+    Loop,
+    Ref,
+    Value,
+    Variable,
+    real,
+    subtract,
+    whole,
+)
+from language.rk4 import rk4
+
+EVENT_LIMIT = "event_limit"
+MODE = "memory.run_mode"
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What the runs of an automaton share."""
+
+    blocks: dict[str, Block]
+    variables: tuple[Variable, ...]
+    constants: tuple[Constant, ...]
+
+
+def run_motion(
+    automaton: Automaton, runs: list[ModelRun], values: Mapping[str, Scalar], problems: Problems
+) -> Motion:
+    """Return the motion of the model inside a tick; `values` are those of the constants."""
+    model = automaton.model
+    assert model
+    for run in runs:
+        if (run.method, run.substeps) != (runs[0].method, runs[0].substeps):
+            label = "all runs of an automaton have one method and one number of substeps"
+            problems.error("run", run.span, label)
+    inputs = _inputs(automaton, problems)
+    field = Field(model, constant_names(automaton), inputs, MODE, f"{model.name} ")
+    blocks = field_blocks(field)
+    method = _method(automaton, field, runs[0], blocks, values, problems)
+    made = {
+        **blocks,
+        **method.blocks,
+        **motion_blocks(field, method, RUN_HALVINGS, lambda mode: None),
+    }
+    for mode in model.modes.values():
+        made[f"switch_{mode.name}"] = _switch(field, mode, problems)
+    variables = (
+        Variable(MODE, "whole", about=f"mode of the run of {model.name}"),
+        Variable("work.left", "real", "s", about="rest of the substep"),
+        Variable("work.event", "whole"),
+        Variable("work.substep", "whole"),
+        *field_variables(field),
+        *motion_variables(field, method),
+    )
+    return Motion(made, variables, method.constants)
+
+
+def run_block(automaton: Automaton, run: ModelRun) -> Block:
+    """Return the advance of a mode that runs the model: the whole period, through its events."""
+    model = automaton.model
+    assert model and automaton.period is not None
+    field = Field(model, {}, {}, MODE, "")
+    may_jump = Compare("<", Ref("work.event"), whole(run.events))
+    at_limit: Block = (FaultBit(EVENT_LIMIT), Assign("work.left", real(0.0)))
+    after: Block = (Branch(may_jump, (by_mode(field, "switch"),), at_limit),)
+    segment: Block = (
+        Assign("work.h", Ref("work.left")),
+        by_mode(field, "move"),
+        Assign("work.left", subtract(Ref("work.left"), Ref("work.elapsed"))),
+        Branch(Ref("work.crossed"), after),
+    )
+    left = Compare(">", Ref("work.left"), real(0.0))
+    substep = real(float(automaton.period / run.substeps))
+    body: Block = (
+        Assign("work.left", substep, f"{automaton.name} {run.key}"),
+        Loop(run.events + 1, "work.event", (Branch(left, segment),)),
+    )
+    return body if run.substeps == 1 else (Loop(run.substeps, "work.substep", body),)
+
+
+def _inputs(automaton: Automaton, problems: Problems) -> dict[str, Expr]:
+    """A run reads the inputs of the tick before; what is no input here has its default."""
+    model = automaton.model
+    assert model
+    found: dict[str, Expr] = {}
+    for name, thing in model.inputs.items():
+        found[name] = real(0.0)
+        if name in automaton.inputs:
+            found[name] = Ref(f"before.{name}")
+        elif thing.default is not None:
+            default = thing.default
+            found[name] = Value(bool(default)) if thing.truth else real(rounded(default))
+        else:
+            label = f"the run needs an input `{name}`: `{model.name}` has no default for it"
+            problems.error("run", automaton.span, label)
+    return found
+
+
+def _method(
+    automaton: Automaton,
+    field: Field,
+    run: ModelRun,
+    blocks: Mapping[str, Block],
+    values: Mapping[str, Scalar],
+    problems: Problems,
+) -> Method:
+    assert automaton.period is not None
+    if run.method == "rk4":
+        return rk4(field)
+    h = float(automaton.period / run.substeps)
+    formulas: list[Formula] = []
+    for mode in field.automaton.modes.values():
+        formulas += mode.equations.values()
+        for balance in mode.flow.values():
+            formulas += [Formula(balance.left, ""), Formula(balance.right, "")]
+    depends_on = tunables_of(automaton, formulas)
+    return exponential(field, blocks, values, h, depends_on, run.span, problems)
+
+
+def _switch(field: Field, mode: Mode, problems: Problems) -> Block:
+    for transition in mode.transitions:
+        if transition.wait:
+            label = "a run inside a tick follows transitions without a wait only"
+            problems.error("run", transition.wait.span, label)
+    enabled: dict[int, Expr] = {k: Ref(f"work.guard_{k}") for k in range(len(mode.transitions))}
+    fire: dict[int, Block] = {k: (enter(field, t),) for k, t in enumerate(mode.transitions)}
+    return jump(field, mode, enabled, fire)
