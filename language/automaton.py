@@ -7,30 +7,24 @@ from fractions import Fraction
 from typing import cast
 
 from language.document import Document, Entry, Node, Scalar, Table
+from language.mode import ModeReader
 from language.model import (
     Automaton,
-    Balance,
-    Formula,
     Input,
     Kind,
     Mode,
     Parameter,
     State,
-    Transition,
 )
-from language.observer import read_observer, read_run
 from language.overlay import lay, without
-from language.problem import Problems, SpecError, nearest
+from language.problem import Problems, nearest
 from language.project import Project, expanded, read_document
 from language.reader import Reader
-from language.syntax import Application, Arithmetic, Broken, Name, Tree, parse_balance, walk
 from language.units import SECOND, Unit, fits, parse_unit
 
 COMMON_KEYS = ("language", "automaton", "parameters", "inputs", "states", "equations")
 LOGIC_KEYS = ("flow", "initial", "modes", "templates", "outputs")
 CLOCK_KEYS = ("period", "step", "numbers", "model")
-MODE_KEYS = ("number", "equations", "flow", "update", "observer", "runs", "transitions")
-TRANSITION_KEYS = ("to", "when", "wait", "priority", "reset")
 DEFAULT_STEP = Fraction(1, 1000)
 """Major step of a continuous automaton that gives none."""
 
@@ -114,7 +108,7 @@ class _AutomatonReader(Reader):
         self.sampled = period is not None
         self._check_numbers(tree)
         own = {e.key: self._parameter(e) for e in self.named(tree.get("parameters"), "parameters")}
-        modes = self._modes(tree)
+        modes = ModeReader(self.problems, model).modes(tree, self.at)
         initial = self._initial(tree, modes)
         automaton = Automaton(
             name=document.name,
@@ -219,106 +213,6 @@ class _AutomatonReader(Reader):
                 found[entry.key] = State(entry.key, unit, initial, limits, key, entry.span)
         return found
 
-    def _modes(self, tree: Table) -> dict[str, Mode]:
-        templates = self.table(tree.get("templates"), "templates")
-        root = tree
-        modes: dict[str, Mode] = {}
-        for entry in self.named(tree.get("modes"), "modes"):
-            table = entry.node if isinstance(entry.node, Table) else Table({}, entry.span)
-            table = self._like(table, templates)
-            modes[entry.key] = self._mode(entry, table, root, len(modes))
-        if not modes:
-            self.problems.error("missing", self.at, "an automaton has at least one mode in `modes`")
-            self.problems.stop_if_any()
-        numbers: dict[int, str] = {}
-        for mode in modes.values():
-            if mode.number in numbers:
-                label = f"number {mode.number} is that of mode `{numbers[mode.number]}`"
-                self.problems.error("duplicate", mode.span, label)
-            numbers.setdefault(mode.number, mode.name)
-        return modes
-
-    def _like(self, mode: Table, templates: Table) -> Table:
-        node = mode.get("like")
-        if node is None:
-            return mode
-        name = self.text(node, "like", node.span)
-        template = templates.get(name)
-        if not isinstance(template, Table):
-            label = f"there is no template `{name}`"
-            self.problems.error("name", node.span, label, nearest(name, templates.entries))
-            return without(mode, "like")
-        return lay(template, without(mode, "like"), self.problems, template=True)
-
-    def _mode(self, entry: Entry, body: Table, root: Table, position: int) -> Mode:
-        key = f"modes.{entry.key}"
-        table = self.table(body, key, MODE_KEYS)
-        equations = self._formulas(root.get("equations"), "equations")
-        for name, formula in self._formulas(table.get("equations"), f"{key}.equations").items():
-            if name in equations:
-                label = f"`{name}` has an equation for every mode already"
-                hint = f"it is given at {equations[name].span}"
-                self.problems.error("duplicate", formula.span, label, hint)
-            equations[name] = formula
-        flow = self._flow(root.get("flow"), "flow")
-        flow.update(self._flow(table.get("flow"), f"{key}.flow"))
-        observer_node, run_node = table.get("observer"), table.get("runs")
-        return Mode(
-            name=entry.key,
-            number=self.whole(table.get("number"), "number", position, -100, 100),
-            equations=equations,
-            flow=flow,
-            update=self._formulas(table.get("update"), f"{key}.update"),
-            observer=read_observer(self, observer_node, f"{key}.observer")
-            if observer_node
-            else None,
-            run=read_run(self, run_node, f"{key}.runs", self.model) if run_node else None,
-            transitions=tuple(self._transitions(table.get("transitions"), entry.key)),
-            key=key,
-            span=entry.span,
-        )
-
-    def _formulas(self, node: Node | None, key: str) -> dict[str, Formula]:
-        found = {}
-        for entry in self.named(node, key):
-            formula = self.expression(entry.node, f"{key}.{entry.key}", entry.span)
-            if formula:
-                found[entry.key] = formula
-        return found
-
-    def _flow(self, node: Node | None, key: str) -> dict[str, Balance]:
-        found = {}
-        for entry in self.named(node, key):
-            scalar = self.scalar(entry.node, f"{key}.{entry.key}", entry.span)
-            if scalar is None:
-                continue
-            left: Tree = Broken(scalar.span)
-            right: Tree = left
-            with self.problems.collecting():
-                left, right = parse_balance(scalar)
-            found[entry.key] = Balance(entry.key, left, right, f"{key}.{entry.key}")
-        return found
-
-    def _transitions(self, node: Node | None, source: str) -> list[Transition]:
-        found = []
-        for entry in self.named(node, "transitions"):
-            key = f"modes.{source}.transitions.{entry.key}"
-            table = self.table(entry.node, key, TRANSITION_KEYS)
-            to = table.get("to")
-            target = self.text(to, "to", entry.span) if to else entry.key
-            when = self.expression(table.get("when"), f"{key}.when", entry.span)
-            wait_node = table.get("wait")
-            wait = self.expression(wait_node, f"{key}.wait", entry.span) if wait_node else None
-            priority_node = table.get("priority")
-            priority = self.whole(priority_node, "priority", 0, 0, 1000) if priority_node else None
-            reset = self._formulas(table.get("reset"), f"{key}.reset")
-            if when:
-                at = to.span if to else entry.span
-                found.append(
-                    Transition(entry.key, source, target, when, wait, priority, reset, key, at)
-                )
-        return found
-
     def _initial(self, tree: Table, modes: dict[str, Mode]) -> str:
         node = tree.get("initial")
         if node is None and len(modes) == 1:
@@ -328,34 +222,3 @@ class _AutomatonReader(Reader):
             label = f"there is no mode `{name}`"
             self.problems.error("name", node.span, label, nearest(name, modes))
         return name
-
-
-def coefficient_of(left: Tree, state: str) -> Tree | SpecError | None:
-    """Return the factor of der(state) on the left side of a balance, None where it is 1."""
-    if isinstance(left, Application) and left.function == "der":
-        return None if _is_derivative(left, state) else _bad_balance(left, state)
-    if isinstance(left, Arithmetic) and left.operator == "*":
-        if isinstance(left.right, Application) and _is_derivative(left.right, state):
-            return left.left if not _has_derivative(left.left) else _bad_balance(left, state)
-        if isinstance(left.left, Application) and _is_derivative(left.left, state):
-            return left.right if not _has_derivative(left.right) else _bad_balance(left, state)
-    return _bad_balance(left, state)
-
-
-def _is_derivative(tree: Application, state: str) -> bool:
-    match tree:
-        case Application("der", (Name(path, _),), _):
-            return path == state
-        case _:
-            return False
-
-
-def _has_derivative(tree: Tree) -> bool:
-    return any(isinstance(part, Application) and part.function == "der" for part in walk(tree))
-
-
-def _bad_balance(left: Tree, state: str) -> SpecError:
-    problems = Problems()
-    label = f"the left side is `coefficient * der({state})` with der once"
-    problems.error("balance", left.span, label)
-    return SpecError(problems.found)

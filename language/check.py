@@ -5,14 +5,15 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Mapping
 
-from language.automaton import coefficient_of
+from language.balance import coefficient_of
+from language.check_observer import check_observer
 from language.dimension import DimensionCheck, Kind, Scope
 from language.guards import report_overlaps
-from language.model import Automaton, Formula, Mode, Observer
+from language.model import Automaton, Formula, Mode
 from language.order import equation_order, report_circle
 from language.problem import Problems, Span, SpecError, nearest
 from language.syntax import Broken, Tree, names
-from language.units import NUMBER, SECOND, Dimension, product
+from language.units import SECOND, Dimension, product
 from language.witness import report_refiring
 
 RESERVED_OUTPUTS = ("mode", "faults")
@@ -134,7 +135,7 @@ class _Check:
         self._assignments(mode.update, check)
         self._transitions(mode, check)
         if mode.observer:
-            self._observer(mode.observer, check)
+            check_observer(automaton, mode.observer, self.names, check)
         self._writers(mode)
 
     def _agreed(self, name: str, kind: Kind | None, formula: Formula) -> Kind | None:
@@ -215,40 +216,6 @@ class _Check:
                 label = f"`{read.path}` is {parameter.kind}: a wait is made of fixed values"
                 self.problems.error("wait", read.span, label)
 
-    def _observer(self, observer: Observer, check: DimensionCheck) -> None:
-        automaton = self.automaton
-        for name in observer.states:
-            if name not in automaton.states:
-                self.problems.error("name", observer.span, f"`{name}` is not a state")
-        for name in (*observer.inputs, *observer.measures):
-            if name not in automaton.inputs:
-                self.problems.error("name", observer.span, f"`{name}` is not an input")
-        kinds = {name: kind for name, kind in self.names.items() if isinstance(kind, Dimension)}
-        if not all(name in kinds for name in (*observer.states, *observer.measures)):
-            return
-        for row, entries in observer.a.items():
-            for column, formula in entries.items():
-                self._entry(check, formula, _rate(kinds[row]), kinds[column])
-        for row, entries in observer.b.items():
-            for column, formula in entries.items():
-                self._entry(check, formula, _rate(kinds[row]), kinds.get(column, NUMBER))
-        for row, entries in observer.c.items():
-            for column, formula in entries.items():
-                self._entry(check, formula, kinds[row], kinds[column])
-        for row, formula in observer.f.items():
-            check.quantity(formula.tree, _loose(_rate(kinds[row])), formula.key)
-        for row, formula in observer.process_noise.items():
-            want = _rate(product(kinds[row], _loose(kinds[row])))
-            check.quantity(formula.tree, _loose(want), formula.key)
-        for row, formula in observer.measurement_noise.items():
-            want = product(kinds[row], _loose(kinds[row]))
-            check.quantity(formula.tree, _loose(want), formula.key)
-
-    def _entry(
-        self, check: DimensionCheck, formula: Formula, row: Dimension, column: Dimension
-    ) -> None:
-        check.quantity(formula.tree, _loose(product(row, column, -1)), formula.key)
-
     def _writers(self, mode: Mode) -> None:
         automaton = self.automaton
         writers: dict[str, str] = {}
@@ -299,14 +266,3 @@ def _of_model(automaton: Automaton) -> Mapping[str, object]:
 
 def _equation_names(modes: Iterable[Mode]) -> list[str]:
     return list(dict.fromkeys(name for mode in modes for name in mode.equations))
-
-
-def _rate(dimension: Dimension) -> Dimension:
-    powers = list(dimension.powers)
-    powers[2] -= 1
-    return Dimension(tuple(powers), dimension.angle)
-
-
-def _loose(dimension: Dimension) -> Dimension:
-    """The dimension with a free angle: entries of matrices are quotients."""
-    return Dimension(dimension.powers, None)

@@ -158,7 +158,7 @@ class _Names:
         return tuple(found)
 
     def row(self, letter: str, matrix: Matrix, row: str, values: Mapping[str, Expr]) -> list[Expr]:
-        """Return the products of a row with values by column; 0 is left out, 1 is not multiplied."""
+        """Return the products of a row with values by column; 0 is left out, 1 is no factor."""
         rows, columns = self.sides(letter)
         if not matrix:
             return []

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from fractions import Fraction
 
-from language.automaton import coefficient_of
+from language.balance import coefficient_of
 from language.model import Automaton, Balance, Formula, Mode
 from language.order import equation_order
 from language.problem import SpecError

@@ -183,7 +183,7 @@ def shape(a: Matrix) -> str:
 
 
 def _transition(name: str, a: Matrix, h: float) -> tuple[Matrix, Matrix]:
-    """Return e^(A h) and its integral: Horner's rule for phi_1, small terms first, then doubling."""
+    """Return e^(A h) and its integral: Horner's rule for phi_1, small terms first; doubling."""
     x, exponents, halvings = short_step(name, a, h)
     unit = identity(len(a))
     series = unit

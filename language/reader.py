@@ -8,8 +8,9 @@ from fractions import Fraction
 
 from language.document import Entry, Items, Node, Scalar, Table
 from language.model import Formula, Range
+from language.parse import COMMA_HINT, parse_expression
 from language.problem import Problems, Source, Span, SpecError, nearest
-from language.syntax import COMMA_HINT, Broken, Negative, Number, Tree, parse_expression
+from language.syntax import Broken, Negative, Number, Tree
 from language.units import NO_UNIT, SYMBOLS, Unit, UnitError, fits, parse_unit
 
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,30}")

@@ -1,4 +1,4 @@
-"""Covariances of a sampled observer: the noise of one period, the steady gain by a Riccati equation.
+"""Covariances of a sampled observer: noise of one period, steady gain by a Riccati equation.
 
 Same arithmetic, and for the same reason, as `language.matrix`.
 """
@@ -171,10 +171,10 @@ def _doubled(a: Matrix, g: Matrix, h: Matrix) -> tuple[float, Matrix]:
 
 
 def _improved(phi: Matrix, qd: Matrix, c: Matrix, r: Matrix, gain: Matrix) -> tuple[float, Matrix]:
-    """Return the memory left and the covariance, (n, n), that an observer with this gain settles to.
+    """Return the memory left and the covariance, (n, n), that an observer with this gain reaches.
 
     Newton's method on the Riccati equation, one step (Hewer 1971, IEEE Trans. Autom. Control 16,
-    382-384): P = S P S' + Qd + K R K' with K = Phi L, S = Phi - K C. Only covariances are added, so
+    382-384): P = S P S' + Qd + K R K' with K = Phi L, S = Phi - K C. Only covariances are added:
     nothing cancels; doubled as in Smith 1968 (SIAM J. Appl. Math. 16, 198-201). Stop: as `_doubled`.
     """
     k = multiply(phi, gain)

@@ -108,7 +108,7 @@ def defaults_of(automaton: Automaton) -> dict[str, float | bool]:
 
 
 def finished(program: Program, entries: tuple[str, ...]) -> Program:
-    """Return the program with only what its entries use: blocks, constants, variables, functions."""
+    """Return the program with only what its entries use."""
     blocks = _reached(program.blocks, entries)
     used = {name for block in blocks.values() for name in _names(block)}
     used |= {wire.source for wire in program.outputs}

@@ -31,6 +31,8 @@ from language.project import Project, read_document
 from language.scenario import read_scenario
 from language.system import read_system
 
+Alone = Callable[[str, str], tuple[System, Scenario]]
+
 ROOT = Path(__file__).parents[2]
 PUBLISHED = ROOT / "tests/data/paper/truth_tip_out_events.csv"
 EVENT_TOLERANCE = 1e-8
@@ -118,7 +120,7 @@ def theirs(tip_out: tuple[System, Scenario]) -> Trajectory:
 
 
 @pytest.fixture
-def alone(tmp_path: Path) -> Callable[[str, str], tuple[System, Scenario]]:
+def alone(tmp_path: Path) -> Alone:
     """Return a function that makes a system of one automaton and its scenario."""
 
     def made(text: str, horizon: str) -> tuple[System, Scenario]:
@@ -197,9 +199,7 @@ def test_our_engine_comes_nearer_with_the_fourth_power_of_its_step(
     assert 3.5 < math.log2(gaps[0] / gaps[1]) < 4.5
 
 
-def test_a_bouncing_ball_bounces_when_the_formula_says(
-    alone: Callable[[str, str], tuple[System, Scenario]],
-) -> None:
+def test_a_bouncing_ball_bounces_when_the_formula_says(alone: Alone) -> None:
     run = reference(*alone(BALL, "3 s"))
     fall = math.sqrt(2 * 1.3 / 9.81)
     flights = [fall, *(2 * fall * 0.8**k for k in range(1, 8))]
@@ -209,9 +209,7 @@ def test_a_bouncing_ball_bounces_when_the_formula_says(
     assert times == pytest.approx(expected, abs=EXACT_TOLERANCE)
 
 
-def test_a_decay_faster_than_its_step_switches_when_the_formula_says(
-    alone: Callable[[str, str], tuple[System, Scenario]],
-) -> None:
+def test_a_decay_faster_than_its_step_switches_when_the_formula_says(alone: Alone) -> None:
     run = reference(*alone(DECAY, "20 ms"))
     expected = 0.37e-3 * math.log(5 / 0.2) + 12.3e-3
     assert [event.time for event in run.events] == pytest.approx([expected], abs=EXACT_TOLERANCE)
@@ -219,26 +217,20 @@ def test_a_decay_faster_than_its_step_switches_when_the_formula_says(
     assert run.signals["one.u"] == pytest.approx(exact, rel=0, abs=1e-9)
 
 
-def test_a_pulse_inside_a_step_is_seen(
-    alone: Callable[[str, str], tuple[System, Scenario]],
-) -> None:
+def test_a_pulse_inside_a_step_is_seen(alone: Alone) -> None:
     run = reference(*alone(PULSE, "20 ms"))
     expected = (0.04 - math.sqrt(0.04**2 - 2 * 16 * 4.9e-5)) / 16
     assert [event.time for event in run.events] == pytest.approx([expected], abs=EXACT_TOLERANCE)
 
 
-def test_a_state_that_grows_without_bound_stops_the_run_with_its_place(
-    alone: Callable[[str, str], tuple[System, Scenario]],
-) -> None:
+def test_a_state_that_grows_without_bound_stops_the_run_with_its_place(alone: Alone) -> None:
     run = reference(*alone(RUNAWAY, "1 s"))
     assert run.stopped is not None
     assert "`runaway` in mode `only`" in run.stopped
     assert run.times[-1] == pytest.approx(0.1, abs=2e-3)
 
 
-def test_a_start_that_is_not_finite_is_refused_by_name(
-    alone: Callable[[str, str], tuple[System, Scenario]],
-) -> None:
+def test_a_start_that_is_not_finite_is_refused_by_name(alone: Alone) -> None:
     stepper = LibraryStepper(programs_of(*alone(BALL, "1 s"))["one"])
     stepper.run("init")
     stepper.set("state.v", math.nan)

@@ -1,0 +1,62 @@
+"""Check of an observer: its names, and the dimensions of its matrices, vectors and noises."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from language.dimension import DimensionCheck, Kind
+from language.model import Automaton, Formula, Observer
+from language.problem import nearest
+from language.units import Dimension, product
+
+
+def check_observer(
+    automaton: Automaton, observer: Observer, kinds: Mapping[str, Kind], check: DimensionCheck
+) -> None:
+    """Report unknown names, and entries that do not fit dx/dt = A x + B u + f, y = C x."""
+    problems = check.problems
+    for names, known, what in (
+        (observer.states, automaton.states, "a state"),
+        ((*observer.inputs, *observer.measures), automaton.inputs, "an input"),
+    ):
+        for name in names:
+            if name not in known:
+                label = f"`{name}` is not {what}"
+                problems.error("name", observer.span, label, nearest(name, known))
+    named = (*observer.states, *observer.measures, *observer.inputs)
+    sizes = {name: kind for name, kind in kinds.items() if isinstance(kind, Dimension)}
+    if all(name in sizes for name in named):
+        _check_matrices(observer, sizes, check)
+        _check_vectors(observer, sizes, check)
+
+
+def _check_matrices(
+    observer: Observer, sizes: Mapping[str, Dimension], check: DimensionCheck
+) -> None:
+    for matrix, per_second in ((observer.a, True), (observer.b, True), (observer.c, False)):
+        for row, entries in matrix.items():
+            result = _rate(sizes[row]) if per_second else sizes[row]
+            for column, formula in entries.items():
+                _fits(check, formula, product(result, sizes[column], -1))
+
+
+def _check_vectors(
+    observer: Observer, sizes: Mapping[str, Dimension], check: DimensionCheck
+) -> None:
+    for row, formula in observer.f.items():
+        _fits(check, formula, _rate(sizes[row]))
+    for row, formula in observer.process_noise.items():
+        _fits(check, formula, _rate(product(sizes[row], sizes[row])))
+    for row, formula in observer.measurement_noise.items():
+        _fits(check, formula, product(sizes[row], sizes[row]))
+
+
+def _fits(check: DimensionCheck, formula: Formula, want: Dimension) -> None:
+    """Entries are quotients of quantities: their power of the angle is free."""
+    check.quantity(formula.tree, Dimension(want.powers, None), formula.key)
+
+
+def _rate(dimension: Dimension) -> Dimension:
+    powers = list(dimension.powers)
+    powers[2] -= 1
+    return Dimension(tuple(powers), dimension.angle)

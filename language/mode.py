@@ -1,0 +1,123 @@
+"""Mode reader: the modes of an automaton with their transitions, templates laid under them."""
+
+from __future__ import annotations
+
+from language.document import Entry, Node, Table
+from language.model import Automaton, Balance, Formula, Mode, Transition
+from language.observer import read_observer, read_run
+from language.overlay import lay, without
+from language.parse import parse_balance
+from language.problem import Problems, Span, nearest
+from language.reader import Reader
+from language.syntax import Broken, Tree
+
+MODE_KEYS = ("number", "equations", "flow", "update", "observer", "runs", "transitions")
+TRANSITION_KEYS = ("to", "when", "wait", "priority", "reset")
+
+
+class ModeReader(Reader):
+    """Reads modes; `model` is what their runs may run."""
+
+    def __init__(self, problems: Problems, model: Automaton | None) -> None:
+        """Report into `problems`."""
+        super().__init__(problems)
+        self.model = model
+
+    def modes(self, tree: Table, at: Span) -> dict[str, Mode]:
+        """Return the modes of an automaton by name."""
+        templates = self.table(tree.get("templates"), "templates")
+        modes: dict[str, Mode] = {}
+        for entry in self.named(tree.get("modes"), "modes"):
+            table = self._like(self.table(entry.node, f"modes.{entry.key}"), templates)
+            modes[entry.key] = self._mode(entry, table, tree, len(modes))
+        if not modes:
+            self.problems.error("missing", at, "an automaton has at least one mode in `modes`")
+            self.problems.stop_if_any()
+        numbers: dict[int, str] = {}
+        for mode in modes.values():
+            if mode.number in numbers:
+                label = f"number {mode.number} is that of mode `{numbers[mode.number]}`"
+                self.problems.error("duplicate", mode.span, label)
+            numbers.setdefault(mode.number, mode.name)
+        return modes
+
+    def _like(self, mode: Table, templates: Table) -> Table:
+        node = mode.get("like")
+        if node is None:
+            return mode
+        name = self.text(node, "like", node.span)
+        template = templates.get(name)
+        if not isinstance(template, Table):
+            label = f"there is no template `{name}`"
+            self.problems.error("name", node.span, label, nearest(name, templates.entries))
+            return without(mode, "like")
+        return lay(template, without(mode, "like"), self.problems, template=True)
+
+    def _mode(self, entry: Entry, body: Table, root: Table, position: int) -> Mode:
+        key = f"modes.{entry.key}"
+        table = self.table(body, key, MODE_KEYS)
+        equations = self._formulas(root.get("equations"), "equations")
+        for name, formula in self._formulas(table.get("equations"), f"{key}.equations").items():
+            if name in equations:
+                label = f"`{name}` has an equation for every mode already"
+                hint = f"it is given at {equations[name].span}"
+                self.problems.error("duplicate", formula.span, label, hint)
+            equations[name] = formula
+        flow = self._flow(root.get("flow"), "flow")
+        flow.update(self._flow(table.get("flow"), f"{key}.flow"))
+        observer_node, run_node = table.get("observer"), table.get("runs")
+        return Mode(
+            name=entry.key,
+            number=self.whole(table.get("number"), "number", position, -100, 100),
+            equations=equations,
+            flow=flow,
+            update=self._formulas(table.get("update"), f"{key}.update"),
+            observer=read_observer(self, observer_node, f"{key}.observer")
+            if observer_node
+            else None,
+            run=read_run(self, run_node, f"{key}.runs", self.model) if run_node else None,
+            transitions=tuple(self._transitions(table.get("transitions"), entry.key)),
+            key=key,
+            span=entry.span,
+        )
+
+    def _formulas(self, node: Node | None, key: str) -> dict[str, Formula]:
+        found = {}
+        for entry in self.named(node, key):
+            formula = self.expression(entry.node, f"{key}.{entry.key}", entry.span)
+            if formula:
+                found[entry.key] = formula
+        return found
+
+    def _flow(self, node: Node | None, key: str) -> dict[str, Balance]:
+        found = {}
+        for entry in self.named(node, key):
+            scalar = self.scalar(entry.node, f"{key}.{entry.key}", entry.span)
+            if scalar is None:
+                continue
+            left: Tree = Broken(scalar.span)
+            right: Tree = left
+            with self.problems.collecting():
+                left, right = parse_balance(scalar)
+            found[entry.key] = Balance(entry.key, left, right, f"{key}.{entry.key}")
+        return found
+
+    def _transitions(self, node: Node | None, source: str) -> list[Transition]:
+        found = []
+        for entry in self.named(node, "transitions"):
+            key = f"modes.{source}.transitions.{entry.key}"
+            table = self.table(entry.node, key, TRANSITION_KEYS)
+            to = table.get("to")
+            target = self.text(to, "to", entry.span) if to else entry.key
+            when = self.expression(table.get("when"), f"{key}.when", entry.span)
+            wait_node = table.get("wait")
+            wait = self.expression(wait_node, f"{key}.wait", entry.span) if wait_node else None
+            priority_node = table.get("priority")
+            priority = self.whole(priority_node, "priority", 0, 0, 1000) if priority_node else None
+            reset = self._formulas(table.get("reset"), f"{key}.reset")
+            if when:
+                at = to.span if to else entry.span
+                found.append(
+                    Transition(entry.key, source, target, when, wait, priority, reset, key, at)
+                )
+        return found

@@ -1,0 +1,214 @@
+"""Parse: the text of an expression or balance to its tree, or a problem at the right place."""
+
+from __future__ import annotations
+
+import re
+from fractions import Fraction
+from functools import cache
+from importlib import resources
+from typing import Any
+
+import lark
+
+from language.document import Scalar
+from language.problem import Problems, Span, SpecError, nearest
+from language.syntax import (
+    Application,
+    Arithmetic,
+    Choice,
+    Logic,
+    Name,
+    Negative,
+    Not,
+    Number,
+    Power,
+    Relation,
+    Tree,
+    Truth,
+)
+from language.units import NO_UNIT, SYMBOLS, Unit, UnitError, parse_unit
+
+DECIMAL = re.compile(r"(0|[1-9]\d*)(\.\d+)?([eE][-+]?\d+)?")
+MAX_TEXT = 2000
+"""Longest expression read; longer ones want an equation of their own."""
+COMMA_HINT = "in `{...}` YAML ends a value at a comma: quote a value that has one"
+MAX_POWER = 8
+MAX_EXPONENT = 308
+"""Largest decimal exponent of a literal: beyond it a double overflows."""
+
+
+def parse_expression(scalar: Scalar) -> Tree:
+    """Parse an expression. Raises SpecError with the place inside the text."""
+    tree: Tree = _parse(scalar, "expression")
+    return tree
+
+
+def parse_balance(scalar: Scalar) -> tuple[Tree, Tree]:
+    """Parse `left = right`. Raises SpecError with the place inside the text."""
+    left, right = _parse(scalar, "balance")
+    return left, right
+
+
+def decimal(text: str, span: Span) -> Fraction:
+    """Return the exact value of a decimal literal. Raises SpecError for other forms."""
+    problems = Problems()
+    if re.fullmatch(r"\d+[eE][-+]?\d+", text):
+        digits, exponent = re.split("[eE]", text)
+        hint = f"write `{digits}.0e{exponent}`: other YAML tools read `{text}` as a text"
+        problems.error("number", span, f"`{text}` has an exponent but no point", hint)
+    elif re.fullmatch(r"0\d+.*", text):
+        hint = f"write `{text.lstrip('0') or '0'}`: other YAML tools read `{text}` as octal"
+        problems.error("number", span, f"`{text}` starts with a zero", hint)
+    elif not DECIMAL.fullmatch(text):
+        problems.error(
+            "number", span, f"`{text}` is not a number", "write it as `1.0e-3` or `12.5`"
+        )
+    elif abs(_exponent(text)) > MAX_EXPONENT:
+        problems.error("number", span, f"`{text}` is out of the range of a double")
+    problems.stop_if_any()
+    return Fraction(text)
+
+
+def _exponent(text: str) -> int:
+    parts = re.split("[eE]", text)
+    return int(parts[1]) if len(parts) == 2 else 0
+
+
+@cache
+def _parser(start: str) -> lark.Lark:
+    grammar = resources.files("language").joinpath("expression.lark").read_text("utf-8")
+    return lark.Lark(grammar, parser="lalr", start=start, propagate_positions=True)
+
+
+def _parse(scalar: Scalar, start: str) -> Any:
+    text, span = scalar.text, scalar.text_span
+    problems = Problems()
+    if len(text) > MAX_TEXT:
+        problems.error("expression", span, f"an expression of {len(text)} characters is too long")
+    if "\n" in text:
+        problems.error("expression", span, "an expression stands on one line")
+    problems.stop_if_any()
+    try:
+        tree = _parser(start).parse(text)
+        return _Build(span).transform(tree)
+    except lark.exceptions.VisitError as error:
+        raise error.orig_exc from None
+    except lark.exceptions.UnexpectedInput as error:
+        problems.error("expression", *_explain(text, span, start, error))
+    except RecursionError:
+        problems.error("expression", span, "the expression is nested too deeply")
+    raise SpecError(problems.found)
+
+
+def _explain(
+    text: str, span: Span, start: str, error: lark.exceptions.UnexpectedInput
+) -> tuple[Span, str, str]:
+    column = getattr(error, "column", 0)
+    found = str(getattr(error, "token", "")) or ""
+    ended = column < 1 or (not found and column > len(text)) or found == "$END"
+    place = span.inside(len(text)) if ended else span.inside(column - 1, len(found))
+    if start == "balance" and "=" not in text:
+        return span, "a balance is `coefficient * der(x) = ...`", ""
+    if ended or not text.strip():
+        hint = COMMA_HINT if text.count("(") > text.count(")") else ""
+        return place, "the expression ends too early", hint
+    rest = text[column - 1 :]
+    if found in ("<", "<=", ">", ">=", "==", "!="):
+        return place, "one relation only", "write `a < b and b < c`"
+    if rest.startswith("="):
+        return place, "`=` is not part of an expression", "equality is written `==`"
+    if text.count("(") > text.count(")"):
+        return place, "a `(` is not closed", COMMA_HINT
+    hint = "there is no implied multiplication" if re.match(r"[A-Za-z0-9(]", rest) else ""
+    return place, f"`{rest.split(' ')[0][:20]}` was not expected here", hint
+
+
+def _unit(text: str, span: Span) -> Unit:
+    try:
+        return parse_unit(text)
+    except UnitError as error:
+        problems = Problems()
+        unknown = re.findall(r"[A-Za-z]+", text)
+        wrong = next((symbol for symbol in unknown if symbol not in SYMBOLS), "")
+        hint = nearest(wrong, SYMBOLS) or "a product is written with `*`: `2 * x`"
+        problems.error("unit", span, str(error), hint)
+        raise SpecError(problems.found) from None
+
+
+class _Build(lark.Transformer[Any, Any]):
+    """From lark's tree to ours, bottom up."""
+
+    def __init__(self, span: Span) -> None:
+        super().__init__()
+        self.text = span
+
+    def _at(self, token: lark.Token) -> Span:
+        return self.text.inside(token.start_pos or 0, len(token))
+
+    def _over(self, first: Any, last: Any) -> Span:
+        start, end = first.span, last.span
+        return Span(start.source, start.line, start.column, end.column + end.width - start.column)
+
+    def expression(self, items: list[Any]) -> Any:
+        return items[0]
+
+    def balance(self, items: list[Any]) -> Any:
+        return items[0], items[1]
+
+    def number(self, items: list[Any]) -> Any:
+        span = self._at(items[0])
+        return Number(decimal(str(items[0]), span), NO_UNIT, span)
+
+    def quantity(self, items: list[Any]) -> Any:
+        digits, _, text = str(items[0]).partition(" ")
+        span = self._at(items[0])
+        value = decimal(digits, span.inside(0, len(digits)))
+        unit = _unit(text, span.inside(len(digits) + 1, len(text)))
+        return Number(value * unit.factor + unit.offset, unit, span)
+
+    def true(self, items: list[Any]) -> Any:
+        return Truth(True, self.text)
+
+    def false(self, items: list[Any]) -> Any:
+        return Truth(False, self.text)
+
+    def path(self, items: list[Any]) -> Any:
+        first, last = items[0], items[-1]
+        width = (last.end_pos or 0) - (first.start_pos or 0)
+        return Name(".".join(items), self.text.inside(first.start_pos or 0, width))
+
+    def call(self, items: list[Any]) -> Any:
+        name, *arguments = items
+        return Application(name.path, tuple(arguments), self._over(name, arguments[-1]))
+
+    def negative(self, items: list[Any]) -> Any:
+        return Negative(items[0], items[0].span)
+
+    def not_(self, items: list[Any]) -> Any:
+        return Not(items[0], items[0].span)
+
+    def power_of(self, items: list[Any]) -> Any:
+        base, token = items
+        if abs(int(token)) > MAX_POWER:
+            problems = Problems()
+            problems.error("power", self._at(token), f"a power is at most {MAX_POWER}")
+            raise SpecError(problems.found)
+        return Power(base, int(token), base.span)
+
+    def binary(self, items: list[Any]) -> Any:
+        left, operator, right = items
+        return Arithmetic(str(operator), left, right, self._over(left, right))
+
+    def compare(self, items: list[Any]) -> Any:
+        left, operator, right = items
+        return Relation(str(operator), left, right, self._over(left, right))
+
+    def or_(self, items: list[Any]) -> Any:
+        return Logic("or", items[0], items[1], self._over(items[0], items[1]))
+
+    def and_(self, items: list[Any]) -> Any:
+        return Logic("and", items[0], items[1], self._over(items[0], items[1]))
+
+    def select(self, items: list[Any]) -> Any:
+        condition, then, other = items
+        return Choice(condition, then, other, self._over(condition, other))
