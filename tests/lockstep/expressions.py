@@ -114,7 +114,7 @@ def truths(draw: Draw, scope: Scope, depth: int) -> Expr:
             counter, largest = draw(st.sampled_from(scope.counters))
             relation = draw(st.sampled_from(RELATIONS))
             return Compare(relation, counter, whole(draw(st.integers(1, largest))))
-        case "same":
+        case "same" if len(scope.truths) > 1:
             # A C compiler warns of `q == q`, and of comparisons with true and false.
             sides = draw(st.permutations(scope.truths))[:2]
             return Compare(draw(st.sampled_from(RELATIONS[4:])), sides[0], sides[1])
@@ -122,7 +122,7 @@ def truths(draw: Draw, scope: Scope, depth: int) -> Expr:
             return Unary("not", part())
         case "and" | "or":
             return Binary(kind, part(), part())
-        case "select":
+        case "select" if scope.truths:
             return Select(part(), draw(st.sampled_from(scope.truths)), part())
         case _:
             known = draw(st.integers(0, len(scope.truths)))

@@ -1,0 +1,116 @@
+"""The rule book: every folder beside this file is one rule with the outcome derived by hand."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+import modewright as mw
+
+HERE = Path(__file__).resolve().parent
+EVENT_TOLERANCE = 1e-9  # s
+RELATIONS: dict[str, Callable[[float, float], bool]] = {
+    ">": operator.gt,
+    ">=": operator.ge,
+    "<": operator.lt,
+    "<=": operator.le,
+}
+
+
+def _expected(folder: Path) -> dict[str, Any]:
+    expected: dict[str, Any] = yaml.safe_load((folder / "expected.yaml").read_text("utf-8"))
+    return expected
+
+
+def _parameters() -> list[Any]:
+    found = []
+    for path in sorted(HERE.glob("*/expected.yaml")):
+        reason = _expected(path.parent).get("xfail")
+        marks = [pytest.mark.xfail(strict=True, reason=reason)] if reason else []
+        found.append(pytest.param(path.parent, id=path.parent.name, marks=marks))
+    return found
+
+
+@pytest.mark.parametrize("folder", _parameters())
+def test_rule(folder: Path) -> None:
+    """Check one rule against the outcome that its text demands."""
+    expected = _expected(folder)
+    if "problems" in expected:
+        for name, wanted in expected["problems"].items():
+            _check_problems(folder, name, wanted)
+    if "events" in expected:
+        _check_run(folder, expected)
+
+
+def _check_problems(folder: Path, name: str, wanted: list[list[str]]) -> None:
+    """Every wanted problem stands in its line, and no other line has one."""
+    lines = (folder / "spec" / f"{name}.yaml").read_text("utf-8").splitlines()
+    problems = [p for p in mw.check(name, root=folder) if p.severity == "error"]
+    shown = [f"{p.span.line}: {p.label} {p.help}" for p in problems]
+    numbers = set()
+    for snippet, *texts in wanted:
+        (number,) = [i for i, line in enumerate(lines, start=1) if snippet in line]
+        numbers.add(number)
+        here = " ".join(f"{p.label} {p.help}" for p in problems if p.span.line == number)
+        assert here, f"no problem in line {number} `{snippet}`: {shown}"
+        for text in texts:
+            assert text in here, f"line {number} does not say `{text}`: {here}"
+    assert {p.span.line for p in problems} == numbers, shown
+
+
+def _check_run(folder: Path, expected: dict[str, Any]) -> None:
+    if expected.get("lockstep"):
+        trajectory, verdicts = mw.lockstep("rig", "run", root=folder)
+        assert verdicts and all(v.is_equal for v in verdicts), verdicts
+    else:
+        trajectory = mw.simulate("rig", "run", root=folder)
+    stopped = trajectory.stopped
+    if "stopped" in expected:
+        assert stopped is not None, "the run was not stopped"
+        for text in expected["stopped"]:
+            assert text in stopped, stopped
+    else:
+        assert stopped is None, stopped
+    _check_events(trajectory, expected)
+    _check_values(trajectory, expected)
+
+
+def _check_events(trajectory: mw.Trajectory, expected: dict[str, Any]) -> None:
+    """The events are these, in this order, and no others (unless `first_events`)."""
+    wanted = [(w[0], w[1], float(w[2]), *w[3:]) for w in expected["events"]]
+    found = list(trajectory.events)
+    if expected.get("any_order"):
+        wanted.sort(key=lambda w: w[0])
+        found.sort(key=lambda e: e.instance)
+    shown = "\n".join(str(e) for e in found[:20])
+    if expected.get("first_events"):
+        found = found[: len(wanted)]
+    assert len(found) == len(wanted), f"{len(wanted)} events expected, found:\n{shown}"
+    tolerance = expected.get("within", EVENT_TOLERANCE)
+    for event, (instance, transition, time, *micro_step) in zip(found, wanted, strict=True):
+        names = {event.transition, f"{event.source} -> {event.target}"}
+        assert event.instance == instance and transition in names, shown
+        assert abs(event.time - time) <= tolerance, f"{transition} at {time}:\n{shown}"
+        assert not micro_step or event.micro_step == micro_step[0], shown
+
+
+def _check_values(trajectory: mw.Trajectory, expected: dict[str, Any]) -> None:
+    def value(signal: str, time: float) -> float:
+        rows = np.flatnonzero(np.abs(trajectory.times - time) < 1e-9)
+        assert rows.size, f"no sample at {time} s: {trajectory.times[:3]} .. {trajectory.times[-3:]}"
+        return float(trajectory.signals[signal][rows[-1]])
+
+    for signal, time, wanted, tolerance in expected.get("values", []):
+        found = value(signal, time)
+        assert abs(found - wanted) <= tolerance, f"{signal} at {time} s: {found}, not {wanted}"
+    for signal, time, relation, bound in expected.get("bounds", []):
+        found = value(signal, time)
+        assert RELATIONS[relation](found, bound), f"{signal}: {found!r}, not {relation} {bound}"
+    if "ends_by" in expected:
+        assert trajectory.times[-1] <= expected["ends_by"], trajectory.times[-1]
