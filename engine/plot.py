@@ -15,7 +15,6 @@ from engine.trajectory import Trajectory, Values
 
 PALETTE = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#777777")
 """Colours that colour-blind readers tell apart (Tol 2021, bright)."""
-GRAPHIC_FORMATS = (".png", ".svg", ".pdf")
 
 
 @dataclass(frozen=True)

@@ -9,15 +9,15 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from engine.plot import GRAPHIC_FORMATS, all_panels, picture
 from engine.trajectory import Trajectory
 from language.printing import program_text
 from language.problem import ordered, render_all
-from modewright import api, demo, show
+from modewright import api, show
 from modewright.exits import EXIT_CODES, PROBLEMS, exit_code
 from modewright.files import OutputError, require_writable, write_files
 from modewright.generated import generated_files, spec_files, stale_files
-from modewright.replay_picture import replay_picture
+
+GRAPHIC_FORMATS = (".png", ".svg", ".pdf")
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -86,6 +86,8 @@ def simulate(
     if out:
         files[out] = trajectory.csv().encode()
     if plot:
+        from engine.plot import all_panels, picture  # matplotlib takes a second: only if asked for
+
         title = f"{system}, scenario {scenario}"
         files[plot] = picture(trajectory, all_panels(trajectory), bands, title, _format(plot))
     write_files(files)
@@ -129,6 +131,8 @@ def replay(
     if out:
         files[out] = trajectory.csv().encode()
     if plot:
+        from modewright.replay_picture import replay_picture
+
         title = f"{estimator} on {recording.name}" + (f", variant {variant}" if variant else "")
         files[plot] = replay_picture(replayed, title, _format(plot))
     write_files(files)
@@ -190,6 +194,8 @@ def run_demo(
     ),
 ) -> None:
     """Simulate the tip-out of the paper, compare engine and C, draw the picture."""
+    from modewright import demo
+
     _make_folder(out)
     if not demo.run(out, console):
         raise typer.Exit(PROBLEMS)

@@ -41,12 +41,12 @@ def command(row: int) -> float:
     if row < TIP_OUT:
         return float(np.round(4 * (150 + 4 * np.sin(0.0145 * row))) / 4)
     since = row - TIP_OUT
-    if since < 5:  # quickly away, ...
-        return 122.0 - 28.0 * since
-    if since < 14:  # ... gently towards zero and a rest there, ...
-        return max(0.0, 7.5 - 2.5 * (since - 5))
+    if since < 13:  # away over one period of the shuffle, as anti-jerk control does, ...
+        return 136.25 - 10.5 * since
+    if since < 22:  # ... gently towards zero and a rest there, ...
+        return max(0.0, 7.5 - 2.5 * (since - 13))
     if row < TIP_IN:  # ... through the gap, and into coasting
-        return max(-20.0, -3.0 - 1.25 * (since - 14))
+        return max(-20.0, -3.0 - 1.25 * (since - 22))
     return min(60.0, -20.0 + 2.5 * (row - TIP_IN))
 
 

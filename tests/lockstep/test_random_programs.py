@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-
-import pytest
-from hypothesis import HealthCheck, Phase, find, given, note, settings
+from hypothesis import HealthCheck, given, note, settings
 
 from language.printing import expr_text
-from language.program import Assign, Call, Expr, Program
-from language.wiring import reads, walk
+from language.program import Assign, Program
+from language.wiring import walk
 from lockstep.compare import compare
 from tests.lockstep.programs import Tick, programs, taped, ticks
 

@@ -103,7 +103,9 @@ def _check_events(trajectory: mw.Trajectory, expected: dict[str, Any]) -> None:
 def _check_values(trajectory: mw.Trajectory, expected: dict[str, Any]) -> None:
     def value(signal: str, time: float) -> float:
         rows = np.flatnonzero(np.abs(trajectory.times - time) < 1e-9)
-        assert rows.size, f"no sample at {time} s: {trajectory.times[:3]} .. {trajectory.times[-3:]}"
+        assert rows.size, (
+            f"no sample at {time} s: {trajectory.times[:3]} .. {trajectory.times[-3:]}"
+        )
         return float(trajectory.signals[signal][rows[-1]])
 
     for signal, time, wanted, tolerance in expected.get("values", []):
