@@ -9,14 +9,14 @@ from typing import Any
 
 import jinja2
 
-from codegen.expression import literal
+from codegen.expression import c_expression, literal
 from codegen.names import CNames, c_member, c_type, mode_constant, run_mode_constant
-from codegen.statement import Writer
+from codegen.statement import Writer, wrapped
 from codegen.usage import Usage, locals_of, usages
 from language.elementary import FUNCTIONS
 from language.printing import digest
-from language.program import Assign, Constant, Function, Program, Ref, Variable, short
-from language.wiring import reads
+from language.program import Assign, Constant, Function, Program, Run, Variable, short
+from language.wiring import reads, walk
 
 GROUPS = ("state", "equation", "before", "innovation", "timer")
 """Nested structs of the instance, in order."""
@@ -201,9 +201,6 @@ def _callees_first(program: Program) -> list[str]:
 
 
 def _runs(program: Program, name: str) -> list[str]:
-    from language.program import Run
-    from language.wiring import walk
-
     return [op.block for op in walk(program.blocks[name]) if isinstance(op, Run)]
 
 
@@ -218,16 +215,10 @@ class _FunctionNames:
 
 
 def _function(function: Function) -> dict[str, Any]:
-    from codegen.expression import c_expression
-
     place = _FunctionNames()
-    lines = []
+    lines: list[str] = []
     for op in function.body:
         assert isinstance(op, Assign)
-        text = c_expression(op.value, place)
-        last = op.target == "work.y"
-        lines.append(f"return {text};" if last else f"const double {place(op.target)} = {text};")
+        left = "return " if op.target == "work.y" else f"const double {place(op.target)} = "
+        lines += wrapped(left, c_expression(op.value, place), "")
     return {"name": function.name, "about": function.about, "lines": lines}
-
-
-__all__ = ["Ref", "c_files", "math_files", "render", "version"]

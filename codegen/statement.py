@@ -52,7 +52,7 @@ class Writer:
                 yield from self._assign(target, c_expression(value, self.place), value, key)
             case Store(array, index, value):
                 left = f"{self.place(array)}[{c_expression(index, self.place)}]"
-                yield from _wrapped(f"{left} = ", c_expression(value, self.place), "")
+                yield from wrapped(f"{left} = ", c_expression(value, self.place), "")
             case Branch(condition, then, other):
                 yield from self._branch(condition, then, other)
             case Choose(selector, cases):
@@ -73,7 +73,7 @@ class Writer:
         if isinstance(value, Value) and type(value.value) is int:
             text = self.place.whole(target, value.value)
         declared = f"const {self.types[target]} " if target in self.local else ""
-        yield from _wrapped(f"{declared}{self.place(target)} = ", text, key)
+        yield from wrapped(f"{declared}{self.place(target)} = ", text, key)
 
     def _branch(self, condition: object, then: Block, other: Block) -> Iterator[str]:
         test = c_expression(condition, self.place)  # type: ignore[arg-type]
@@ -114,7 +114,7 @@ def _comment(key: str) -> str:
     return f" /* {key} */" if key else ""
 
 
-def _wrapped(left: str, text: str, key: str) -> Iterator[str]:
+def wrapped(left: str, text: str, key: str) -> Iterator[str]:
     """Yield `left text;` with the key path cited, broken before operators where it is too long."""
     comment = _comment(key)
     if len(left) + len(text) + len(comment) <= WIDTH:
@@ -126,7 +126,7 @@ def _wrapped(left: str, text: str, key: str) -> Iterator[str]:
         yield f"{left}{text};"
         return
     pieces = textwrap.wrap(
-        re.sub(r" ([*/?:]|[<>=!]=?|&&) ", "\1\\g<1>\1", text)
+        re.sub(r" ([*/]|[<>=!]=?|&&) ", "\1\\g<1>\1", text)
         .replace(" + ", " +\1")
         .replace(" - ", " -\1"),
         width=WIDTH - 2 * len(INDENT),

@@ -58,8 +58,8 @@ def sign(x: float) -> float:
 
 
 def power_of_two(k: float) -> float:
-    """Return 2^k exactly, for a whole-valued k from -1022 to 1023."""
-    return math.ldexp(1.0, int(k)) if k == k else k
+    """Return 2^k exactly for a whole-valued k from -1022 to 1023, anything else as it is."""
+    return math.ldexp(1.0, int(k)) if -1022.0 <= k <= 1023.0 else k
 
 
 ELEMENTARY: Mapping[str, Callable[..., Scalar]] = {

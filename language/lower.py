@@ -209,9 +209,15 @@ def constant_of(automaton: Automaton, name: str, kind: str, value: float) -> Con
         kind=kind,  # type: ignore[arg-type]
         value=value,
         unit=si_text(automaton, name),
-        key=f"{automaton.name} {parameter.key}",
+        key=f"{_owner(automaton, name)} {parameter.key}",
         range=(rounded(limits[0]), rounded(limits[1])) if limits else None,
     )
+
+
+def _owner(automaton: Automaton, name: str) -> str:
+    """Return the automaton that declares a parameter: the model, or this one."""
+    model = automaton.model
+    return model.name if model and name in model.parameters else automaton.name
 
 
 def si_text(automaton: Automaton, name: str) -> str:

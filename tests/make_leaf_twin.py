@@ -4,7 +4,8 @@
 
 Two inertias and one backlash (Guercioni et al. 2018, eqs 1-9; Nordin's form of the gap) with the
 values of spec/nissan_leaf/leaf.yaml, over those of spec/ev_driveline/plant.yaml. It imports
-nothing of the product, so that it can be a witness against it. Same bytes on every run.
+nothing of the product, so that it can be a witness against it. Same bytes on every run. It
+prints when the gap is entered and left (time [s], mode), which the file does not tell.
 """
 
 from __future__ import annotations
@@ -56,32 +57,34 @@ def load(w_w: float) -> float:
     return A_AER * R_W**3 * w_w**2 + rolling + B_W * w_w
 
 
-def drive() -> tuple[np.ndarray, np.ndarray]:
-    """Return motor torque [N*m], motor and wheel speed [rad/s] per millisecond (n, 3).
+def drive() -> tuple[list[tuple[float, float, float]], list[tuple[float, int]]]:
+    """Return motor torque [N*m], motor and wheel speed [rad/s] of every millisecond.
 
-    The second value is the half-shaft torque [N*m] (n,). Semi-implicit Euler: at 0.1 ms the
-    times of contact are within 0.1 ms of those at 0.01 ms, far below one row.
+    And the changes of mode: time [s] and the new mode (1 drive, 0 gap, -1 coast). Semi-implicit
+    Euler: against a step of 0.01 ms these times are within 0.3 ms, the motor within 0.6 rpm.
     """
-    torque, w_w = command(0), START
+    torque, w_w, mode = command(0), START, 1
     w_em = R * w_w
     pull = (torque - B_EM * w_em + J_EM * R * load(w_w) / J_V) / (1 / R + J_EM * R / J_V)
     theta_d, theta_b = ALPHA + pull / K, ALPHA  # the twist of a steady pull
-    kept, shaft = [], []
+    kept, changes = [], []
     for step in range(ROWS * STEPS + 1):
         w_d = w_em / R - w_w
         w_b = w_d + K / C * (theta_d - theta_b)  # inside the gap
-        if (theta_b >= ALPHA and w_b > 0) or (theta_b <= -ALPHA and w_b < 0):
-            w_b = 0.0
+        side = (theta_b >= ALPHA and w_b > 0) - (theta_b <= -ALPHA and w_b < 0)
+        if side != mode:
+            mode = side
+            changes.append((step * STEP, mode))
+        w_b = 0.0 if mode else w_b
         T_hs = K * (theta_d - theta_b) + C * (w_d - w_b)
         if step % 10 == 0:
             kept.append((torque, w_em, w_w))
-            shaft.append(T_hs)
         torque += STEP / LAG * (command(step // STEPS) - torque)
         w_em += STEP / J_EM * (torque - T_hs / R - B_EM * w_em)
         w_w += STEP / J_V * (T_hs - load(w_w))
         theta_d += STEP * (w_em / R - w_w)
         theta_b = min(ALPHA, max(-ALPHA, theta_b + STEP * w_b))
-    return np.array(kept), np.array(shaft)
+    return kept, changes
 
 
 def rounded(value: float, quantum: float) -> str:
@@ -89,7 +92,7 @@ def rounded(value: float, quantum: float) -> str:
     return str(round(round(value / quantum) * quantum, 3))
 
 
-def rows(kept: np.ndarray) -> list[str]:
+def rows(kept: list[tuple[float, float, float]]) -> list[str]:
     """Return the lines of the recording; every second one has a wheel frame, with its time."""
     noise = np.random.RandomState(SEED)  # its stream is frozen, that of default_rng is not
     lines = []
@@ -114,4 +117,7 @@ def rows(kept: np.ndarray) -> list[str]:
 
 if __name__ == "__main__":
     target = Path(sys.argv[1]) if len(sys.argv) > 1 else TARGET
-    target.write_bytes("\n".join([HEAD, *rows(drive()[0]), ""]).encode("ascii"))
+    kept, changes = drive()
+    target.write_bytes("\n".join([HEAD, *rows(kept), ""]).encode("ascii"))
+    for time, mode in changes:
+        print(f"{time:.4f},{mode}")

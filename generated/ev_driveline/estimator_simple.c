@@ -19,11 +19,11 @@ static const struct {
     double alpha;
     double b_0;
 } constant = {
-    .R = 8.1, /* 1; estimator_simple parameters.R */
-    .J_v = 107.92499999999998, /* kg*m^2; estimator_simple parameters.J_v */
-    .k_hs = 4800.0, /* N*m/rad; estimator_simple parameters.k_hs; 1000.0 to 20000.0 */
-    .c_hs = 14.0, /* N*m*s/rad; estimator_simple parameters.c_hs; 1.0 to 200.0 */
-    .alpha = 0.0256, /* rad; estimator_simple parameters.alpha; 0.0 to 0.1 */
+    .R = 8.1, /* 1; driveline parameters.R */
+    .J_v = 107.92499999999998, /* kg*m^2; driveline parameters.J_v */
+    .k_hs = 4800.0, /* N*m/rad; driveline parameters.k_hs; 1000.0 to 20000.0 */
+    .c_hs = 14.0, /* N*m*s/rad; driveline parameters.c_hs; 1.0 to 200.0 */
+    .alpha = 0.0256, /* rad; driveline parameters.alpha; 0.0 to 0.1 */
     .b_0 = 21.505886015325668, /* N*m; estimator_simple parameters.b_0 */
 };
 

@@ -23,7 +23,7 @@ enum {
 
 /* Tunable parameters */
 typedef struct {
-    double J_em; /* kg*m^2; estimator_simple parameters.J_em; 0.01 to 0.2 */
+    double J_em; /* kg*m^2; driveline parameters.J_em; 0.01 to 0.2 */
 } estimator_simple_Cal;
 
 /* What follows from tunable parameters: estimator_simple_Derive */

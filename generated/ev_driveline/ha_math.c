@@ -16,7 +16,7 @@ double ha_pow2(double k)
 {
     double result = k;
 
-    if (k == k) {
+    if ((k >= -1022.0) && (k <= 1023.0)) {
         const uint64_t bits = (uint64_t)((int64_t)k + 1023) << 52;
         (void)memcpy(&result, &bits, sizeof result);
     }
@@ -38,13 +38,21 @@ double ha_sin(double x)
     const double square = head * head;
     const double half = 0.5 * square;
     const double crest = 1.0 - half;
-    const double sine_upper = 2.755731370700222e-06 + (square * ((-2.5050760240823352e-08) + (square * 1.5896909130064357e-10)));
-    const double sine_series = (-0.16666666666666632) + (square * (0.00833333333332249 + (square * ((-0.000198412698298578) + (square * sine_upper)))));
+    const double sine_upper = 2.755731370700222e-06 + (square * ((-2.5050760240823352e-08)
+        + (square * 1.5896909130064357e-10)));
+    const double sine_series =
+        (-0.16666666666666632) + (square * (0.00833333333332249 + (square * ((-0.000198412698298578)
+        + (square * sine_upper)))));
     const double sine = head + ((tail * crest) + (head * square * sine_series));
-    const double cosine_upper = (-2.7557314401028414e-07) + (square * (2.0875729280773627e-09 + (square * (-1.135993421169908e-11))));
-    const double cosine_series = 0.0416666666666666 + (square * ((-0.0013888888888874474) + (square * (2.4801587289671533e-05 + (square * cosine_upper)))));
-    const double cosine = crest + (1.0 - crest - half + ((square * square * cosine_series) - (head * tail)));
-    return (fabs(x) < 7.450580596923828e-09) ? x : ((quadrant < 0.5) ? sine : ((quadrant < 1.5) ? cosine : ((quadrant < 2.5) ? (-sine) : (-cosine))));
+    const double cosine_upper = (-2.7557314401028414e-07) + (square * (2.0875729280773627e-09
+        + (square * (-1.135993421169908e-11))));
+    const double cosine_series =
+        0.0416666666666666 + (square * ((-0.0013888888888874474) + (square * (2.4801587289671533e-05
+        + (square * cosine_upper)))));
+    const double cosine =
+        crest + (1.0 - crest - half + ((square * square * cosine_series) - (head * tail)));
+    return (fabs(x) < 7.450580596923828e-09) ? x : ((quadrant < 0.5) ? sine : ((quadrant < 1.5) ?
+        cosine : ((quadrant < 2.5) ? (-sine) : (-cosine))));
 }
 
 /* cosine; |x| <= 1e5 rad, clamped; error < 0.85 ULP */
@@ -62,26 +70,39 @@ double ha_cos(double x)
     const double square = head * head;
     const double half = 0.5 * square;
     const double crest = 1.0 - half;
-    const double sine_upper = 2.755731370700222e-06 + (square * ((-2.5050760240823352e-08) + (square * 1.5896909130064357e-10)));
-    const double sine_series = (-0.16666666666666632) + (square * (0.00833333333332249 + (square * ((-0.000198412698298578) + (square * sine_upper)))));
+    const double sine_upper = 2.755731370700222e-06 + (square * ((-2.5050760240823352e-08)
+        + (square * 1.5896909130064357e-10)));
+    const double sine_series =
+        (-0.16666666666666632) + (square * (0.00833333333332249 + (square * ((-0.000198412698298578)
+        + (square * sine_upper)))));
     const double sine = head + ((tail * crest) + (head * square * sine_series));
-    const double cosine_upper = (-2.7557314401028414e-07) + (square * (2.0875729280773627e-09 + (square * (-1.135993421169908e-11))));
-    const double cosine_series = 0.0416666666666666 + (square * ((-0.0013888888888874474) + (square * (2.4801587289671533e-05 + (square * cosine_upper)))));
-    const double cosine = crest + (1.0 - crest - half + ((square * square * cosine_series) - (head * tail)));
-    return (quadrant < 0.5) ? cosine : ((quadrant < 1.5) ? (-sine) : ((quadrant < 2.5) ? (-cosine) : sine));
+    const double cosine_upper = (-2.7557314401028414e-07) + (square * (2.0875729280773627e-09
+        + (square * (-1.135993421169908e-11))));
+    const double cosine_series =
+        0.0416666666666666 + (square * ((-0.0013888888888874474) + (square * (2.4801587289671533e-05
+        + (square * cosine_upper)))));
+    const double cosine =
+        crest + (1.0 - crest - half + ((square * square * cosine_series) - (head * tail)));
+    return (quadrant < 0.5) ? cosine : ((quadrant < 1.5) ? (-sine) : ((quadrant < 2.5) ? (-cosine) :
+        sine));
 }
 
 /* e^x; -708 <= x <= 709, clamped; error < 0.95 ULP */
 double ha_exp(double x)
 {
     const double bounded = (x > 709.0) ? 709.0 : ((x < (-708.0)) ? (-708.0) : x);
-    const double exponent = (bounded > (-708.0)) ? ((bounded * 1.4426950408889634) + 6755399441055744.0 - 6755399441055744.0) : (-1021.0);
+    const double exponent = (bounded > (-708.0)) ? ((bounded * 1.4426950408889634) + 6755399441055744.0
+        - 6755399441055744.0) : (-1021.0);
     const double head = bounded - (exponent * 0.6931471805598903);
     const double tail = exponent * 5.497923018708371e-14;
     const double r = head - tail;
-    const double upper = 2.7557558513417143e-06 + (r * (2.763019225057943e-07 + (r * 2.5007202378603645e-08)));
-    const double middle = 0.0013888888943694578 + (r * (0.00019841269546225928 + (r * (2.4801493177744308e-05 + (r * upper)))));
-    const double series = 0.5000000000000011 + (r * (0.16666666666666466 + (r * (0.041666666666528816 + (r * (0.00833333333347021 + (r * middle)))))));
+    const double upper =
+        2.7557558513417143e-06 + (r * (2.763019225057943e-07 + (r * 2.5007202378603645e-08)));
+    const double middle =
+        0.0013888888943694578 + (r * (0.00019841269546225928 + (r * (2.4801493177744308e-05
+        + (r * upper)))));
+    const double series = 0.5000000000000011 + (r * (0.16666666666666466 + (r * (0.041666666666528816
+        + (r * (0.00833333333347021 + (r * middle)))))));
     const double scaled = 1.0 + (head + ((r * r * series) - tail));
     return ha_pow2(exponent) * scaled;
 }
@@ -93,7 +114,9 @@ double ha_tanh(double x)
     const double bounded = (size > 20.0) ? 20.0 : size;
     const double square = bounded * bounded;
     const double above = 675675.0 + (square * (45045.0 + (square * (594.0 + square))));
-    const double below = 2027025.0 + (square * (945945.0 + (square * (51975.0 + (square * (630.0 + square))))));
-    const double magnitude = (bounded < 0.625) ? (bounded - (bounded * square * above / below)) : (1.0 - (2.0 / (ha_exp(bounded + bounded) + 1.0)));
+    const double below =
+        2027025.0 + (square * (945945.0 + (square * (51975.0 + (square * (630.0 + square))))));
+    const double magnitude = (bounded < 0.625) ? (bounded - (bounded * square * above / below)) : (1.0
+        - (2.0 / (ha_exp(bounded + bounded) + 1.0)));
     return (size < 7.450580596923828e-09) ? x : ((x < 0.0) ? (-magnitude) : magnitude);
 }

@@ -30,20 +30,20 @@ static const struct {
     double g;
     double b_0;
 } constant = {
-    .R = 8.1938, /* 1; leaf parameters.R */
-    .m = 1800.0, /* kg; leaf parameters.m; 800.0 to 2500.0 */
-    .r_w = 0.3183, /* m; leaf parameters.r_w */
-    .J_v = 185.16680200000005, /* kg*m^2; leaf parameters.J_v */
-    .k_hs = 9500.0, /* N*m/rad; leaf parameters.k_hs; 1000.0 to 20000.0 */
-    .c_hs = 60.0, /* N*m*s/rad; leaf parameters.c_hs; 1.0 to 200.0 */
-    .alpha = 0.017, /* rad; leaf parameters.alpha; 0.0 to 0.1 */
-    .b_em = 0.01, /* N*m*s/rad; leaf parameters.b_em */
-    .b_w = 0.2, /* N*m*s/rad; leaf parameters.b_w */
-    .a_aer = 0.378, /* kg/m; leaf parameters.a_aer */
-    .C_0 = 0.01, /* 1; leaf parameters.C_0 */
-    .C_1 = 1e-05, /* s/rad; leaf parameters.C_1 */
-    .C_2 = 1e-07, /* s^2/rad^2; leaf parameters.C_2 */
-    .g = 9.81, /* m/s^2; leaf parameters.g */
+    .R = 8.1938, /* 1; driveline parameters.R */
+    .m = 1800.0, /* kg; driveline parameters.m; 800.0 to 2500.0 */
+    .r_w = 0.3183, /* m; driveline parameters.r_w */
+    .J_v = 185.16680200000005, /* kg*m^2; driveline parameters.J_v */
+    .k_hs = 9500.0, /* N*m/rad; driveline parameters.k_hs; 1000.0 to 20000.0 */
+    .c_hs = 60.0, /* N*m*s/rad; driveline parameters.c_hs; 1.0 to 200.0 */
+    .alpha = 0.017, /* rad; driveline parameters.alpha; 0.0 to 0.1 */
+    .b_em = 0.01, /* N*m*s/rad; driveline parameters.b_em */
+    .b_w = 0.2, /* N*m*s/rad; driveline parameters.b_w */
+    .a_aer = 0.378, /* kg/m; driveline parameters.a_aer */
+    .C_0 = 0.01, /* 1; driveline parameters.C_0 */
+    .C_1 = 1e-05, /* s/rad; driveline parameters.C_1 */
+    .C_2 = 1e-07, /* s^2/rad^2; driveline parameters.C_2 */
+    .g = 9.81, /* m/s^2; driveline parameters.g */
     .b_0 = -40.91263893748038, /* N*m; leaf parameters.b_0 */
 };
 

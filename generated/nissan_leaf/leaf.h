@@ -31,7 +31,7 @@ enum {
 
 /* Tunable parameters */
 typedef struct {
-    double J_em; /* kg*m^2; leaf parameters.J_em; 0.01 to 0.2 */
+    double J_em; /* kg*m^2; driveline parameters.J_em; 0.01 to 0.2 */
 } leaf_Cal;
 
 /* What follows from tunable parameters: leaf_Derive */

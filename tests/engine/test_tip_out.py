@@ -35,7 +35,12 @@ def scenario(name: str, folder: Path) -> str:
     spec.mkdir()
     starts = ", ".join(
         f"plant.{state}: {first[state]} {unit}"
-        for state, unit in (("w_em", "rad/s"), ("w_w", "rad/s"), ("theta_d", "rad"), ("theta_b", "rad"))
+        for state, unit in (
+            ("w_em", "rad/s"),
+            ("w_w", "rad/s"),
+            ("theta_d", "rad"),
+            ("theta_b", "rad"),
+        )
     )
     (spec / "manoeuvre.yaml").write_text(
         f"language: 1\nscenario: manoeuvre\nof: ev_driveline_ideal\nhorizon: 2.5 s\n"
