@@ -23,7 +23,7 @@ for python in $(PYTHON) python3 python3.14 python3.13 python3.12 python3.11 ""; 
 done
 endef
 
-.PHONY: help setup demo test check format generate lock clean
+.PHONY: help setup demo test verify check format generate lock clean
 .PHONY: check-lock check-format check-lint check-types check-floors check-specs check-generated
 
 help: ## list the targets
@@ -49,6 +49,9 @@ test: export PYTHONUTF8 := 1
 test: export TZ := UTC
 test: setup ## run the tests, the same way everywhere
 	$(BIN)/pytest -n 2 -q $(ARGS)
+
+verify: setup ## measure every acceptance figure; with recordings: ARGS="--recordings DIR"
+	$(BIN)/python tests/verify/first_drive.py $(ARGS)
 
 check: check-lock check-format check-lint check-types ## run all checks
 check: check-floors check-specs check-generated

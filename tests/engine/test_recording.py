@@ -1,0 +1,349 @@
+"""Recording: what a file gives, and what each bad file is told."""
+
+from __future__ import annotations
+
+import gzip
+import math
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+from hypothesis import given, strategies as st
+
+from engine.recording import Channel, Recording, read_recording
+from language.map import read_map
+from language.model import RecordingMap
+from language.problem import SpecError, render_all
+from language.project import Project, read_document
+
+Read = Callable[..., Recording]
+Told = Callable[..., str]
+
+HEAD = "t_s,torque_Nm,speed_rpm\n"
+GOOD = HEAD + "0.01,92.5,2639\n0.02,91.0,\n0.03,-1.5,2640\n"
+COLUMNS = """\
+  torque_Nm: {to: T_em, unit: N*m}
+  speed_rpm: {to: y_em, unit: rpm, blank: skip}
+"""
+
+
+def made_map(folder: Path, columns: str, unit: str = "s") -> RecordingMap:
+    head = f"language: 1\nmap: bench\ntime: {{column: t_s, unit: {unit}}}\ncolumns:\n"
+    path = folder / "map.yaml"
+    path.write_text(head + columns, "utf-8")
+    return read_map(read_document(path), Project(folder))
+
+
+@pytest.fixture
+def read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Read:
+    """Return a function that writes a file `drive.csv` and reads it with a map."""
+    monkeypatch.chdir(tmp_path)
+
+    def reading(
+        data: str | bytes, columns: str = COLUMNS, name: str = "drive.csv", unit: str = "s"
+    ) -> Recording:
+        path = tmp_path / name
+        path.write_bytes(data.encode() if isinstance(data, str) else data)
+        mapping = made_map(tmp_path, columns, unit)
+        return read_recording(path, mapping, list(mapping.columns))
+
+    return reading
+
+
+@pytest.fixture
+def told(read: Read) -> Told:
+    """Return a function that gives the rendered problems of a bad file."""
+
+    def telling(data: str | bytes, columns: str = COLUMNS, name: str = "drive.csv") -> str:
+        with pytest.raises(SpecError) as caught:
+            read(data, columns, name)
+        return render_all(caught.value.problems)
+
+    return telling
+
+
+def told_of(path: Path, folder: Path) -> str:
+    mapping = made_map(folder, COLUMNS)
+    with pytest.raises(SpecError) as caught:
+        read_recording(path, mapping, list(mapping.columns))
+    return render_all(caught.value.problems)
+
+
+def only(recording: Recording) -> Channel:
+    (channel,) = recording.channels.values()
+    return channel
+
+
+class TestAGoodFile:
+    def test_it_gives_every_value_with_its_exact_time(self, read: Read) -> None:
+        torque = read(GOOD).channels["torque_Nm"]
+        assert torque.times == (Fraction(1, 100), Fraction(2, 100), Fraction(3, 100))
+        assert torque.values == (92.5, 91.0, -1.5)
+
+    def test_its_end_is_the_last_time_stamp(self, read: Read) -> None:
+        assert read(GOOD).end == Fraction(3, 100)
+
+    def test_it_is_known_by_its_file_name(self, read: Read) -> None:
+        assert read(GOOD).name == "drive.csv"
+
+    def test_blank_cells_are_left_out_where_the_map_skips_them(self, read: Read) -> None:
+        assert read(GOOD).channels["speed_rpm"].times == (Fraction(1, 100), Fraction(3, 100))
+
+    def test_columns_that_are_not_used_are_not_looked_at(self, read: Read) -> None:
+        recording = read("note,t_s,a,note\nx,1,5,\ny,2,6,z\n", "  a: {to: T_em, unit: N*m}\n")
+        assert only(recording).values == (5.0, 6.0)
+
+    def test_rpm_become_rad_per_second(self, read: Read) -> None:
+        speed = read(GOOD).channels["speed_rpm"].values
+        assert speed == pytest.approx((2639 * math.pi / 30, 2640 * math.pi / 30), rel=1e-15)
+
+    def test_km_per_h_become_m_per_second(self, read: Read) -> None:
+        channel = only(read("t_s,v\n1,36\n", "  v: {to: v, unit: km/h}\n"))
+        assert channel.values == pytest.approx((10.0,), rel=1e-15)
+
+    def test_degrees_celsius_become_kelvin(self, read: Read) -> None:
+        channel = only(read("t_s,T\n1,-40\n", "  T: {to: T, unit: degC}\n"))
+        assert channel.values == pytest.approx((233.15,), rel=1e-15)
+
+    def test_time_stamps_in_ms_become_exact_seconds(self, read: Read) -> None:
+        recording = read("t_s,a\n0.1,1\n2.5e1,2\n", "  a: {to: a, unit: A}\n", unit="ms")
+        assert only(recording).times == (Fraction(1, 10_000), Fraction(25, 1000))
+        assert recording.end == Fraction(25, 1000)
+
+    def test_sign_minus_one_turns_a_value_round(self, read: Read) -> None:
+        assert only(read("t_s,a\n1,5\n", "  a: {to: a, unit: A, sign: -1}\n")).values == (-5.0,)
+
+    def test_scale_is_a_factor_that_may_have_a_unit(self, read: Read) -> None:
+        columns = "  v: {to: w, unit: km/h, scale: 1 rad / 0.25 m}\n"
+        assert only(read("t_s,v\n1,36\n", columns)).values == pytest.approx((40.0,), rel=1e-15)
+
+    def test_delay_is_added_to_the_time_stamps_exactly(self, read: Read) -> None:
+        channel = only(read("t_s,a\n0.1,5\n0.2,6\n", "  a: {to: a, unit: A, delay: 7 ms}\n"))
+        assert channel.times == (Fraction(107, 1000), Fraction(207, 1000))
+
+    def test_mean_of_two_columns_has_a_value_where_both_have(self, read: Read) -> None:
+        columns = "  w: {mean: [a, b], to: w, unit: rad/s, blank: skip}\n"
+        channel = only(read("t_s,a,b\n1,10,11\n2,,9\n3,8,\n4,7,8\n", columns))
+        assert channel.values == (10.5, 7.5)
+        assert channel.times == (Fraction(1), Fraction(4))
+
+    def test_a_column_may_have_its_own_time_stamps(self, read: Read) -> None:
+        columns = "  w: {to: w, unit: rad/s, time: t_w, blank: skip}\n"
+        channel = only(read("t_s,w,t_w\n0.1,,\n0.2,5,0.195\n0.3,,\n0.4,6,0.393\n", columns))
+        assert channel.times == (Fraction(195, 1000), Fraction(393, 1000))
+        assert channel.values == (5.0, 6.0)
+
+    def test_columns_are_found_by_name_in_any_order(self, read: Read) -> None:
+        shuffled = "speed_rpm,t_s,torque_Nm\n2639,0.01,92.5\n,0.02,91.0\n2640,0.03,-1.5\n"
+        assert read(shuffled).channels == read(GOOD).channels
+
+    @pytest.mark.parametrize(
+        ("name", "data"),
+        [
+            ("drive.csv.gz", gzip.compress(GOOD.encode(), mtime=0)),
+            ("bom.csv", b"\xef\xbb\xbf" + GOOD.encode()),
+            ("crlf.csv", GOOD.replace("\n", "\r\n").encode()),
+            ("bom.csv.gz", gzip.compress(b"\xef\xbb\xbf" + GOOD.encode(), mtime=0)),
+            ("no_last_line_end.csv", GOOD.rstrip("\n").encode()),
+            ("spaces.csv", GOOD.replace(",", " , ").encode()),
+            ("empty_lines.csv", GOOD.replace("\n", "\n\n").encode()),
+            ("quoted.csv", GOOD.replace("92.5", '"92.5"').replace("t_s", '"t_s"').encode()),
+        ],
+    )
+    def test_the_same_file_in_another_form_gives_the_same_channels(
+        self, read: Read, name: str, data: bytes
+    ) -> None:
+        assert read(data, name=name).channels == read(GOOD).channels
+
+
+class TestAFileThatCannotBeRead:
+    def test_missing(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.chdir(tmp_path)
+        assert told_of(tmp_path / "drive.csv", tmp_path) == (
+            "drive.csv:1:1: error: the recording cannot be read: No such file or directory"
+        )
+
+    def test_directory(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.chdir(tmp_path)
+        (tmp_path / "drives").mkdir()
+        assert told_of(tmp_path / "drives", tmp_path) == (
+            "drives:1:1: error: the recording cannot be read: Is a directory"
+        )
+
+    @pytest.mark.parametrize("data", [b"", b"\n", b"  \r\n\n", b"\xef\xbb\xbf"])
+    def test_empty(self, told: Told, data: bytes) -> None:
+        assert told(data) == "drive.csv:1:1: error: the recording is empty"
+
+    def test_empty_and_packed(self, told: Told) -> None:
+        text = told(gzip.compress(b"", mtime=0), name="drive.csv.gz")
+        assert text == "drive.csv.gz:1:1: error: the recording is empty"
+
+    @pytest.mark.parametrize(
+        "data", [b"\x89PNG\r\n\x1a\n\0\0", b"t_s,a\n1,\0\n", GOOD.encode("utf-16"), b"\xb0C,1\n"]
+    )
+    def test_binary(self, told: Told, data: bytes) -> None:
+        assert told(data) == (
+            "drive.csv:1:1: error: this is not a text file\nhelp: a recording is CSV, or CSV.gz"
+        )
+
+    def test_named_gz_and_not_packed(self, told: Told) -> None:
+        assert told(GOOD, name="drive.csv.gz").startswith(
+            "drive.csv.gz:1:1: error: the recording cannot be read: Not a gzipped file"
+        )
+
+    def test_packed_and_cut_off(self, told: Told) -> None:
+        packed = gzip.compress(GOOD.encode(), mtime=0)
+        for length in range(1, len(packed)):
+            text = told(packed[:length], name="drive.csv.gz")
+            assert text.startswith("drive.csv.gz:1:1: error: the recording cannot be "), length
+            assert "\n" not in text
+
+    def test_packed_and_damaged(self, told: Told) -> None:
+        packed = bytearray(gzip.compress(GOOD.encode(), mtime=0))
+        packed[len(packed) // 2] ^= 0xFF
+        text = told(bytes(packed), name="drive.csv.gz")
+        assert text.startswith("drive.csv.gz:1:1: error: the recording cannot be ")
+
+
+class TestAHeadLine:
+    def test_alone(self, told: Told) -> None:
+        assert told(HEAD) == (
+            "drive.csv:1:1: error: the recording has a head line and no values\n"
+            "  t_s,torque_Nm,speed_rpm\n"
+            "  ^^^^^^^^^^^^^^^^^^^^^^^"
+        )
+
+    def test_with_a_column_missing_proposes_the_nearest(self, told: Told) -> None:
+        assert told(GOOD.replace("torque_Nm", "torqe_Nm")) == (
+            "drive.csv:1:1: error: there is no column `torque_Nm`, which map `bench` reads\n"
+            "  t_s,torqe_Nm,speed_rpm\n"
+            "  ^^^^^^^^^^^^^^^^^^^^^^\n"
+            "help: did you mean `torqe_Nm`?"
+        )
+
+    def test_with_several_columns_missing_tells_all_of_them(self, told: Told) -> None:
+        text = told("when,what\n1,2\n")
+        for name in ("t_s", "torque_Nm", "speed_rpm"):
+            assert f"error: there is no column `{name}`, which map `bench` reads" in text
+
+    def test_with_the_time_column_of_a_channel_missing(self, told: Told) -> None:
+        text = told("t_s,w\n1,2\n", "  w: {to: w, unit: rad/s, time: t_w}\n")
+        assert text.splitlines()[0] == (
+            "drive.csv:1:1: error: there is no column `t_w`, which map `bench` reads"
+        )
+
+    def test_with_a_column_twice(self, told: Told) -> None:
+        assert told("t_s,torque_Nm,speed_rpm,torque_Nm\n1,2,3,4\n") == (
+            "drive.csv:1:1: error: there are two columns `torque_Nm`\n"
+            "  t_s,torque_Nm,speed_rpm,torque_Nm\n"
+            "  ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^"
+        )
+
+
+class TestAValue:
+    @pytest.mark.parametrize("cell", ["NaN", "nan", "inf", "-Infinity", "1e999", "12x"])
+    def test_that_is_not_a_finite_number(self, told: Told, cell: str) -> None:
+        assert told(HEAD + f"0.01,92.5,2639\n0.02,{cell},2640\n") == (
+            f"drive.csv:3:6: error: `{cell}` in column `torque_Nm` is not a finite number\n"
+            f"  0.02,{cell},2640\n"
+            f"       {'^' * len(cell)}"
+        )
+
+    def test_that_is_text_is_refused_even_where_blanks_are_skipped(self, told: Told) -> None:
+        assert told(HEAD + "0.01,92.5,fast\n") == (
+            "drive.csv:2:11: error: `fast` in column `speed_rpm` is not a finite number\n"
+            "  0.01,92.5,fast\n"
+            "            ^^^^"
+        )
+
+    def test_that_is_blank_is_refused_by_default(self, told: Told) -> None:
+        assert told(HEAD + "0.01,92.5,2639\n0.02,,2640\n") == (
+            "drive.csv:3:6: error: `` in column `torque_Nm` is not a finite number\n"
+            "  0.02,,2640\n"
+            "       ^\n"
+            "help: `blank: skip` in the map leaves empty cells out"
+        )
+
+    def test_that_a_short_row_lacks_is_refused_like_a_blank(self, told: Told) -> None:
+        text = told(HEAD + "0.01,92.5,2639\n0.02\n")
+        assert text.splitlines()[0] == (
+            "drive.csv:3:6: error: `` in column `torque_Nm` is not a finite number"
+        )
+
+    def test_that_is_never_there_is_refused_even_where_blanks_are_skipped(self, told: Told) -> None:
+        text = told(HEAD + "0.01,92.5,\n0.02,91,\n")
+        assert text.splitlines()[0] == "drive.csv:1:1: error: column `speed_rpm` has no values"
+
+    def test_of_a_column_read_twice_is_told_once(self, told: Told) -> None:
+        columns = "  a: {to: T_em, unit: N*m}\n  b: {column: a, to: T_req, unit: N*m}\n"
+        assert told("t_s,a\n1,x\n", columns).count("error") == 1
+
+    def test_after_many_bad_ones_is_not_looked_at(self, told: Told) -> None:
+        text = told(HEAD + "".join(f"{row},x,1\n" for row in range(1, 1000)))
+        assert text.count("error") == 20
+
+    def test_that_is_bad_is_told_together_with_all_others_in_order(self, told: Told) -> None:
+        text = told(HEAD + "1,x,1\n2,5,y\n2,6,7\n4,z,8\n")
+        places = [line.split(": ")[0] for line in text.splitlines() if "error" in line]
+        assert places == ["drive.csv:2:3", "drive.csv:3:5", "drive.csv:4:1", "drive.csv:5:3"]
+
+
+class TestATimeStamp:
+    def test_below_the_one_before(self, told: Told) -> None:
+        assert told(HEAD + "0.02,1,1\n0.01,1,1\n") == (
+            "drive.csv:3:1: error: the time stamp 0.01 is not above the one before, 0.02\n"
+            "  0.01,1,1\n"
+            "  ^^^^\n"
+            "help: sort the recording, and remove repeated rows"
+        )
+
+    def test_that_is_repeated(self, told: Told) -> None:
+        assert told(HEAD + "0.01,1,1\n0.010,1,1\n") == (
+            "drive.csv:3:1: error: the time stamp 0.010 is not above the one before, 0.01\n"
+            "  0.010,1,1\n"
+            "  ^^^^^\n"
+            "help: sort the recording, and remove repeated rows"
+        )
+
+    def test_that_is_missing(self, told: Told) -> None:
+        assert told(HEAD + "0.01,1,1\n,1,1\n0.03,1,1\n") == (
+            "drive.csv:3:1: error: no time stamp\n  ,1,1\n  ^"
+        )
+
+    @pytest.mark.parametrize("cell", ["NaN", "inf", "12:30:01", "x", "1_0", "0x1F", "1e15"])
+    def test_that_is_not_a_number(self, told: Told, cell: str) -> None:
+        assert told(HEAD + f"0.01,1,1\n{cell},1,1\n") == (
+            f"drive.csv:3:1: error: the time stamp `{cell}` is not a number\n"
+            f"  {cell},1,1\n"
+            f"  {'^' * len(cell)}"
+        )
+
+    def test_of_a_channel_of_its_own_is_checked_too(self, told: Told) -> None:
+        columns = "  w: {to: w, unit: rad/s, time: t_w, blank: skip}\n"
+        text = told("t_s,w,t_w\n0.1,5,0.095\n0.2,,\n0.3,6,0.095\n", columns)
+        assert text.splitlines()[0] == (
+            "drive.csv:4:7: error: the time stamp 0.095 is not above the one before, 0.095"
+        )
+
+
+@given(
+    st.one_of(
+        st.binary(max_size=80), st.text("t_s,a\n\r 0123456789.+-\"'xn\0é\u2028").map(str.encode)
+    )
+)
+def test_any_bytes_are_a_recording_or_a_problem(
+    tmp_path_factory: pytest.TempPathFactory, data: bytes
+) -> None:
+    folder = tmp_path_factory.getbasetemp()
+    path = folder / "any.csv"
+    path.write_bytes(b"t_s,a\n0,1\n" + data)
+    mapping = made_map(folder, "  a: {to: a, unit: A, blank: skip}\n")
+    try:
+        channel = read_recording(path, mapping, ["a"]).channels["a"]
+    except SpecError as error:
+        assert render_all(error.problems)
+    else:
+        assert len(channel.times) == len(channel.values) > 0
+        assert list(channel.times) == sorted(set(channel.times))
+        assert all(math.isfinite(value) for value in channel.values)

@@ -1,0 +1,96 @@
+"""Making: documents, models and Programs out of texts, and what the user is told about a text."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+from typing import TypeVar
+
+from engine.interpreter import Interpreter
+from language.document import Document, Scalar
+from language.load import automaton_of, program_of
+from language.model import Automaton
+from language.parse import parse_expression
+from language.problem import Problem, Problems, Source, Span, SpecError
+from language.program import Program
+from language.project import Project, document_of, read_document
+from language.syntax import Tree
+from language.units import Dimension, parse_unit
+
+ROOT = Path(__file__).parents[2]
+SHIPPED = Project(ROOT)
+NOWHERE = Span(Source("nowhere"), 1, 1)
+
+Made = TypeVar("Made")
+
+
+def scalar(text: str, name: str = "here") -> Scalar:
+    return Scalar(text, Span(Source(name, (text,)), 1, 1, max(1, len(text))))
+
+
+def tree(text: str) -> Tree:
+    return parse_expression(scalar(text))
+
+
+def document(text: str, name: str = "here.yaml") -> Document:
+    return document_of(Source(name, tuple(text.splitlines())), text)
+
+
+def automaton(text: str, project: Project = SHIPPED, **values: str) -> Automaton:
+    given = {name: scalar(value) for name, value in values.items()}
+    return automaton_of(document(text), project, given)
+
+
+def program(text: str, project: Project = SHIPPED, **values: str) -> Program:
+    return program_of(automaton(text, project, **values))
+
+
+def stepper(text: str, project: Project = SHIPPED, **values: str) -> Interpreter:
+    return Interpreter(program(text, project, **values))
+
+
+def shipped(name: str, **values: str) -> Automaton:
+    given = {key: scalar(value) for key, value in values.items()}
+    return automaton_of(read_document(SHIPPED.path_of(name)), SHIPPED, given)
+
+
+def project_of(folder: Path, **files: str) -> Project:
+    """Return a project of some files: `spec/<name>.yaml`."""
+    (folder / "spec").mkdir(exist_ok=True)
+    for name, text in files.items():
+        (folder / "spec" / f"{name}.yaml").write_text(text, "utf-8")
+    return Project(folder)
+
+
+def solved(made: Program) -> dict[str, float]:
+    """Return the constants of a Program by name."""
+    return {constant.name: constant.value for constant in made.constants}
+
+
+def dimension(unit: str) -> Dimension:
+    return parse_unit(unit).dimension
+
+
+def si(text: str) -> Fraction:
+    """Return a literal such as `3 deg` in SI, exactly."""
+    number, _, unit = text.partition(" ")
+    return Fraction(number) * parse_unit(unit or "1").factor
+
+
+def refusal(make: Callable[[], object]) -> tuple[Problem, ...]:
+    """Return the problems that something is refused with; () if it is not."""
+    try:
+        make()
+    except SpecError as error:
+        return tuple(dict.fromkeys(error.problems))
+    return ()
+
+
+def told(make: Callable[[], object]) -> list[str]:
+    """Return what the user is told: `line:column label` of each problem."""
+    return [f"{p.span.line}:{p.span.column} {p.label}" for p in refusal(make)]
+
+
+def labels(problems: Problems) -> list[str]:
+    return [problem.label for problem in problems.found]
