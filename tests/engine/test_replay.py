@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import gzip
 import subprocess
 import sys
 from collections.abc import Callable
@@ -32,14 +31,19 @@ TWIN = ROOT / "tests/data/leaf_twin/drive_twin.csv"
 TWIN_SCRIPT = ROOT / "tests/make_leaf_twin.py"
 ESTIMATORS = ("estimator", "estimator_simple")
 
+Moment = tuple[int, int, int]
+"""A transition: its tick [ms], mode before, mode after."""
+
 TRACES = tuple(
     f"{name}_1kHz{noise}" for name in ("tip_out", "tip_in", "step") for noise in ("", "_noisy")
 )
-ALPHA = 0.0256
-"""Half of the gap [rad] in the reference traces."""
-TORQUE_ERROR = {"tip_out": 0.7, "tip_in": 3.0, "step": 3.0}
-"""Root mean square [N*m] against the reference's half-shaft torque, of up to 580 N*m: all of it
-stems from ticks in which one of the two is still in the gap, and from the first 50 ms."""
+TORQUE_ERROR = 1.2
+"""Root mean square [N*m] against the half-shaft torque of the reference, of up to 580 N*m: it
+stems from the ticks in which one of the two is still in the gap, one tick of 10 at most."""
+POSITION_ERROR = 1e-5
+"""The same of theta_b [rad], of up to 0.0256 rad."""
+ARRIVAL = 3.0
+"""Contact is told at most so late [ms]: loss is seen up to 2 ms late, the wait takes a tick."""
 
 NEAR = 0.15
 """The estimators leave drive contact that close [s] to the zero crossing of the torque report,
@@ -79,25 +83,14 @@ def loaded(
     return Loaded(automaton, program_of(automaton), mapping, recording)
 
 
-def trace(name: str) -> Path:
-    return PAPER / f"est_paper_{name}.csv.gz"
-
-
-def reference_events(name: str) -> list[tuple[int, int, int]]:
-    """Return tick [ms], mode before and mode after of the reference's transitions."""
+def reference_events(name: str) -> list[Moment]:
+    """Return the transitions of the reference."""
     with (PAPER / f"est_paper_{name}_events.csv").open() as file:
         rows = list(csv.DictReader(file))
     return [(round(1000 * float(row["t"])), int(row["from"]), int(row["to"])) for row in rows]
 
 
-def reference_contact(name: str, tick: int) -> int:
-    """Return the tick in which the reference's own theta_b came to the stop before `tick`."""
-    with gzip.open(trace(name), "rt") as file:
-        inside = [abs(float(row["theta_b"])) < ALPHA for row in csv.DictReader(file)]
-    return max(k for k in range(tick) if inside[k]) + 1
-
-
-def own_events(result: Replay) -> list[tuple[int, int, int]]:
+def own_events(result: Replay) -> list[Moment]:
     numbers = {name: number for number, name in result.trajectory.modes["mode"].items()}
     return [
         (round(1000 * event.time), numbers[event.source], numbers[event.target])
@@ -123,10 +116,18 @@ def assert_one_clean_tip_out(events: tuple[Event, ...], crossing: float) -> None
 
 
 @cache
-def both(name: str) -> tuple[list[tuple[int, int, int]], list[tuple[int, int, int]]]:
+def replayed_trace(name: str) -> Replay:
+    return loaded(PAPER / f"est_paper_{name}.csv.gz", "reference_trace", "estimator").replayed()
+
+
+@cache
+def replayed_twin(name: str) -> Replay:
+    return loaded(TWIN, "leaf_can", name, "leaf").replayed()
+
+
+def both(name: str) -> tuple[list[Moment], list[Moment]]:
     """Return our transitions in a reference trace, and those of the reference."""
-    ours = own_events(loaded(trace(name), "reference_trace", "estimator").replayed())
-    return ours, reference_events(name)
+    return own_events(replayed_trace(name)), reference_events(name)
 
 
 @pytest.fixture(scope="module")
@@ -136,7 +137,7 @@ def twin() -> Loaded:
 
 @pytest.fixture(scope="module")
 def golden() -> Replay:
-    return loaded(trace("tip_out_1kHz"), "reference_trace", "estimator").replayed()
+    return replayed_trace("tip_out_1kHz")
 
 
 class TestTheReferenceTraces:
@@ -146,43 +147,31 @@ class TestTheReferenceTraces:
         assert [event[1:] for event in ours] == [event[1:] for event in theirs]
 
     @pytest.mark.parametrize("name", TRACES)
+    def test_give_each_transition_within_one_tick_of_the_reference(self, name: str) -> None:
+        ours, theirs = both(name)
+        assert all(abs(a[0] - b[0]) <= 1 for a, b in zip(ours, theirs, strict=True))
+
+    @pytest.mark.parametrize("name", TRACES)
     def test_lose_contact_in_the_same_tick_as_the_reference(self, name: str) -> None:
         ours, theirs = both(name)
         assert [e for e in ours if e[2] == 0] == [e for e in theirs if e[2] == 0]
 
-    @pytest.mark.parametrize("name", TRACES)
-    def test_come_to_the_stop_within_one_tick_of_the_reference(self, name: str) -> None:
-        for (tick, before, _), (late, _, _) in zip(*both(name), strict=True):
-            if before == 0:
-                assert reference_contact(name, late) - tick in (0, 1)
-
-    @pytest.mark.parametrize("name", TRACES)
-    def test_tell_contact_one_tick_earlier_for_the_reference_looks_at_the_tick_before(
-        self, name: str
-    ) -> None:
-        for (tick, before, _), (late, _, _) in zip(*both(name), strict=True):
-            if before == 0:
-                assert late - reference_contact(name, late) == 1
-                assert late - tick in (1, 2)
-
     @pytest.mark.parametrize("name", ["tip_out", "tip_in"])
-    def test_contact_begins_in_the_first_tick_after_it_does_in_the_plant(self, name: str) -> None:
-        ours = own_events(loaded(trace(f"{name}_1kHz"), "reference_trace", "estimator").replayed())
+    def test_give_contact_after_it_began_in_the_plant(self, name: str) -> None:
         with (PAPER / f"truth_{name}_events.csv").open() as file:
             plant = [1000 * float(row["t"]) for row in csv.DictReader(file) if row["from"] == "0"]
+        ours, _ = both(f"{name}_1kHz")
         contacts = [tick for tick, before, _ in ours if before == 0 and tick > 478]
         late = [tick - time for tick, time in zip(contacts, plant, strict=True)]
-        assert 0 <= late[0] < 1
-        assert all(-1 < tick < 3 for tick in late), late  # after a loss seen 1 to 2 ms late
+        assert all(0 <= milliseconds < ARRIVAL for milliseconds in late), late
 
     @pytest.mark.parametrize("name", TRACES)
-    def test_give_the_torque_of_the_reference(self, name: str) -> None:
-        result = loaded(trace(f"{name}_1kHz"), "reference_trace", "estimator").replayed()
-        torque, position = result.comparisons
+    def test_give_the_torque_and_the_gap_position_of_the_reference(self, name: str) -> None:
+        torque, position = replayed_trace(name).comparisons
         assert (torque.output, torque.unit) == ("T_hs", "N*m")
-        assert torque.rms < TORQUE_ERROR[name]
+        assert torque.rms < TORQUE_ERROR
         assert (position.output, position.unit) == ("theta_b", "rad")
-        assert position.rms < 1e-5
+        assert position.rms < POSITION_ERROR
 
     def test_golden_the_estimated_torque_is_first_below_zero_at_507_ms(
         self, golden: Replay
@@ -203,7 +192,7 @@ class TestTheReferenceTraces:
     def test_without_noise_an_innovation_is_that_of_the_hand_over_alone(
         self, golden: Replay
     ) -> None:
-        noisy = loaded(trace("tip_out_1kHz_noisy"), "reference_trace", "estimator").replayed()
+        noisy = replayed_trace("tip_out_1kHz_noisy")
         assert golden.innovation_rms["y_w"] < 0.005
         assert noisy.innovation_rms["y_w"] == pytest.approx(0.05, rel=0.1)
 
@@ -219,13 +208,13 @@ class TestTheTwin:
 
     @pytest.mark.parametrize("name", ESTIMATORS)
     def test_leaves_drive_contact_once_and_reaches_coast_contact(self, name: str) -> None:
-        result = loaded(TWIN, "leaf_can", name, "leaf").replayed()
+        result = replayed_twin(name)
         before_tip_in = tuple(e for e in result.trajectory.events if e.time < 12.5)
         assert_one_clean_tip_out(before_tip_in, TWIN_CROSSING)
 
     @pytest.mark.parametrize("name", ESTIMATORS)
     def test_returns_to_drive_contact_after_the_tip_in(self, name: str) -> None:
-        result = loaded(TWIN, "leaf_can", name, "leaf").replayed()
+        result = replayed_twin(name)
         later = [(e.source, e.target) for e in result.trajectory.events if e.time >= 12.5]
         assert later == [("coast", "gap"), ("gap", "drive")]
         assert result.trajectory.signals["mode"][-1] == 1
@@ -251,7 +240,7 @@ class TestTheTwin:
                 pairs.append((stepper.get(f"is_new.{name}"), stepper.get(f"innovation.{name}")))
 
         twin.replayed(look)
-        for name, frames in {"y_em": 1499, "y_w": 750}.items():
+        for name, frames in {"y_em": 1500, "y_w": 750}.items():
             assert sum(is_new for is_new, _ in seen[name]) == frames
             assert all(value == 0 for is_new, value in seen[name] if not is_new)
             assert sum(value != 0 for is_new, value in seen[name] if is_new) > 0.9 * frames
@@ -408,7 +397,8 @@ class TestAMap:
                 "  a: {to: a, unit: A}\n  c: {compare: totl, unit: A}\n",
                 "spec/bench.yaml:6:3: error: `totl` is not an output of `echo`\n"
                 "    c: {compare: totl, unit: A}\n"
-                "    ^",
+                "    ^\n"
+                "help: did you mean `total`?",
             ),
         ],
         ids=["input without value", "dimension", "fed twice", "unknown output"],
@@ -424,3 +414,17 @@ class TestAMap:
         ready = echoed("  a: {to: a, unit: A, delay: 1 s}\n", "t,a\n0,1\n0.5,2\n")
         with pytest.raises(SpecError, match="ticks"):
             ready.replayed()
+
+    @pytest.mark.xfail(reason="used_columns checks the dimension of `to` only", strict=True)
+    def test_that_compares_another_dimension_is_told(self, echoed: Callable[..., Loaded]) -> None:
+        columns = "  a: {to: a, unit: A}\n  b: {compare: total, unit: rpm}\n"
+        with pytest.raises(SpecError):
+            echoed(columns, "t,a,b\n0,1,1\n")
+
+    @pytest.mark.xfail(reason="constants are not checked", strict=True)
+    @pytest.mark.parametrize("constant", ["b: 5 V", "bb: 5 A"], ids=["dimension", "name"])
+    def test_with_a_constant_that_does_not_fit_is_told(
+        self, echoed: Callable[..., Loaded], constant: str
+    ) -> None:
+        with pytest.raises(SpecError):
+            echoed(f"  a: {{to: a, unit: A}}\nconstants: {{{constant}}}\n", "t,a\n0,1\n")

@@ -197,7 +197,6 @@ def test_a_range_is_converted_with_its_zero() -> None:
 
 
 def test_a_degree_celsius_in_a_product_is_a_kelvin() -> None:
-    assert parse_unit("J/degC") == parse_unit("J/degC")
     assert parse_unit("J/degC").offset == 0
     assert parse_unit("J/degC").dimension == parse_unit("J/K").dimension
 
@@ -240,12 +239,16 @@ def test_fitting_is_mutual_and_a_sum_has_the_exact_angle(a: Dimension, b: Dimens
         assert together.angle == (b.angle if a.angle is None else a.angle)
 
 
+def bounds(low: int, high: int | Fraction) -> tuple[Fraction, Fraction]:
+    return Fraction(low), Fraction(high)
+
+
 def test_units_convert_where_a_value_is_declared() -> None:
     text = """language: 1
 automaton: declared
 parameters:
   v: {value: 36 km/h, range: [0, 72]}
-  n: {value: 60, unit: rpm, range: [0 rpm, 2 rev/s]}
+  f: {value: 60, unit: rpm, range: [0 rpm, 2 rev/s]}
   T: {value: 20 degC, range: [-10, 40]}
   c: {value: -10, unit: degC}
   d: {value: -10 degC}
@@ -257,11 +260,12 @@ modes: {only: {}}
     made = automaton(text)
     values = {name: thing.value for name, thing in made.parameters.items()}
     assert values["v"] == 10
-    assert made.parameters["v"].range == (0, 20)
-    assert math.isclose(values["n"] or 0, 2 * math.pi)
-    assert made.parameters["n"].range == (0, si("2 rev/s"))
+    assert made.parameters["v"].range == bounds(0, 20)
+    assert math.isclose(values["f"] or 0, 2 * math.pi)
+    assert made.parameters["f"].range == bounds(0, si("2 rev/s"))
     assert values["T"] == Fraction(29315, 100)
     assert made.parameters["T"].range == (Fraction(26315, 100), Fraction(31315, 100))
     assert values["c"] == values["d"] == Fraction(26315, 100)
-    assert (made.inputs["p"].default, made.inputs["p"].range) == (2 * 10**5, (0, 5 * 10**5))
+    assert made.inputs["p"].default == 2 * 10**5
+    assert made.inputs["p"].range == bounds(0, 5 * 10**5)
     assert made.states["x"].range == (Fraction(-5, 1000), Fraction(5, 1000))

@@ -66,7 +66,7 @@ def _constants(a: float, b: float, p: float) -> tuple[Constant, ...]:
         Constant("calibration.p", "tunable", p),
         Constant("derived.c", "derived", 0.0),
         Constant("derived.d", "derived", 0.0),
-        Constant("solved.stamp_p", "solved", p, depends_on=("calibration.p",)),
+        Constant("solved.stamp_p", "solved", p, depends_on=("p",)),
     )
 
 
