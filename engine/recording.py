@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import csv
 import gzip
+import io
 import math
+import re
 import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -17,7 +19,10 @@ from language.project import shown
 
 MAX_BYTES = 512 * 1024 * 1024
 """Largest recording read, unpacked."""
-DECIMALS = frozenset("0123456789+-.eE")
+DECIMAL = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,3})?", re.ASCII)
+LONGEST_STAMP = 40
+LATEST_TIME = 10**12
+"""Time stamps are below this, in their unit."""
 MAX_PROBLEMS = 20
 """After so many problems of values the rest is not looked at."""
 
@@ -45,8 +50,8 @@ def read_recording(path: Path, mapping: RecordingMap, used: Sequence[str]) -> Re
     source = Source(shown(path))
     lines = _read_lines(path, source)
     source = Source(source.name, tuple(lines))
-    rows = _Rows(source)
     problems = Problems()
+    rows = _Rows(source, problems)
     columns = [mapping.columns[name] for name in used]
     wanted = [name for column in columns for name in column.columns]
     wanted += [column.time for column in columns if column.time]
@@ -70,7 +75,10 @@ def _read_lines(path: Path, source: Source) -> list[str]:
             problems.stop_if_any()
         data = path.read_bytes()
         if path.suffix == ".gz":
-            data = gzip.decompress(data)
+            data = gzip.GzipFile(fileobj=io.BytesIO(data)).read(MAX_BYTES + 1)
+        if len(data) > MAX_BYTES:
+            problems.error("huge", place, f"the recording is larger than {MAX_BYTES} bytes")
+            problems.stop_if_any()
         text = data.decode("utf-8-sig")
     except OSError as error:
         reason = error.strerror or str(error)
@@ -91,14 +99,31 @@ def _read_lines(path: Path, source: Source) -> list[str]:
 class _Rows:
     """The cells of a CSV text, each with its place."""
 
-    def __init__(self, source: Source) -> None:
+    def __init__(self, source: Source, problems: Problems) -> None:
         self.source = source
-        reader = csv.reader(source.lines)
-        self.head = [cell.strip() for cell in next(reader)]
+        self.head: list[str] = []
         self.rows: list[tuple[int, list[str]]] = []
-        for row in reader:
-            if row:
-                self.rows.append((reader.line_num, row))
+        for number, line in enumerate(source.lines, start=1):
+            if not line.strip():
+                continue
+            row = self._cells_of(number, line, problems)
+            if not self.head:
+                self.head = [cell.strip() for cell in row]
+            elif len(row) != len(self.head):
+                label = f"this row has {len(row)} cells, the head line has {len(self.head)}"
+                hint = "a recording is separated by commas, with decimal points"
+                problems.error("row", Span(source, number, 1, len(line)), label, hint)
+            else:
+                self.rows.append((number, row))
+            if len(problems.found) >= MAX_PROBLEMS:
+                break
+
+    def _cells_of(self, number: int, line: str, problems: Problems) -> list[str]:
+        try:
+            return next(csv.reader([line], strict=True))
+        except csv.Error as error:
+            problems.error("row", Span(self.source, number, 1, len(line)), f"not CSV: {error}")
+            return [""] * len(self.head)
 
     def require(self, names: Sequence[str], mapping: RecordingMap, problems: Problems) -> None:
         head = Span(self.source, 1, 1, max(1, len(self.source.lines[0])))
@@ -156,14 +181,20 @@ class _Rows:
         times: list[Fraction] = []
         kept: list[float] = []
         scale = float(column.scale[0]) * column.sign
-        for stamp, *cells in zip(stamps, *values, strict=False):
-            if stamp is None or any(cell is None for cell in cells):
+        for (number, row), stamp, *cells in zip(self.rows, stamps, *values, strict=False):
+            if any(cell is None for cell in cells):
                 continue
-            total = 0.0
-            for cell in cells:
-                total += cell or 0.0
+            place = self.span(number, row, self.head.index(column.columns[0]))
+            if stamp is None:
+                if column.time and not row[self.head.index(column.time)].strip():
+                    label = f"a value of `{column.name}` without a time stamp"
+                    problems.error("time", place, label)
+                continue
+            value = _mean(cells) * scale
+            if not math.isfinite(value):
+                problems.error("value", place, f"`{column.name}` is {value} in SI")
             times.append(stamp + column.delay)
-            kept.append(total / len(cells) * scale)
+            kept.append(value)
         if not times and not problems.has_errors:
             place = Span(self.source, 1, 1, max(1, len(self.source.lines[0])))
             problems.error("empty", place, f"column `{column.columns[0]}` has no values")
@@ -175,29 +206,32 @@ class _Rows:
         for line, row, position, text in self.cells(name):
             if len(problems.found) >= MAX_PROBLEMS:
                 break
-            value: float | None = None
-            if text or column.blank == "refuse":
-                value = _real(text)
-                if value is None or not math.isfinite(value):
-                    label = f"`{text}` in column `{name}` is not a finite number"
-                    hint = "" if text else "`blank: skip` in the map leaves empty cells out"
-                    problems.error("value", self.span(line, row, position), label, hint)
+            value = _real(text)
+            if text and (value is None or not math.isfinite(value)):
+                label = f"`{text}` in column `{name}` is not a finite number"
+                problems.error("value", self.span(line, row, position), label)
+                value = None
+            elif not text and column.blank == "refuse":
+                label = f"column `{name}` has no value here"
+                hint = "`blank: skip` in the map leaves empty cells out"
+                problems.error("value", self.span(line, row, position), label, hint)
             found.append(None if value is None else value * factor + offset)
         return found
 
 
+def _mean(cells: Sequence[float | None]) -> float:
+    total = 0.0
+    for cell in cells:
+        total += cell or 0.0
+    return total / len(cells)
+
+
 def _exact(text: str) -> Fraction | None:
-    if not text or not DECIMALS.issuperset(text) or len(text) > 40:
+    if len(text) > LONGEST_STAMP or not DECIMAL.fullmatch(text):
         return None
-    try:
-        value = Fraction(text)
-    except (ValueError, ZeroDivisionError):
-        return None
-    return value if abs(value) < 10**12 else None
+    value = Fraction(text)
+    return value if abs(value) < LATEST_TIME else None
 
 
 def _real(text: str) -> float | None:
-    try:
-        return float(text)
-    except ValueError:
-        return None
+    return float(text) if DECIMAL.fullmatch(text) else None

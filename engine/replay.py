@@ -14,10 +14,10 @@ from engine.interpreter import Interpreter, Stepper
 from engine.recording import Channel, Recording
 from engine.trajectory import Event, Trajectory, Values, column_array
 from language.map import column_dimension
-from language.model import Automaton, RecordingMap
+from language.model import Automaton, Column, RecordingMap
 from language.problem import Problems, SpecError, nearest
 from language.program import Program
-from language.units import fits
+from language.units import NUMBER, Dimension, fits
 
 MAX_TICKS = 20_000_000
 """Most ticks of one replay."""
@@ -54,23 +54,23 @@ def used_columns(automaton: Automaton, mapping: RecordingMap) -> tuple[list[str]
     problems = Problems()
     used, left_out = [], []
     fed = set(mapping.constants)
+    _check_constants(automaton, mapping, problems)
     for column in mapping.columns.values():
         if column.compare is not None:
             if column.compare not in automaton.outputs:
                 label = f"`{column.compare}` is not an output of `{automaton.name}`"
-                problems.error(
-                    "name", column.span, label, nearest(column.compare, automaton.outputs)
-                )
+                hint = nearest(column.compare, automaton.outputs)
+                problems.error("name", column.span, label, hint)
+            else:
+                want = automaton.dimensions.get(column.compare, NUMBER)
+                _check_dimension(column, want, f"output `{column.compare}`", problems)
             used.append(column.name)
             continue
         thing = automaton.inputs.get(column.to or "")
         if thing is None:
             left_out.append(column.name)
             continue
-        if not fits(column_dimension(column), thing.unit.dimension):
-            label = f"column `{column.name}` is in `{column_dimension(column)}`"
-            hint = f"input `{thing.name}` is in `{thing.unit.dimension}`"
-            problems.error("dimension", column.span, label, hint)
+        _check_dimension(column, thing.unit.dimension, f"input `{thing.name}`", problems)
         if thing.name in fed:
             problems.error("duplicate", column.span, f"input `{thing.name}` is fed twice")
         fed.add(thing.name)
@@ -80,6 +80,7 @@ def used_columns(automaton: Automaton, mapping: RecordingMap) -> tuple[list[str]
             label = f"map `{mapping.name}` gives no value for input `{name}` of `{automaton.name}`"
             problems.error("missing", mapping.span, label, nearest(name, left_out))
     problems.stop_if_any()
+    left_out += [name for name in mapping.constants if name not in automaton.inputs]
     return used, left_out
 
 
@@ -95,7 +96,8 @@ def replay(
 
     The first tick is where every input has had a value; tick k is k periods later.
     """
-    assert program.period is not None
+    if program.period is None:
+        raise ValueError(f"{program.name} is continuous: only a sampled automaton is replayed")
     stepper = build(program)
     feeds = [c for c in recording.channels.values() if c.column.to is not None]
     start = max(channel.times[0] for channel in feeds) if feeds else Fraction(0)
@@ -105,13 +107,13 @@ def replay(
         label = f"the recording spans {count} ticks of {program.period} s; 1 to {MAX_TICKS} is fine"
         problems.error("range", mapping.span, label)
         raise SpecError(problems.found)
-    cursors = [_Cursor(channel, f"input.{channel.column.to}") for channel in feeds]
+    cursors = [_Cursor(channel, program) for channel in feeds]
     _set_constants(automaton, program, mapping, stepper)
     keep = _Kept(program, [cursor.target for cursor in cursors])
     for tick in range(count):
         time = start + tick * program.period
         for cursor in cursors:
-            cursor.advance(time, stepper, program)
+            cursor.advance(time, stepper)
         stepper.run("step")
         keep.row(time, stepper)
         if ticked:
@@ -121,30 +123,54 @@ def replay(
     return Replay(
         trajectory,
         keep.innovation_rms(),
-        tuple(_compared(channel, trajectory, start, program) for channel in compared),
+        tuple(
+            found
+            for channel in compared
+            if (found := _compared(channel, trajectory, start, program))
+        ),
     )
+
+
+def _check_dimension(column: Column, want: Dimension, what: str, problems: Problems) -> None:
+    if not fits(column_dimension(column), want):
+        label = f"column `{column.name}` is in `{column_dimension(column)}`"
+        problems.error("dimension", column.span, label, f"{what} is in `{want}`")
+
+
+def _check_constants(automaton: Automaton, mapping: RecordingMap, problems: Problems) -> None:
+    """Constants for inputs that this automaton lacks are for another one that the map serves."""
+    for name, (_, dimension) in mapping.constants.items():
+        thing = automaton.inputs.get(name)
+        if thing and not fits(dimension, thing.unit.dimension):
+            label = f"constant `{name}` is in `{dimension}`"
+            hint = f"input `{name}` is in `{thing.unit.dimension}`"
+            problems.error("dimension", mapping.span, label, hint)
 
 
 class _Cursor:
     """A channel and how far it has been read."""
 
-    def __init__(self, channel: Channel, target: str) -> None:
+    def __init__(self, channel: Channel, program: Program) -> None:
         self.channel = channel
-        self.target = target
+        self.target = f"input.{channel.column.to}"
         self.position = 0
+        kinds = {variable.name: variable.type for variable in program.variables}
+        flag = f"is_new.{channel.column.to}"
+        self.flag = flag if flag in kinds else None
+        self.truth = kinds[self.target] == "truth"
 
-    def advance(self, time: Fraction, stepper: Stepper, program: Program) -> None:
-        """Latch the latest value with a stamp up to `time`; tell whether there was a new one."""
+    def advance(self, time: Fraction, stepper: Stepper) -> None:
+        """Latch the latest value with a stamp up to `time`, and say whether it is new."""
         times, position = self.channel.times, self.position
         while position < len(times) and times[position] <= time:
             position += 1
         is_new = position > self.position
         if is_new:
-            stepper.set(self.target, self.channel.values[position - 1])
+            value = self.channel.values[position - 1]
+            stepper.set(self.target, value != 0.0 if self.truth else value)
         self.position = position
-        flag = f"is_new.{self.target.partition('.')[2]}"
-        if any(variable.name == flag for variable in program.variables):
-            stepper.set(flag, is_new)
+        if self.flag:
+            stepper.set(self.flag, is_new)
 
 
 def _set_constants(
@@ -218,8 +244,8 @@ class _Kept:
 
 def _compared(
     channel: Channel, trajectory: Trajectory, start: Fraction, program: Program
-) -> Comparison:
-    """Compare an output with a column at the ticks in which the column has a new value."""
+) -> Comparison | None:
+    """Compare an output with a column at the ticks in which it has a new value; None without."""
     assert program.period is not None and channel.column.compare is not None
     output = trajectory.signals[channel.column.compare]
     differences = []
@@ -227,7 +253,9 @@ def _compared(
         tick = math.ceil((time - start) / program.period)
         if 0 <= tick < len(output):
             differences.append(float(output[tick]) - value)
-    array = np.array(differences or [math.nan])
+    if not differences:
+        return None
+    array = np.array(differences)
     return Comparison(
         channel.column.compare,
         float(np.sqrt(np.mean(array**2))),

@@ -89,7 +89,7 @@ class _MapReader(Reader):
             compare=self.text(compare, "compare", entry.span) if compare else None,
             unit=self.unit(table.get("unit")),
             scale=self._scale(table),
-            sign=self.whole(table.get("sign"), "sign", 1, -1, 1) or 1,
+            sign=int(self.choice(table.get("sign"), "sign", ("1", "-1"), "1")),
             delay=shift,
             blank=cast(Literal["refuse", "skip"], blank),
             time=self.text(time, "time", entry.span) if time else None,

@@ -133,6 +133,6 @@ def print_replay(console: Console, replayed: Replayed) -> None:
         text = f"{found.output} against the recording: RMS {found.rms:.4g} {found.unit}"
         console.print(f"{text}, largest {found.largest:.4g} {found.unit}", highlight=False)
     for name in replayed.left_out:
-        console.print(f"column `{name}` of the map is not read: no such input", highlight=False)
+        console.print(f"`{name}` of the map is not read: there is no such input", highlight=False)
     if replayed.verdict:
         print_verdicts(console, [replayed.verdict])

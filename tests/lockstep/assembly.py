@@ -30,8 +30,8 @@ PERIOD = Fraction(1, 100)
 MODES = ("rest", "move", "stop")
 INPUTS = ("u", "v", "w")
 STATES = ("x", "y")
-EQUATIONS = 24
-CONDITIONS = 10
+EQUATIONS = 36
+CONDITIONS = 12
 SIZE = 4
 """Length of the array `work.list`."""
 

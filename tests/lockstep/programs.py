@@ -26,6 +26,7 @@ from language.program import (
     Run,
     Store,
     Value,
+    multiply,
     real,
     subtract,
     whole,
@@ -114,7 +115,7 @@ class _Blocks:
 
     def derive(self) -> Block:
         return (
-            Assign("derived.c", self.some(TUNED)),
+            Assign("derived.c", multiply(Ref("calibration.p"), self.some(TUNED))),
             Assign("derived.d", self.some(TUNED.plus(Ref("derived.c")))),
         )
 
