@@ -1,0 +1,272 @@
+"""Exponential: exact for affine flows, of second order for the rest, and its bounds."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+from hypothesis import given, strategies as st
+
+from engine.interpreter import Interpreter
+from language.exponential import LARGEST_NORM, taylor_terms
+from language.program import Program
+from tests.language.making import program, project_of, refusal, told
+
+EXACT = 1e-13
+"""Relative: some ten roundings of 1.1e-16 a tick, over at most fifty ticks."""
+
+MODEL = """language: 1
+automaton: m
+parameters: {{{parameters}}}
+inputs: {{u: {{unit: 1/s, default: 0 1/s}}}}
+states: {{{states}}}
+flow: {{{flow}}}
+initial: one
+modes:
+  one: {{transitions: {{{leave}}}}}
+  two: {{flow: {{{other}}}}}
+"""
+CLOCK = """language: 1
+automaton: s
+period: {period}
+numbers: float64
+model: m
+inputs: {{u: {{unit: 1/s, default: 0 1/s}}}}
+states: {{{states}}}
+modes: {{go: {{runs: {{of: m.one, method: exponential, substeps: {substeps}, events: 4}}}}}}
+"""
+
+
+class Flow:
+    """A model inside a tick: texts of its parts, and the Program of them."""
+
+    def __init__(self, folder: Path, flow: str, start: dict[str, float], **more: str) -> None:
+        self.folder = folder
+        self.flow = flow
+        self.start = start
+        self.more = more
+
+    def program(self, period: str = "1 s", substeps: int = 1, width: float = 10.0) -> Program:
+        span = f"range: [{-width / 2}, {width / 2}]"
+        states = ", ".join(
+            f'{name}: {{unit: "1", initial: {value}, {span}}}' for name, value in self.start.items()
+        )
+        parts = {"parameters": "", "leave": "", "other": self.flow, **self.more}
+        flow = self.flow
+        if "{" in parts["leave"]:
+            flow = ""
+        body = MODEL.format(states=states, flow=flow, **parts)
+        if not flow:
+            body = body.replace("  one: {", f"  one: {{flow: {{{self.flow}}}, ")
+        else:
+            body = body.replace(f"two: {{flow: {{{parts['other']}}}}}", "two: {}")
+        project = project_of(self.folder, m=body)
+        return program(CLOCK.format(period=period, substeps=substeps, states=states), project)
+
+    def ticked(self, count: int, u: float = 0.0, **how: object) -> dict[str, float]:
+        """Return the states after some ticks; tick 0 only starts."""
+        inside = Interpreter(self.program(**how))  # type: ignore[arg-type]
+        inside.set("input.u", u)
+        for _ in range(count + 1):
+            inside.run("step")
+        return {name: float(inside.get(f"state.{name}")) for name in self.start}
+
+
+W, Z = 3.0, 0.15
+PARAMETERS = f"w0: {{value: {W} 1/s}}, zeta: {{value: {Z}}}"
+SWING = "x: der(x) = v * 1 1/s, v: der(v) = -w0^2 * 1 s * x - 2 * zeta * w0 * v + u * 1"
+
+
+def swing(folder: Path) -> Flow:
+    return Flow(folder, SWING, {"x": 1.0, "v": 0.5}, parameters=PARAMETERS)
+
+
+def swung(t: float, u: float = 0.0) -> tuple[float, float]:
+    """Return x, v of x'' + 2 zeta w0 x' + w0^2 x = u, from x = 1, v = 0.5 (any textbook)."""
+    rest, decay, turn = u / W**2, Z * W, W * math.sqrt(1 - Z * Z)
+    a, b = 1 - rest, (0.5 + decay * (1 - rest)) / turn
+    c, s = math.cos(turn * t), math.sin(turn * t)
+    x = math.exp(-decay * t) * (a * c + b * s)
+    v = -decay * x + math.exp(-decay * t) * turn * (b * c - a * s)
+    return rest + x, v
+
+
+@pytest.mark.parametrize("u", [0.0, 2.5])
+@pytest.mark.parametrize(("period", "count"), [("0.1 s", 50), ("0.25 s", 20), ("10 ms", 50)])
+def test_a_damped_swing_is_exact(tmp_path: Path, period: str, count: int, u: float) -> None:
+    found = swing(tmp_path).ticked(count, u, period=period)
+    t = count * float(period.split()[0]) / (1000 if "ms" in period else 1)
+    x, v = swung(t, u)
+    scale = W * max(1.0, u)
+    assert found["x"] == pytest.approx(x, rel=0, abs=EXACT * scale)
+    assert found["v"] == pytest.approx(v, rel=0, abs=EXACT * scale)
+
+
+def test_a_decay_and_a_ramp_are_exact(tmp_path: Path) -> None:
+    flow = "x: der(x) = -2 1/s * x, z: der(z) = 3 1/s * z, q: der(q) = 0.5 1/s * x + u"
+    found = Flow(tmp_path, flow, {"x": 1.0, "z": 1.0, "q": 0.0}).ticked(8, 0.75, period="0.2 s")
+    t = 8 * 0.2
+    expected = {
+        "x": math.exp(-2 * t),
+        "z": math.exp(3 * t),
+        "q": 0.25 * (1 - math.exp(-2 * t)) + 0.75 * t,
+    }
+    assert found == pytest.approx(expected, rel=EXACT)
+
+
+def test_substeps_change_nothing_for_an_affine_flow(tmp_path: Path) -> None:
+    flow = swing(tmp_path)
+    whole, parts = (flow.ticked(10, 1.0, period="0.3 s", substeps=n) for n in (1, 7))
+    assert parts == pytest.approx(whole, rel=0, abs=EXACT * W)
+
+
+@pytest.mark.parametrize("fraction", [1e-6, 0.1, 0.37, 0.5, 0.99])
+def test_a_part_of_a_step_is_exact_too(tmp_path: Path, fraction: float) -> None:
+    """The Taylor sum that goes on after an event, against the same closed form."""
+    inside = Interpreter(swing(tmp_path).program(period="0.4 s"))
+    inside.run("step")
+    inside.set("before.u", 2.5)
+    inside.set("work.h", 0.4 * fraction)
+    inside.run("step_one")
+    x, v = swung(0.4 * fraction, 2.5)
+    assert inside.get("work.end_x") == pytest.approx(x, rel=0, abs=EXACT * W)
+    assert inside.get("work.end_v") == pytest.approx(v, rel=0, abs=EXACT * W)
+
+
+def test_the_polynomial_follows_the_flow_inside_the_step(tmp_path: Path) -> None:
+    leave = "two: {when: x < -9, priority: 1}"
+    flow = Flow(tmp_path, SWING, {"x": 1.0, "v": 0.5}, parameters=PARAMETERS, leave=leave)
+    inside = Interpreter(flow.program(period="0.4 s"))
+    inside.run("step")
+    inside.set("work.h", 0.4)
+    inside.run("step_one")
+    inside.run("series_one")
+    for s in (0.0, 0.05, 0.2, 0.399, 0.4):
+        inside.set("work.s", s)
+        inside.run("point")
+        assert inside.get("work.at_x") == pytest.approx(swung(s)[0], rel=0, abs=EXACT * W)
+
+
+def test_the_flow_goes_on_in_the_mode_that_an_event_leads_to(tmp_path: Path) -> None:
+    """x falls with 2/s to 0.3, then rises with 1/s; the event is located to T/2^24."""
+    made = Flow(
+        tmp_path,
+        "x: der(x) = -2 1/s * x",
+        {"x": 1.0},
+        leave="two: {when: x <= 0.3}",
+        other="x: der(x) = 1 1/s * x",
+    )
+    turn = math.log(1 / 0.3) / 2
+    for count in (1, 2, 3):
+        after = 0.4 * count - turn
+        expected = 0.3 * math.exp(after) if after > 0 else math.exp(-0.8 * count)
+        located = 0.4 / 2**24 * 3
+        found = made.ticked(count, period="0.4 s")["x"]
+        assert found == pytest.approx(expected, rel=located)
+
+
+def orders(error: Callable[[int], float], counts: tuple[int, ...]) -> list[float]:
+    errors = [error(count) for count in counts]
+    return [math.log2(a / b) for a, b in itertools.pairwise(errors)]
+
+
+def test_a_rest_that_is_not_linear_is_of_second_order(tmp_path: Path) -> None:
+    """Bernoulli 1695: x' = -2 x + 3 x^2 has 1/x = 3/2 + (1/x0 - 3/2) e^(2 t)."""
+    made = Flow(tmp_path, "x: der(x) = -2 1/s * x + 3 1/s * x^2", {"x": 0.5})
+    exact = 1 / (1.5 + (1 / 0.5 - 1.5) * math.exp(2.0))
+
+    def error(substeps: int) -> float:
+        return abs(made.ticked(1, substeps=substeps)["x"] - exact)
+
+    for order in orders(error, (8, 16, 32, 64)):
+        assert 1.9 < order < 2.1
+
+
+def test_a_stiff_linear_part_does_not_spoil_the_order(tmp_path: Path) -> None:
+    """z relaxes fifty times faster than x bends; z' = -50 (z - x), x' = -x^2, x = 1/(1 + t)."""
+    flow = "x: der(x) = -1 1/s * x^2, z: der(z) = -50 1/s * (z - x)"
+    made = Flow(tmp_path, flow, {"x": 1.0, "z": 1.0})
+
+    def error(substeps: int) -> float:
+        return abs(made.ticked(1, substeps=substeps)["x"] - 0.5)
+
+    for order in orders(error, (32, 64)):
+        assert 1.9 < order < 2.1
+
+
+def test_an_input_is_held_over_the_tick(tmp_path: Path) -> None:
+    inside = Interpreter(Flow(tmp_path, "x: der(x) = u", {"x": 0.0}).program(period="0.5 s"))
+    for u, x in ((1.0, 0.0), (2.0, 0.5), (0.0, 1.5), (4.0, 1.5)):
+        inside.set("input.u", u)
+        inside.run("step")
+        assert inside.get("state.x") == x
+
+
+# Bounds.
+
+
+def terms_of(norm: Fraction) -> int:
+    """Return the smallest K >= 1 with norm^(K+1)/(K+1)! <= 2^-53, in exact arithmetic."""
+    return next(
+        k
+        for k in itertools.count(1)
+        if norm ** (k + 1) * 2**53 <= math.factorial(k + 1)
+    )
+
+
+@given(st.fractions(Fraction(1, 1000), 4))
+def test_the_number_of_terms_is_the_smallest_that_is_enough(norm: Fraction) -> None:
+    close = float(norm)
+    exact = terms_of(Fraction(close))
+    size = Fraction(close) ** (exact + 1) * 2**53 / math.factorial(exact + 1)
+    below = Fraction(close) ** exact * 2**53 / math.factorial(exact)
+    if abs(size - 1) > 1e-12 and abs(below - 1) > 1e-12:
+        assert taylor_terms(close) == exact
+
+
+def test_no_flow_at_all_has_one_term() -> None:
+    assert taylor_terms(0.0) == taylor_terms(1e-20) == 1
+    assert taylor_terms(LARGEST_NORM) == terms_of(Fraction(4)) == 30
+
+
+def series_length(made: Program) -> int:
+    (size,) = {v.size for v in made.variables if v.name.startswith("work.series_")}
+    return size
+
+
+@pytest.mark.parametrize("rate", [0.01, 0.5, 2.0, 4.0])
+def test_a_program_has_the_terms_that_its_norm_needs(tmp_path: Path, rate: float) -> None:
+    made = Flow(tmp_path, f"x: der(x) = -{rate} 1/s * x", {"x": 1.0}).program()
+    assert series_length(made) == terms_of(Fraction(rate))
+
+
+def test_the_norm_is_a_row_sum_in_units_of_the_ranges(tmp_path: Path) -> None:
+    text = "x: der(x) = -1 1/s * x + 8 1/s * z, z: der(z) = -0.5 1/s * z"
+    flow = Flow(tmp_path, text, {"x": 1.0, "z": 1.0})
+    assert [line.partition(": ")[2] for line in told(flow.program)] == [
+        "|A h| = 9 is above 4"
+    ]
+    narrow = flow.program
+    body = narrow  # both have one range width: the sum is 1 + 8
+    assert callable(body)
+
+
+@pytest.mark.parametrize("sign", ["", "-"])
+def test_a_step_that_is_too_long_is_a_problem_that_proposes_substeps(
+    tmp_path: Path, sign: str
+) -> None:
+    flow = Flow(tmp_path, f"x: der(x) = {sign}19 1/s * x", {"x": 1.0})
+    (problem,) = refusal(flow.program)
+    assert problem.label == "mode `one` is too fast for one step: |A h| = 19 is above 4"
+    assert problem.help == "5 times as many `substeps` are enough"
+    assert refusal(lambda: flow.program(substeps=4))
+    assert not refusal(lambda: flow.program(substeps=5))
+
+
+def test_a_norm_of_4_is_not_too_long(tmp_path: Path) -> None:
+    assert not refusal(Flow(tmp_path, "x: der(x) = -4 1/s * x", {"x": 1.0}).program)
+    assert refusal(Flow(tmp_path, "x: der(x) = -4.001 1/s * x", {"x": 1.0}).program)
