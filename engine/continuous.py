@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 
 from engine.interpreter import Stepper
 from engine.trajectory import Event
-from language.program import Program, short
+from language.motion import MERGE
+from language.program import Program, TransitionInfo, short
 
 EVENTS_PER_STEP = 100
 """More located events than this within one major step are Zeno behaviour (rule 12)."""
@@ -31,6 +32,8 @@ class ContinuousRun:
         self.time = Fraction(0)
         self._log = log
         self._due: dict[int, Fraction] = {}
+        self._in_step: list[TransitionInfo] = []
+        self.is_settled = False
         self._leaving = {
             mode.number: [t for t in program.transitions if t.source == mode.number]
             for mode in program.modes
@@ -40,16 +43,20 @@ class ContinuousRun:
         self._read_states = stepper.reader(states)
 
     def start(self) -> None:
-        """Enter the initial mode at time 0; guards are evaluated on the first inputs (rule 16)."""
+        """Put the states where they start; `settle` enters the initial mode (rule 16)."""
         self.stepper.run("init")
-        self.settle()
+        self.stepper.run("equations")
+        self.is_settled = False
 
     def flow_to(self, time: Fraction) -> None:
-        """Flow up to `time`, through every event on the way. Raises Stopped."""
+        """Flow up to `time`, through every event before it. Raises Stopped.
+
+        An event at `time` itself is left to `settle`: inputs that step there come first.
+        """
         step = self.program.major_step
         while self.time < time:
             boundary = (self.time // step + 1) * step
-            self._major_step(min(boundary, time))
+            self._major_step(min(boundary, time), time)
 
     def settle(self) -> None:
         """Jump before flow: micro-steps until no transition is enabled, then equations."""
@@ -62,44 +69,55 @@ class ContinuousRun:
             if number == 0:
                 break
             info = self.program.transitions[number - 1]
-            fired.append(info.name)
+            fired.append(info)
             if micro_step == bound:
-                chain = ", ".join(f"`{name}`" for name in fired)
-                raise Stopped(f"{self._here()}: transitions fire for ever at one instant: {chain}")
+                raise Stopped(f"{self._here()}: {_fired(fired)} fire for ever at one instant")
             self._due.clear()
-            names = self.program.mode_name
-            self._log(
-                Event(
-                    float(self.time),
-                    micro_step,
-                    self.name,
-                    info.name,
-                    names(info.source),
-                    names(info.target),
-                )
-            )
+            self._log_event(info, micro_step)
+        self._in_step += fired
         self.stepper.run("watch")
         self._start_timers()
         self.stepper.run("equations")
+        self.is_settled = True
 
-    def _major_step(self, end: Fraction) -> None:
-        located = 0
+    def _log_event(self, info: TransitionInfo, micro_step: int) -> None:
+        names = self.program.mode_name
+        source, target = names(info.source), names(info.target)
+        self._log(Event(float(self.time), micro_step, self.name, info.name, source, target))
+
+    def _major_step(self, end: Fraction, horizon: Fraction) -> None:
+        self._in_step, located = [], 0
         while self.time < end:
-            due = min(self._due.values(), default=end)
-            stop = min(end, max(due, self.time))
-            h = float(stop - self.time)
-            if h > 0.0:
-                self.stepper.set("work.h", h)
-                self.stepper.run("flow")
-                self._require_finite()
-            crossed = h > 0.0 and self.stepper.get("work.crossed")
-            elapsed = self.stepper.get("work.elapsed") if crossed else h
-            self.time = stop if elapsed == h else self.time + Fraction(elapsed)
-            if crossed or self.time >= due:
-                located += 1
-                if located > EVENTS_PER_STEP:
-                    raise Stopped(f"{self._here()}: more than {EVENTS_PER_STEP} events in one step")
+            due = min(self._due.values(), default=None)
+            stop = end if due is None else min(end, max(due, self.time))
+            crossed = self._flow(stop)
+            if not crossed and (due is None or self.time < due):
+                continue
+            located += 1
+            if located > EVENTS_PER_STEP:
+                text = f"more than {EVENTS_PER_STEP} events in one step"
+                raise Stopped(f"{self._here()}: {text}: {_fired(self._in_step)}")
+            if self.time < horizon:
                 self.settle()
+            else:
+                self.is_settled = False
+
+    def _flow(self, stop: Fraction) -> bool:
+        """Flow up to `stop` or the first crossing before it; tell whether there was one."""
+        h = float(stop - self.time)
+        if h <= 0.0:
+            self.time = stop
+            return False
+        self.stepper.set("work.h", h)
+        merge = MERGE * float(max(stop, self.program.major_step))
+        self.stepper.set("work.merge", merge)
+        self.stepper.run("flow")
+        self._require_finite()
+        crossed = bool(self.stepper.get("work.crossed"))
+        elapsed = self.stepper.get("work.elapsed")
+        at_end = not crossed or h - elapsed <= merge
+        self.time = stop if at_end else self.time + Fraction(elapsed)
+        return crossed
 
     def _mark_due(self) -> None:
         mode = self.stepper.get("memory.mode")
@@ -127,3 +145,8 @@ class ContinuousRun:
     def _here(self) -> str:
         mode = self.program.mode_name(self.stepper.get("memory.mode"))
         return f"t = {float(self.time):.9g} s, `{self.name}` in mode `{mode}`"
+
+
+def _fired(infos: Sequence[TransitionInfo]) -> str:
+    """Return the transitions that fired, each once, by key path."""
+    return ", ".join(f"`{key}`" for key in dict.fromkeys(info.key for info in infos))

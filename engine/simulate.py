@@ -141,12 +141,13 @@ class _Simulation:
             flow.flow_to(time)
         self._read_inputs(time)
         for name in self.flows:
-            self._update_flow(name)
+            if time > 0 or not self._is_controlled(name):
+                self._update_flow(name, time)
         for name in self.system.order:
             if self._ticks_at(name, time):
                 self._tick(name, time)
         for name in self.flows:
-            self._update_flow(name)
+            self._update_flow(name, time)
         if time % self.scenario.every == 0:
             self.times.append(time)
             self.rows.append(
@@ -178,12 +179,20 @@ class _Simulation:
     def _value(self, owner: str, variable: str) -> Any:
         return self.steppers[owner].get(variable)
 
-    def _update_flow(self, name: str) -> None:
+    def _update_flow(self, name: str, time: Fraction) -> None:
         """An input that changed is an event: guards are read again (rule 11)."""
-        if self._feed(name):
-            self.flows[name].settle()
+        changed, flow = self._feed(name), self.flows[name]
+        if changed and time == 0:
+            flow.start()
+        if changed or not flow.is_settled:
+            flow.settle()
         else:
             self.steppers[name].run("equations")
+
+    def _is_controlled(self, name: str) -> bool:
+        """Tell whether an input reads a sampled instance: its first value is that of tick 0."""
+        sources = [source for _, source in self.wires[name] if isinstance(source, str)]
+        return any(source in self.columns for source in sources)
 
     def _ticks_at(self, name: str, time: Fraction) -> bool:
         period = self.programs[name].period

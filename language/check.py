@@ -254,7 +254,8 @@ class _Check:
     def _sampled_ranges(self) -> None:
         automaton = self.automaton
         exponential = any(m.run and m.run.method == "exponential" for m in automaton.modes.values())
-        for state in automaton.states.values():
+        models = automaton.model.states if automaton.model else {}
+        for state in (*automaton.states.values(), *models.values()):
             if exponential and state.range is None:
                 label = f"state `{state.name}` needs a `range`: method `exponential` scales with it"
                 self.problems.error("missing", state.span, label)

@@ -53,7 +53,7 @@ def continuous_program(automaton: Automaton, problems: Problems) -> Program:
     blocks = {
         **field_blocks(field),
         **method.blocks,
-        **motion_blocks(field, method, FLOW_HALVINGS, lambda mode: armed),
+        **motion_blocks(field, method, Ref("work.merge"), FLOW_HALVINGS, lambda mode: armed),
     }
     for mode in automaton.modes.values():
         ops = equations(mode, {**known, **inputs, **_states(automaton)}, "equation.", field.prefix)
@@ -72,6 +72,7 @@ def continuous_program(automaton: Automaton, problems: Problems) -> Program:
         *_reset_variables(automaton),
         *field_variables(field),
         *motion_variables(field, method),
+        Variable("work.merge", "real", "s", about="what crosses within it is one instant"),
     ]
     return finished(
         Program(
@@ -90,6 +91,7 @@ def continuous_program(automaton: Automaton, problems: Problems) -> Program:
             defaults=defaults_of(automaton),
         ),
         entries=ENTRIES,
+        keep=("work.h", "work.merge", "work.elapsed", "work.crossed"),
     )
 
 

@@ -15,8 +15,10 @@ from language.field import Field, any_guard
 from language.model import Mode
 from language.program import (
     Assign,
+    Binary,
     Block,
     Branch,
+    Call,
     Constant,
     Expr,
     Item,
@@ -24,6 +26,7 @@ from language.program import (
     Op,
     Ref,
     Run,
+    Unary,
     Value,
     Variable,
     add,
@@ -33,6 +36,9 @@ from language.program import (
     whole,
 )
 
+MERGE = 2.0**-40
+"""Events nearer than this part of the time (4096 ULPs) are one instant (rule 10): rounding of the
+states moves a crossing by some ten ULPs; at 1 s it is 0.9 ps. In a tick: part of the period."""
 RUN_HALVINGS = 24
 """Halvings inside a tick: 1 ms / 2^24 = 60 ps (docs/language.md, section 9)."""
 FLOW_HALVINGS = 44
@@ -52,13 +58,20 @@ class Method:
 
 
 def motion_blocks(
-    field: Field, method: Method, halvings: int, armed: Callable[[Mode], Armed | None]
+    field: Field,
+    method: Method,
+    merge: Expr,
+    halvings: int,
+    armed: Callable[[Mode], Armed | None],
 ) -> dict[str, Block]:
-    """Return `point`, and `locate_<mode>` and `move_<mode>` of every mode."""
+    """Return `point`, and `locate_<mode>` and `move_<mode>` of every mode.
+
+    What crosses within `merge` [s] is one instant; `armed` gives a mode's guards as they were.
+    """
     blocks = {"point": _point(field, method.terms)}
     for mode in field.automaton.modes.values():
         crossed = any_guard(mode, armed(mode))
-        blocks[f"locate_{mode.name}"] = _locate(field, mode, crossed, halvings)
+        blocks[f"locate_{mode.name}"] = _locate(field, mode, crossed, halvings, merge)
         blocks[f"move_{mode.name}"] = _move(field, mode, crossed)
     return blocks
 
@@ -74,6 +87,7 @@ def motion_variables(field: Field, method: Method) -> list[Variable]:
         Variable("work.high", "real", "s"),
         Variable("work.halving", "whole"),
         Variable("work.term", "whole"),
+        *(Variable(f"work.first_{k}", "truth") for k in range(field.widest)),
     ]
     for name, state in field.automaton.states.items():
         unit = str(state.unit.dimension)
@@ -98,21 +112,51 @@ def _point(field: Field, terms: int) -> Block:
     return (*first, Loop(terms, "work.term", tuple(body)), *last)
 
 
-def _locate(field: Field, mode: Mode, crossed: Expr, halvings: int) -> Block:
+def _locate(field: Field, mode: Mode, crossed: Expr, halvings: int, merge: Expr) -> Block:
     """Halve (low, high]: a guard has changed at high, none has at low."""
-    low, high, s = Ref("work.low"), Ref("work.high"), Ref("work.s")
+    low, high = Ref("work.low"), Ref("work.high")
+    middle = add(low, multiply(real(0.5), subtract(high, low)))
     keep = [Assign(f"work.end_{name}", Ref(f"work.at_{name}")) for name in field.states]
     body: Block = (
-        Assign("work.s", add(low, multiply(real(0.5), subtract(high, low)))),
-        Run("point"),
-        Run(f"guards_{mode.name}"),
-        Branch(crossed, (Assign("work.high", s), *keep), (Assign("work.low", s),)),
+        *_look(mode, middle),
+        Branch(
+            crossed,
+            (Assign("work.high", Ref("work.s")), *keep),
+            (Assign("work.low", Ref("work.s")),),
+        ),
     )
     return (
         Assign("work.low", real(0.0)),
         Assign("work.high", Ref("work.h")),
         Loop(halvings, "work.halving", body),
-        Assign("work.elapsed", high),
+        *_merged(field, mode, merge),
+        Assign("work.elapsed", Call("min", (high, Ref("work.h")))),
+    )
+
+
+def _look(mode: Mode, s: Expr) -> Block:
+    """Put the point at `s` and read the guards there."""
+    return (Assign("work.s", s), Run("point"), Run(f"guards_{mode.name}"))
+
+
+def _merged(field: Field, mode: Mode, merge: Expr) -> Block:
+    """Where another guard changes within `merge` after the first, take both as one instant."""
+    count = len(mode.transitions)
+    if count < 2:
+        return ()
+    first = [Assign(f"work.first_{k}", Ref(f"work.guard_{k}")) for k in range(count)]
+    another: Expr = Value(False)
+    for k in range(count):
+        turned = Binary("and", Ref(f"work.guard_{k}"), Unary("not", Ref(f"work.first_{k}")))
+        another = turned if k == 0 else Binary("or", another, turned)
+    keep = [Assign(f"work.end_{name}", Ref(f"work.at_{name}")) for name in field.states]
+    high = Ref("work.high")
+    accepted: Block = (Assign("work.high", Ref("work.s")), *keep)
+    return (
+        *_look(mode, high),
+        *first,
+        *_look(mode, add(high, merge)),
+        Branch(another, accepted),
     )
 
 

@@ -32,7 +32,7 @@ def read_observer(reader: Reader, node: Node, key: str) -> Observer:
     measures = {}
     for entry in reader.named(table.get("measures"), f"{key}.measures"):
         measures[entry.key] = reader.text(entry.node, f"measures.{entry.key}", entry.span)
-    for name in ("A", "C", "measures", *NOISE_KEYS):
+    for name in ("C", "measures", *NOISE_KEYS):
         if name not in table.entries and not (name == "C" and measures):
             reader.problems.error("missing", node.span, f"`{name}` is missing in the observer")
     rows, columns = set(states), set(states)

@@ -104,8 +104,8 @@ def check_name(name: str, span: Span, problems: Problems) -> None:
     elif name in GRAMMAR_WORDS:
         problems.error("name", span, f"`{name}` is a word of the language")
     elif name.lower() in YAML_WORDS:
-        label = f"`{name}` means something else to other YAML tools"
-        problems.error("name", span, label)
+        label = f"`{name}` means something else to other YAML tools: they read true, false or null"
+        problems.error("name", span, label, f"another name, like `{name}_1`")
     elif name in C_WORDS:
         label = f"`{name}` is a word of C, and generated code keeps the names of the model"
         problems.error("name", span, label)

@@ -21,7 +21,7 @@ from language.field import (
 )
 from language.lower import constant_names, rounded, tunables_of
 from language.model import Automaton, Formula, Mode, Run as ModelRun
-from language.motion import RUN_HALVINGS, Method, motion_blocks, motion_variables
+from language.motion import MERGE, RUN_HALVINGS, Method, motion_blocks, motion_variables
 from language.problem import Problems
 from language.program import (
     Assign,
@@ -59,7 +59,7 @@ def run_motion(
 ) -> Motion:
     """Return the motion of the model inside a tick; `values` are those of the constants."""
     model = automaton.model
-    assert model
+    assert model and automaton.period is not None
     for run in runs:
         if (run.method, run.substeps) != (runs[0].method, runs[0].substeps):
             label = "all runs of an automaton have one method and one number of substeps"
@@ -68,10 +68,11 @@ def run_motion(
     field = Field(model, constant_names(automaton), inputs, MODE, f"{model.name} ")
     blocks = field_blocks(field)
     method = _method(automaton, field, runs[0], blocks, values, problems)
+    merge = real(MERGE * float(automaton.period))
     made = {
         **blocks,
         **method.blocks,
-        **motion_blocks(field, method, RUN_HALVINGS, lambda mode: None),
+        **motion_blocks(field, method, merge, RUN_HALVINGS, lambda mode: None),
     }
     for mode in model.modes.values():
         made[f"switch_{mode.name}"] = _switch(field, mode, problems)

@@ -107,11 +107,11 @@ def defaults_of(automaton: Automaton) -> dict[str, float | bool]:
     return found
 
 
-def finished(program: Program, entries: tuple[str, ...]) -> Program:
-    """Return the program with only what its entries use."""
+def finished(program: Program, entries: tuple[str, ...], keep: tuple[str, ...] = ()) -> Program:
+    """Return the program with only what its entries use, and the variables to keep anyway."""
     blocks = _reached(program.blocks, entries)
     used = {name for block in blocks.values() for name in _names(block)}
-    used |= {wire.source for wire in program.outputs}
+    used |= {*keep, *(wire.source for wire in program.outputs)}
     constants = [c for c in program.constants if c.name in used]
     while True:
         needed = {name for c in constants if c.kind == "solved" for name in c.depends_on}

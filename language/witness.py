@@ -174,6 +174,9 @@ def _report(
     label = f"this fires again at the same instant, for ever: {path}"
     hint = f"at {values}; write the direction of motion too, like `x >= limit and v > 0 m/s`"
     states = search.automaton.states
+    open_ended = [f"`{name}`" for name, state in states.items() if state.range is None]
+    if open_ended:
+        hint += f", or give {', '.join(open_ended)} a `range` if this is out of reach"
     bare = next((t for t in (back, out) if _has_boundary(t.when.tree, states)), back)
     problems.error("refire", bare.when.span, label, hint)
 

@@ -69,12 +69,13 @@ class Tape:
         self._observed = observed(self.program)
         self._names = tuple(item.name for item in self._observed)
         kinds = "".join("d" if item.kind == "real" else "q" for item in self._observed)
-        self._input = struct.Struct(f"<{len(self._fed)}d")
+        self._input = struct.Struct(f"<{max(1, len(self._fed))}d")
         self._value = struct.Struct(f"<{kinds}")
 
     def record(self, stepper: Stepper) -> None:
         """Keep the inputs and values of the tick that was just done."""
-        self.inputs.append(self._input.pack(*[float(stepper.get(n)) for n in self._fed]))
+        inputs = [float(stepper.get(name)) for name in self._fed] or [0.0]
+        self.inputs.append(self._input.pack(*inputs))
         self.values.append(self._value.pack(*[stepper.get(n) for n in self._names]))
         self.transitions += stepper.get("memory.fired") != 0
 

@@ -29,7 +29,9 @@ def events_table(events: Sequence[Event]) -> Table:
         "time [s]", "automaton", "from", "to", box=None, pad_edge=False, header_style="bold"
     )
     for event in events[:MOST_EVENTS]:
-        table.add_row(f"{event.time:.9f}", event.instance, event.source, event.target)
+        table.add_row(
+            f"{event.time:.9f}", event.instance, event.transition, event.source, event.target
+        )
     if len(events) > MOST_EVENTS:
         table.add_row("...", f"{len(events) - MOST_EVENTS} more", "", "")
     return table

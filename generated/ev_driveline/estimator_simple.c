@@ -347,7 +347,7 @@ void estimator_simple_Init(estimator_simple_Self *self, const estimator_simple_C
 void estimator_simple_Step(estimator_simple_Self *self, const estimator_simple_Cal *cal, const estimator_simple_In *in,
     estimator_simple_Out *out)
 {
-    Work scratch;
+    Work scratch = {0};
     Work *const work = &scratch;
 
     self->fired = 0U;

@@ -1,79 +1,19 @@
-"""Exponential: exact for affine flows, of second order for the rest, and its bounds."""
+"""Exponential: exact for affine flows, of second order for the rest, against closed forms."""
 
 from __future__ import annotations
 
 import itertools
 import math
 from collections.abc import Callable
-from fractions import Fraction
 from pathlib import Path
 
 import pytest
-from hypothesis import given, strategies as st
 
 from engine.interpreter import Interpreter
-from language.exponential import LARGEST_NORM, taylor_terms
-from language.program import Program
-from tests.language.making import program, project_of, refusal, told
+from tests.language.flowing import Flow
 
 EXACT = 1e-13
 """Relative: some ten roundings of 1.1e-16 a tick, over at most fifty ticks."""
-
-MODEL = """language: 1
-automaton: m
-parameters: {{{parameters}}}
-inputs: {{u: {{unit: 1/s, default: 0 1/s}}}}
-states: {{{states}}}
-flow: {{{flow}}}
-initial: one
-modes:
-  one: {{transitions: {{{leave}}}}}
-  two: {{flow: {{{other}}}}}
-"""
-CLOCK = """language: 1
-automaton: s
-period: {period}
-numbers: float64
-model: m
-inputs: {{u: {{unit: 1/s, default: 0 1/s}}}}
-states: {{{states}}}
-modes: {{go: {{runs: {{of: m.one, method: exponential, substeps: {substeps}, events: 4}}}}}}
-"""
-
-
-class Flow:
-    """A model inside a tick: texts of its parts, and the Program of them."""
-
-    def __init__(self, folder: Path, flow: str, start: dict[str, float], **more: str) -> None:
-        self.folder = folder
-        self.flow = flow
-        self.start = start
-        self.more = more
-
-    def program(self, period: str = "1 s", substeps: int = 1, width: float = 10.0) -> Program:
-        span = f"range: [{-width / 2}, {width / 2}]"
-        states = ", ".join(
-            f'{name}: {{unit: "1", initial: {value}, {span}}}' for name, value in self.start.items()
-        )
-        parts = {"parameters": "", "leave": "", "other": self.flow, **self.more}
-        flow = self.flow
-        if "{" in parts["leave"]:
-            flow = ""
-        body = MODEL.format(states=states, flow=flow, **parts)
-        if not flow:
-            body = body.replace("  one: {", f"  one: {{flow: {{{self.flow}}}, ")
-        else:
-            body = body.replace(f"two: {{flow: {{{parts['other']}}}}}", "two: {}")
-        project = project_of(self.folder, m=body)
-        return program(CLOCK.format(period=period, substeps=substeps, states=states), project)
-
-    def ticked(self, count: int, u: float = 0.0, **how: object) -> dict[str, float]:
-        """Return the states after some ticks; tick 0 only starts."""
-        inside = Interpreter(self.program(**how))  # type: ignore[arg-type]
-        inside.set("input.u", u)
-        for _ in range(count + 1):
-            inside.run("step")
-        return {name: float(inside.get(f"state.{name}")) for name in self.start}
 
 
 W, Z = 3.0, 0.15
@@ -138,7 +78,7 @@ def test_a_part_of_a_step_is_exact_too(tmp_path: Path, fraction: float) -> None:
 
 
 def test_the_polynomial_follows_the_flow_inside_the_step(tmp_path: Path) -> None:
-    leave = "two: {when: x < -9, priority: 1}"
+    leave = "never: {to: one, when: x < -9, reset: {x: 0}}"
     flow = Flow(tmp_path, SWING, {"x": 1.0, "v": 0.5}, parameters=PARAMETERS, leave=leave)
     inside = Interpreter(flow.program(period="0.4 s"))
     inside.run("step")
@@ -204,69 +144,3 @@ def test_an_input_is_held_over_the_tick(tmp_path: Path) -> None:
         inside.set("input.u", u)
         inside.run("step")
         assert inside.get("state.x") == x
-
-
-# Bounds.
-
-
-def terms_of(norm: Fraction) -> int:
-    """Return the smallest K >= 1 with norm^(K+1)/(K+1)! <= 2^-53, in exact arithmetic."""
-    return next(
-        k
-        for k in itertools.count(1)
-        if norm ** (k + 1) * 2**53 <= math.factorial(k + 1)
-    )
-
-
-@given(st.fractions(Fraction(1, 1000), 4))
-def test_the_number_of_terms_is_the_smallest_that_is_enough(norm: Fraction) -> None:
-    close = float(norm)
-    exact = terms_of(Fraction(close))
-    size = Fraction(close) ** (exact + 1) * 2**53 / math.factorial(exact + 1)
-    below = Fraction(close) ** exact * 2**53 / math.factorial(exact)
-    if abs(size - 1) > 1e-12 and abs(below - 1) > 1e-12:
-        assert taylor_terms(close) == exact
-
-
-def test_no_flow_at_all_has_one_term() -> None:
-    assert taylor_terms(0.0) == taylor_terms(1e-20) == 1
-    assert taylor_terms(LARGEST_NORM) == terms_of(Fraction(4)) == 30
-
-
-def series_length(made: Program) -> int:
-    (size,) = {v.size for v in made.variables if v.name.startswith("work.series_")}
-    return size
-
-
-@pytest.mark.parametrize("rate", [0.01, 0.5, 2.0, 4.0])
-def test_a_program_has_the_terms_that_its_norm_needs(tmp_path: Path, rate: float) -> None:
-    made = Flow(tmp_path, f"x: der(x) = -{rate} 1/s * x", {"x": 1.0}).program()
-    assert series_length(made) == terms_of(Fraction(rate))
-
-
-def test_the_norm_is_a_row_sum_in_units_of_the_ranges(tmp_path: Path) -> None:
-    text = "x: der(x) = -1 1/s * x + 8 1/s * z, z: der(z) = -0.5 1/s * z"
-    flow = Flow(tmp_path, text, {"x": 1.0, "z": 1.0})
-    assert [line.partition(": ")[2] for line in told(flow.program)] == [
-        "|A h| = 9 is above 4"
-    ]
-    narrow = flow.program
-    body = narrow  # both have one range width: the sum is 1 + 8
-    assert callable(body)
-
-
-@pytest.mark.parametrize("sign", ["", "-"])
-def test_a_step_that_is_too_long_is_a_problem_that_proposes_substeps(
-    tmp_path: Path, sign: str
-) -> None:
-    flow = Flow(tmp_path, f"x: der(x) = {sign}19 1/s * x", {"x": 1.0})
-    (problem,) = refusal(flow.program)
-    assert problem.label == "mode `one` is too fast for one step: |A h| = 19 is above 4"
-    assert problem.help == "5 times as many `substeps` are enough"
-    assert refusal(lambda: flow.program(substeps=4))
-    assert not refusal(lambda: flow.program(substeps=5))
-
-
-def test_a_norm_of_4_is_not_too_long(tmp_path: Path) -> None:
-    assert not refusal(Flow(tmp_path, "x: der(x) = -4 1/s * x", {"x": 1.0}).program)
-    assert refusal(Flow(tmp_path, "x: der(x) = -4.001 1/s * x", {"x": 1.0}).program)

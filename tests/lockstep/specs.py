@@ -119,8 +119,8 @@ def numbers(draw: Draw) -> str:
 
 @st.composite
 def steps(draw: Draw) -> str:
-    """Return the steps of an input: at a tick, or between two."""
-    instants = draw(st.lists(st.integers(1, 2 * TICKS), max_size=4, unique=True))
+    """Return the steps of an input, half of them between two ticks."""
+    instants = draw(st.lists(st.integers(1, 2 * TICKS), min_size=2, max_size=8, unique=True))
     times = [Fraction(PERIOD_MS * instant, 2) for instant in sorted(instants)]
     return ", ".join(f"{float(time)} ms: {draw(numbers())}" for time in times)
 
@@ -155,7 +155,7 @@ def guards(draw: Draw) -> str:
     """Return a guard: one or two relations."""
 
     def relation() -> str:
-        left, right = draw(sums(READS, 1)), draw(sums(READS, 1))
+        left, right = draw(sums(("u", "v", "x"), 1)), draw(sums(READS, 1))
         return f"({left}) {draw(st.sampled_from(RELATIONS))} ({right})"
 
     word = draw(st.sampled_from(["", "not", "and", "or", "or not"]))

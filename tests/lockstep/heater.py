@@ -1,0 +1,40 @@
+"""The small automaton of tests/codegen/golden: its Program, and a tape of four heatings."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from language.program import Program
+from lockstep.compare import Tape
+from modewright.api import program
+from tests.lockstep.programs import Tick, taped
+
+SPEC = Path(__file__).parents[1] / "codegen" / "golden" / "heater.yaml"
+PERIOD = 0.1
+ROUND = 30
+"""Ticks of one round: a request that ends early, a rest, a heating up to the limit."""
+
+
+def heater() -> Program:
+    """Return the Program."""
+    return program(str(SPEC))
+
+
+def temperature(tick: int) -> float:
+    """Return the input T [K] of a tick: rising through T_on to T_off."""
+    return 320.0 + 0.9 * (tick % ROUND)
+
+
+def heater_tape() -> Tape:
+    """Return two rounds."""
+    inputs: list[Tick] = [
+        {"input.T": temperature(tick), "input.request": tick % ROUND != 6}
+        for tick in range(2 * ROUND)
+    ]
+    return taped(heater(), inputs)
+
+
+def column(tape: Tape, name: str) -> list[float | int]:
+    """Return the values of one variable, tick by tick."""
+    position = tape.names.index(name)
+    return [tape.unpack(record)[position] for record in tape.values]
