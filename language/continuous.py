@@ -19,7 +19,6 @@ from language.program import (
     Block,
     Choose,
     Expr,
-    ModeInfo,
     Program,
     Ref,
     Run,
@@ -30,14 +29,15 @@ from language.program import (
 from language.rk4 import rk4
 from language.transition import transition_infos
 from language.wiring import (
-    defaults_of,
+    assembled,
     finished,
     initial_ops,
     input_variables,
-    output_wires,
     state_variables,
 )
 
+BETWEEN = ("work.h", "work.merge", "work.elapsed", "work.crossed")
+"""What an engine sets before `flow` and reads after it."""
 ENTRIES = ("init", "derive", "equations", "watch", "jump", "flow")
 
 
@@ -46,7 +46,8 @@ def continuous_program(automaton: Automaton, problems: Problems) -> Program:
     parameters = parameter_constants(automaton, problems)
     transitions = transition_infos(automaton, problems)
     inputs: dict[str, Expr] = {name: Ref(f"input.{name}") for name in automaton.inputs}
-    known = constant_names(automaton)
+    states: dict[str, Expr] = {name: Ref(f"state.{name}") for name in automaton.states}
+    known = {**constant_names(automaton), **inputs, **states}
     field = Field(automaton, known, inputs, "memory.mode", f"{automaton.name} ")
     method = rk4(field)
     armed = {k: f"memory.armed_{k}" for k in range(field.widest)}
@@ -56,13 +57,19 @@ def continuous_program(automaton: Automaton, problems: Problems) -> Program:
         **motion_blocks(field, method, Ref("work.merge"), FLOW_HALVINGS, lambda mode: armed),
     }
     for mode in automaton.modes.values():
-        ops = equations(mode, {**known, **inputs, **_states(automaton)}, "equation.", field.prefix)
+        ops = equations(mode, dict(known), "equation.", field.prefix)
         blocks[f"equations_{mode.name}"] = tuple(ops)
         blocks[f"jump_{mode.name}"] = _jump(field, mode, transitions)
-    blocks.update(_entries(automaton, field, {**known, **inputs, **_states(automaton)}))
+    blocks.update(_entries(automaton, field, known))
     problems.stop_if_any()
-    modes = tuple(ModeInfo(mode.name, mode.number) for mode in automaton.modes.values())
-    variables = [
+    constants = (*parameters.values(), *method.constants)
+    variables = [*_variables(automaton, field), *motion_variables(field, method)]
+    program = assembled(automaton, blocks, constants, variables, transitions)
+    return finished(program, ENTRIES, keep=BETWEEN)
+
+
+def _variables(automaton: Automaton, field: Field) -> list[Variable]:
+    return [
         *input_variables(automaton, "input"),
         *state_variables(automaton),
         Variable("memory.mode", "whole", about="active mode"),
@@ -71,32 +78,8 @@ def continuous_program(automaton: Automaton, problems: Problems) -> Program:
         *(Variable(f"memory.due_{k}", "truth") for k in range(field.widest)),
         *_reset_variables(automaton),
         *field_variables(field),
-        *motion_variables(field, method),
         Variable("work.merge", "real", "s", about="what crosses within it is one instant"),
     ]
-    return finished(
-        Program(
-            name=automaton.name,
-            number="float64",
-            period=None,
-            major_step=automaton.step,
-            constants=(*parameters.values(), *method.constants),
-            variables=tuple(variables),
-            outputs=output_wires(automaton),
-            modes=modes,
-            transitions=transitions,
-            faults=(),
-            functions=(),
-            blocks=blocks,
-            defaults=defaults_of(automaton),
-        ),
-        entries=ENTRIES,
-        keep=("work.h", "work.merge", "work.elapsed", "work.crossed"),
-    )
-
-
-def _states(automaton: Automaton) -> dict[str, Expr]:
-    return {name: Ref(f"state.{name}") for name in automaton.states}
 
 
 def _reset_variables(automaton: Automaton) -> list[Variable]:

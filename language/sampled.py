@@ -7,7 +7,7 @@ Blocks: `init` (before the first tick), `step` (one tick) and what they run:
 
 from __future__ import annotations
 
-from fractions import Fraction
+import dataclasses
 
 from language.constants import derive_block, parameter_constants, values_of
 from language.evaluate import Scalar
@@ -37,11 +37,10 @@ from language.program import (
 from language.run import EVENT_LIMIT, run_block, run_motion
 from language.transition import enter_run, sampled_jump, transition_infos
 from language.wiring import (
-    defaults_of,
+    assembled,
     finished,
     initial_ops,
     input_variables,
-    output_wires,
     state_variables,
 )
 
@@ -97,41 +96,36 @@ class _Sampled:
         for mode in modes:
             blocks.update(self._advance(mode))
         for mode in modes:
-            known = dict(self.now)
-            ops = equations(mode, known, "equation.", self.prefix)
-            blocks[f"equations_{mode.name}"] = tuple(ops)
-        for mode in modes:
-            jump = sampled_jump(automaton, mode, self.transitions, self.now)
-            blocks[f"jump_{mode.name}"] = jump
-            if mode.update:
-                blocks[f"update_{mode.name}"] = self._update(mode)
-        blocks["remember"] = tuple(
-            Assign(f"before.{name}", Ref(f"input.{name}")) for name in automaton.inputs
+            blocks.update(self._phases(mode))
+        blocks.update(self._entries())
+        program = assembled(automaton, blocks, self.constants, variables, self.transitions)
+        program = dataclasses.replace(
+            program,
+            faults=tuple(self.faults),
+            run_modes=self._run_modes() if runs else (),
+            observers=tuple(observer.info for observer in self.observers.values()),
         )
-        blocks["start"] = self._start()
-        blocks["derive"] = derive_block(automaton)
-        blocks["init"] = self._init()
-        blocks["step"] = self._step()
-        return finished(
-            Program(
-                name=automaton.name,
-                number="float64",
-                period=automaton.period,
-                major_step=automaton.period or Fraction(0),
-                constants=tuple(self.constants),
-                variables=tuple(variables),
-                outputs=output_wires(automaton),
-                modes=tuple(ModeInfo(mode.name, mode.number) for mode in modes),
-                transitions=self.transitions,
-                faults=tuple(self.faults),
-                functions=(),
-                blocks=blocks,
-                run_modes=self._run_modes() if runs else (),
-                observers=tuple(observer.info for observer in self.observers.values()),
-                defaults=defaults_of(automaton),
-            ),
-            entries=("init", "derive", "step"),
-        )
+        return finished(program, entries=("init", "derive", "step"))
+
+    def _phases(self, mode: Mode) -> dict[str, Block]:
+        """Equations, jump and update of one mode."""
+        ops = equations(mode, dict(self.now), "equation.", self.prefix)
+        jump = sampled_jump(self.automaton, mode, self.transitions, self.now)
+        found = {f"equations_{mode.name}": tuple(ops), f"jump_{mode.name}": jump}
+        if mode.update:
+            found[f"update_{mode.name}"] = self._update(mode)
+        return found
+
+    def _entries(self) -> dict[str, Block]:
+        """What is run from outside, and what these run whatever the mode."""
+        inputs = self.automaton.inputs
+        return {
+            "remember": tuple(Assign(f"before.{n}", Ref(f"input.{n}")) for n in inputs),
+            "start": self._start(),
+            "derive": derive_block(self.automaton),
+            "init": self._init(),
+            "step": self._step(),
+        }
 
     def _variables(self) -> list[Variable]:
         automaton = self.automaton

@@ -16,17 +16,20 @@ from language.program import (
     Call,
     Choose,
     Compare,
+    Constant,
     Count,
     Expr,
     Function,
     Item,
     Loop,
+    ModeInfo,
     Op,
     Program,
     Ref,
     Run,
     Select,
     Store,
+    TransitionInfo,
     Unary,
     ValueType,
     Variable,
@@ -105,6 +108,31 @@ def defaults_of(automaton: Automaton) -> dict[str, float | bool]:
         if thing.default is not None:
             found[name] = bool(thing.default) if thing.truth else rounded(thing.default)
     return found
+
+
+def assembled(
+    automaton: Automaton,
+    blocks: Mapping[str, Block],
+    constants: Iterable[Constant],
+    variables: Iterable[Variable],
+    transitions: tuple[TransitionInfo, ...],
+) -> Program:
+    """Return a program of blocks with what follows from the automaton alone."""
+    return Program(
+        name=automaton.name,
+        number="float64",
+        period=automaton.period,
+        major_step=automaton.period or automaton.step,
+        constants=tuple(constants),
+        variables=tuple(variables),
+        outputs=output_wires(automaton),
+        modes=tuple(ModeInfo(mode.name, mode.number) for mode in automaton.modes.values()),
+        transitions=transitions,
+        faults=(),
+        functions=(),
+        blocks=blocks,
+        defaults=defaults_of(automaton),
+    )
 
 
 def finished(program: Program, entries: tuple[str, ...], keep: tuple[str, ...] = ()) -> Program:

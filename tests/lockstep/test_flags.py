@@ -1,0 +1,158 @@
+"""Flags: which of them keep the bits, which change them, and what is in the compiled code."""
+
+from __future__ import annotations
+
+import platform
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from codegen.build import FLAGS, WARNINGS, BuildError, compile_program, compiler, write_harness
+from engine.simulate import simulate
+from language.program import Program
+from lockstep.compare import Tape, compare
+from modewright.api import load, program
+from tests.lockstep.programs import taped
+
+LEVELS = ("-O0", "-O2", "-O3", "-Os", "-O3 -march=native")
+"""The optimisations that must not change a bit; the last one may use fused operations."""
+FUSED = re.compile(r"\bv?fn?m(?:add|sub|la|ls)", re.IGNORECASE)
+"""Instructions that multiply and add with one rounding: x86 vfmadd, ARM fmadd and vfma."""
+EXACT = {"sqrt", "fabs", "memcpy", "memset"}
+"""What generated code may take from the C library: exact to the last bit, or no arithmetic."""
+PRODUCT = """\
+language: 1
+automaton: product
+period: 1 ms
+numbers: float64
+inputs: {u: {unit: "1"}, v: {unit: "1"}}
+equations: {rest: u * u - v}
+modes: {only: {}}
+outputs: [rest]
+"""
+
+
+@pytest.fixture(scope="module")
+def tapes() -> dict[str, Tape]:
+    """Both estimators through the tip-out."""
+    loaded = load("ev_driveline", "tip_out")
+    found: dict[str, Tape] = {}
+
+    def ticked(name: str, used: Program, stepper: object) -> None:
+        found.setdefault(used.name, Tape(used, name)).record(stepper)  # type: ignore[arg-type]
+
+    simulate(loaded.system, loaded.scenario, ticked=ticked)
+    return found
+
+
+@pytest.fixture
+def product(tmp_path: Path) -> Tape:
+    """u * u - v where the product is rounded to v: 0, or the rounding error if contracted."""
+    spec = tmp_path / "product.yaml"
+    spec.write_text(PRODUCT)
+    return taped(program(str(spec)), [{"input.u": 1.0 + 2.0**-30, "input.v": 1.0 + 2.0**-29}])
+
+
+def has_fused_operations() -> bool:
+    """Tell whether this CPU multiplies and adds with one rounding."""
+    if platform.machine() in ("aarch64", "arm64"):
+        return True
+    info = Path("/proc/cpuinfo")
+    return info.exists() and " fma " in info.read_text()
+
+
+@pytest.mark.parametrize("level", LEVELS)
+@pytest.mark.parametrize("name", ["estimator", "estimator_simple"])
+def test_optimisation_keeps_every_bit_of_a_tip_out(
+    tapes: dict[str, Tape], name: str, level: str
+) -> None:
+    flags = [flag for flag in FLAGS if flag != "-O2"] + level.split()
+    verdict = compare(tapes[name], flags)
+    assert verdict.is_equal, str(verdict.first)
+    assert verdict.transitions > 0
+    assert verdict.ticks in (2501, 251)
+
+
+def test_contraction_is_forbidden_and_would_be_found(product: Tape) -> None:
+    assert "-ffp-contract=off" in FLAGS
+    assert {"-std=c99", "-fno-fast-math"} <= {*FLAGS}
+    assert compare(product, (*FLAGS, "-march=native")).is_equal
+    verdict = compare(product, ("-std=c99", "-O2", "-march=native", "-ffp-contract=fast"))
+    assert verdict.is_equal == (not has_fused_operations())
+    if verdict.first:
+        assert verdict.first.signal == "rest"
+        assert verdict.first.engine == "0.0 (0x0000000000000000)"
+        assert verdict.first.compiled == f"{2.0**-60!r} (0x3c30000000000000)"
+
+
+@pytest.mark.parametrize("flag", ["-ffast-math", "-Ofast"])
+def test_generated_code_refuses_fast_math(product: Tape, flag: str) -> None:
+    with pytest.raises(BuildError, match="exact only without fast-math"):
+        compare(product, (*FLAGS, flag))
+
+
+def test_generated_code_refuses_excess_precision(product: Tape) -> None:
+    """The x87 unit computes with 64 bits; elsewhere the header must give the same answer."""
+    if platform.machine() == "x86_64":
+        with pytest.raises(BuildError, match="without excess precision"):
+            compare(product, (*FLAGS, "-mfpmath=387"))
+    text = write_text(product)
+    assert "#if defined(__FAST_MATH__) || (FLT_EVAL_METHOD != 0)\n#error" in text
+
+
+def write_text(tape: Tape) -> str:
+    from codegen.source import c_files
+
+    return c_files(tape.program)["product.c"]
+
+
+def test_warnings_are_errors(tmp_path: Path) -> None:
+    source = tmp_path / "main.c"
+    source.write_text("int main(void)\n{\n    int unused;\n    return 0;\n}\n")
+    with pytest.raises(BuildError, match="Werror"):
+        compile_program([source], tmp_path / "program")
+    wanted = {"-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wdouble-promotion", "-Wshadow"}
+    assert wanted <= {*WARNINGS}
+
+
+@pytest.mark.parametrize("name", ["estimator", "estimator_simple", "leaf"])
+def test_objects_need_nothing_inexact_from_a_library(name: str, tmp_path: Path) -> None:
+    for found in objects(name, tmp_path, FLAGS):
+        lines = output("nm", "--undefined-only", str(found)).splitlines()
+        needed = {line.split()[-1].lstrip("_") for line in lines}
+        foreign = {symbol for symbol in needed if not symbol.startswith(("ha_", name))}
+        assert foreign <= EXACT | {"GLOBAL_OFFSET_TABLE_"}
+
+
+@pytest.mark.parametrize("name", ["estimator", "estimator_simple"])
+def test_no_fused_operation_even_where_the_cpu_has_them(name: str, tmp_path: Path) -> None:
+    for found in objects(name, tmp_path, (*FLAGS, "-O3", "-march=native")):
+        assert not FUSED.search(output("objdump", "--disassemble", str(found)))
+
+
+def test_the_search_for_fused_operations_finds_them(product: Tape, tmp_path: Path) -> None:
+    flags = ("-O2", "-march=native", "-ffp-contract=fast")
+    folder = tmp_path / "c"
+    folder.mkdir()
+    write_harness(product.program, folder)
+    made = compiled(folder / "product.c", flags)
+    text = output("objdump", "--disassemble", str(made))
+    assert bool(FUSED.search(text)) == has_fused_operations()
+
+
+def objects(name: str, folder: Path, flags: tuple[str, ...]) -> list[Path]:
+    """Return the compiled objects of an automaton, without the harness."""
+    sources = write_harness(program(name), folder)
+    return [compiled(path, flags) for path in sources if path.name != "main.c"]
+
+
+def compiled(source: Path, flags: tuple[str, ...]) -> Path:
+    target = source.with_suffix(".o")
+    output(*compiler(), *flags, "-c", str(source), "-o", str(target))
+    return target
+
+
+def output(*command: str) -> str:
+    return subprocess.run(command, capture_output=True, text=True, check=True).stdout
