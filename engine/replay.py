@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -12,7 +13,7 @@ import numpy as np
 
 from engine.interpreter import Interpreter, Stepper
 from engine.recording import Channel, Recording
-from engine.trajectory import Event, Trajectory, Values, column_array
+from engine.trajectory import Event, Trajectory, Values, column_array, fault_names
 from language.map import column_dimension
 from language.model import Automaton, Column, RecordingMap
 from language.problem import Problems, SpecError, nearest
@@ -118,7 +119,9 @@ def replay(
         keep.row(time, stepper)
         if ticked:
             ticked(stepper)
-    trajectory = keep.trajectory(automaton.name)
+    word = stepper.get("memory.faults") if program.faults else 0
+    faults = fault_names(automaton.name, program, word)
+    trajectory = dataclasses.replace(keep.trajectory(automaton.name), faults=faults)
     compared = [c for c in recording.channels.values() if c.column.compare is not None]
     return Replay(
         trajectory,

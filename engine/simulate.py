@@ -12,7 +12,7 @@ import numpy as np
 
 from engine.continuous import ContinuousRun, Stopped
 from engine.interpreter import Interpreter, Stepper
-from engine.trajectory import Event, Trajectory, column_array
+from engine.trajectory import Event, Trajectory, column_array, fault_names
 from language.load import program_of
 from language.model import Automaton, Formula, Instance, Scenario, Stimulus, System
 from language.problem import Source, Span
@@ -241,6 +241,12 @@ class _Simulation:
             },
             events=tuple(self.events),
             stopped=stopped,
+            faults=tuple(
+                fault
+                for name, program in self.programs.items()
+                if program.faults
+                for fault in fault_names(name, program, self.steppers[name].get("memory.faults"))
+            ),
         )
 
 

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from language.program import Program
+
 Values = NDArray[np.float64] | NDArray[np.int64]
 
 
@@ -30,7 +32,8 @@ class Trajectory:
     """Samples of signals (n_samples,) each, in SI, and all events up to `stopped`.
 
     `signals` are keyed `instance.output`; modes are whole numbers, `modes` names them.
-    `stopped` says why the run ended before the horizon; None if it did not.
+    `stopped` says why the run ended before the horizon; None if it did not. `faults` are the
+    latched fault bits as `instance: fault`; a run with one does not count for accuracy (rule 18).
     """
 
     name: str
@@ -40,6 +43,7 @@ class Trajectory:
     modes: Mapping[str, Mapping[int, str]]
     events: tuple[Event, ...]
     stopped: str | None = None
+    faults: tuple[str, ...] = ()
 
     def events_of(self, instance: str) -> tuple[Event, ...]:
         """Return the events of one instance."""
@@ -60,3 +64,8 @@ def column_array(kind: str, values: Sequence[float | int | bool]) -> Values:
     if kind == "real":
         return np.array(values, dtype=np.float64)
     return np.array(values, dtype=np.int64)
+
+
+def fault_names(name: str, program: Program, word: int) -> tuple[str, ...]:
+    """Return the names of the latched bits of a fault word, as `instance: fault`."""
+    return tuple(f"{name}: {fault}" for bit, fault in enumerate(program.faults) if word >> bit & 1)

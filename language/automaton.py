@@ -38,7 +38,7 @@ def read_automaton(
 
     Problems of form are reported and reading goes on; SpecError where there is nothing to read.
     """
-    document = expanded(document, project)
+    document = expanded(document, project, problems)
     if document.kind != "automaton":
         label = f"`{document.name}` is a {document.kind}, not an automaton"
         problems.error("form", document.name_span, label)
@@ -55,7 +55,7 @@ def _with_model(
     own = _parameters(tree)
     if not isinstance(node, Scalar):
         return _set_values(tree, own, values, own, problems), None
-    base = expanded(read_document(project.path_of(node.text, node.span)), project)
+    base = expanded(read_document(project.path_of(node.text, node.span)), project, problems)
     theirs = _parameters(base.root)
     shared = {key: entry for key, entry in own.entries.items() if key in theirs.entries}
     laid = lay(theirs, Table(shared, own.span), problems, template=True)

@@ -10,7 +10,7 @@ from language.check_observer import check_observer
 from language.dimension import DimensionCheck, Kind, Scope
 from language.guards import report_overlaps
 from language.model import Automaton, Formula, Mode
-from language.order import equation_order, report_circle
+from language.order import equation_order, report_circle, unreached
 from language.problem import Problems, Span, SpecError, nearest
 from language.syntax import Broken, Tree, names
 from language.units import SECOND, Dimension, product
@@ -28,6 +28,8 @@ def check_automaton(automaton: Automaton, problems: Problems) -> Automaton:
         automaton = dataclasses.replace(automaton, model=_declared(automaton.model, problems))
     checked = _declared(automaton, problems)
     problems.stop_if_any()
+    for name in unreached(checked.modes, checked.initial):
+        problems.warning("unreached", checked.modes[name].span, f"mode `{name}` is never entered")
     for mode in checked.modes.values():
         report_overlaps(checked, mode, problems)
     if not checked.is_sampled:

@@ -16,10 +16,16 @@ from language.sampled import sampled_program
 
 
 def automaton_of(
-    document: Document, project: Project, values: Mapping[str, Scalar] | None = None
+    document: Document,
+    project: Project,
+    values: Mapping[str, Scalar] | None = None,
+    problems: Problems | None = None,
 ) -> Automaton:
-    """Return the checked automaton of a document. Raises SpecError with all problems."""
-    problems = Problems()
+    """Return the checked automaton of a document; warnings are left in `problems`.
+
+    Raises SpecError with all problems.
+    """
+    problems = problems or Problems()
     return check_automaton(read_automaton(document, project, values, problems), problems)
 
 

@@ -41,6 +41,15 @@ def report_circle(
     problems.error("loop", spans[loop[0]], f"`{what}` values in a circle: {chain(loop)}")
 
 
+def unreached(modes: Mapping[str, Mode], initial: str) -> list[str]:
+    """Return the modes that no chain of transitions from the initial mode enters."""
+    graph: nx.DiGraph[str] = nx.DiGraph()
+    graph.add_nodes_from(modes)
+    for mode in modes.values():
+        graph.add_edges_from((mode.name, transition.target) for transition in mode.transitions)
+    return [name for name in modes if name != initial and not nx.has_path(graph, initial, name)]
+
+
 def chain(loop: list[str]) -> str:
     """Return a loop as text, back to its first member."""
     return " -> ".join(f"`{name}`" for name in [*loop, loop[0]])

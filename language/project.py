@@ -101,9 +101,12 @@ def document_of(source: Source, text: str) -> Document:
     return Document(head.key, head.node.text, head.node.span, root, source)
 
 
-def expanded(document: Document, project: Project) -> Document:
-    """Return a variant laid over its base, as a document of the base's kind."""
-    return _expanded(document, project, ())
+def expanded(document: Document, project: Project, problems: Problems | None = None) -> Document:
+    """Return a variant laid over its base, as a document of the base's kind.
+
+    Warnings are left in `problems`. Raises SpecError.
+    """
+    return _expanded(document, project, (), problems or Problems())
 
 
 def layered(base: Document, over: Document, project: Project, problems: Problems) -> Document:
@@ -132,16 +135,17 @@ def lineage(document: Document, project: Project) -> list[str]:
     return names
 
 
-def _expanded(document: Document, project: Project, seen: tuple[str, ...]) -> Document:
+def _expanded(
+    document: Document, project: Project, seen: tuple[str, ...], problems: Problems
+) -> Document:
     if document.kind != "variant":
         return document
     extends = _extends(document)
-    problems = Problems()
     if extends.text in (*seen, document.name):
         problems.error("variant", extends.span, f"`{extends.text}` extends itself")
     problems.stop_if_any()
     base = read_document(project.path_of(extends.text, extends.span))
-    base = _expanded(base, project, (*seen, document.name))
+    base = _expanded(base, project, (*seen, document.name), problems)
     over = without(document.root, "language", "variant", "extends")
     root = lay(base.root, over, problems)
     problems.stop_if_any()

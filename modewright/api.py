@@ -45,13 +45,14 @@ class Replayed:
 
 
 def check(reference: str, root: Path | None = None) -> list[Problem]:
-    """Return all problems of a spec; an empty list means that it is fine."""
+    """Return all problems of a spec, warnings too; an empty list means that it is fine."""
     project = Project(root or Path())
+    problems = Problems()
     try:
         document = read_document(project.path_of(reference))
         base = expanded(document, project)
         if base.kind == "automaton":
-            program_of(automaton_of(document, project))
+            program_of(automaton_of(document, project, problems=problems))
         elif base.kind == "system":
             for instance in read_system(document, project).instances.values():
                 program_of(instance.automaton)
@@ -61,7 +62,7 @@ def check(reference: str, root: Path | None = None) -> list[Problem]:
             _check_scenario(reference, project)
     except SpecError as error:
         return list(error.problems)
-    return []
+    return problems.found
 
 
 def load(

@@ -244,6 +244,8 @@ def _report_run(trajectory: Trajectory, as_json: bool) -> None:
 
 
 def _stop_where(failed: bool, trajectory: Trajectory) -> None:
+    for fault in trajectory.faults:
+        print(f"warning: a fault bit is set: {fault}", file=sys.stderr)
     if trajectory.stopped:
         print(f"error: the run stopped: {trajectory.stopped}", file=sys.stderr)
     if failed:

@@ -77,6 +77,7 @@ def trajectory_json(trajectory: Trajectory) -> dict[str, Any]:
         "last": last,
         "units": dict(trajectory.units),
         "stopped": trajectory.stopped,
+        "faults": list(trajectory.faults),
     }
 
 

@@ -1,0 +1,148 @@
+"""Build: which compiler, what happens where there is none or it fails, nothing left behind."""
+
+from __future__ import annotations
+
+import subprocess
+import tempfile
+from pathlib import Path
+
+import pytest
+
+from codegen import build
+from codegen.build import (
+    BuildError,
+    ToolMissing,
+    compile_program,
+    compiler,
+    executable,
+    fed,
+    observed,
+    run_executable,
+)
+from lockstep.compare import compare
+from tests.lockstep.heater import heater, heater_tape
+
+FAILING = """\
+#!/bin/sh
+echo 'engine.c:1:2: error: no more ink' >&2
+exit 1
+"""
+SILENT = """\
+#!/bin/sh
+exit 3
+"""
+
+
+@pytest.fixture
+def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The folder in which temporary folders are made."""
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    return folder
+
+
+def script(path: Path, text: str) -> Path:
+    path.write_text(text)
+    path.chmod(0o755)
+    return path
+
+
+def test_cc_names_the_compiler_with_its_arguments(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CC", "sh -c 'a b'")
+    assert compiler() == ["sh", "-c", "a b"]
+
+
+def test_without_cc_the_first_of_cc_gcc_clang_is_taken(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("CC", raising=False)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    for name in ("clang", "gcc", "cc"):
+        script(tmp_path / name, SILENT)
+        assert compiler() == [name]
+
+
+def test_a_compiler_that_is_missing_comes_with_the_line_that_installs_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("CC", "no-such-compiler -m64")
+    with pytest.raises(ToolMissing) as caught:
+        compare(heater_tape())
+    assert str(caught.value) == (
+        "the C compiler `no-such-compiler` is missing: apt-get install gcc libc6-dev"
+    )
+
+
+def test_no_compiler_at_all_is_missing_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("CC", raising=False)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(ToolMissing, match="`cc` is missing: apt-get install gcc"):
+        compiler()
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [(FAILING, "engine.c:1:2: error: no more ink"), (SILENT, "the compiler ended with 3")],
+    ids=["with a message", "without"],
+)
+def test_a_compiler_that_fails_is_quoted_and_nothing_is_left_behind(
+    tmp_path: Path, temporary: Path, monkeypatch: pytest.MonkeyPatch, text: str, message: str
+) -> None:
+    monkeypatch.setenv("CC", str(script(tmp_path / "cc", text)))
+    with pytest.raises(BuildError) as caught:
+        compare(heater_tape())
+    assert str(caught.value) == message
+    assert list(temporary.iterdir()) == []
+
+
+def test_c_that_is_wrong_is_quoted_with_file_and_line(tmp_path: Path) -> None:
+    source = tmp_path / "wrong.c"
+    source.write_text("int main(void)\n{\n    return wrong;\n}\n")
+    with pytest.raises(BuildError, match=r"wrong\.c:3:12: error: .*wrong"):
+        compile_program([source], tmp_path / "program")
+
+
+def test_a_compiled_program_that_fails_is_an_error(tmp_path: Path) -> None:
+    target = script(tmp_path / "program", SILENT)
+    with pytest.raises(BuildError, match="the compiled program ended with 3"):
+        run_executable(target, b"")
+
+
+def test_a_compiler_that_hangs_is_a_build_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def hangs(*arguments: object, **options: object) -> None:
+        raise subprocess.TimeoutExpired("cc", build.SECONDS)
+
+    monkeypatch.setattr("codegen.build.subprocess.run", hangs)
+    with pytest.raises(BuildError, match="120 s"):
+        compile_program([tmp_path / "any.c"], tmp_path / "program")
+    with pytest.raises(BuildError, match="120 s"):
+        run_executable(tmp_path / "program", b"")
+
+
+def test_the_folder_of_an_executable_goes_away(temporary: Path) -> None:
+    with executable(heater()) as target:
+        assert target.parent.parent == temporary
+        assert {path.name for path in target.parent.iterdir()} >= {"heater.c", "main.c", "program"}
+        assert run_executable(target, b"") == b""
+    assert list(temporary.iterdir()) == []
+    assert compare(heater_tape()).is_equal
+    assert list(temporary.iterdir()) == []
+
+
+def test_an_error_while_it_is_used_leaves_nothing_either(temporary: Path) -> None:
+    with pytest.raises(RuntimeError), executable(heater()):
+        raise RuntimeError
+    assert list(temporary.iterdir()) == []
+
+
+def test_all_that_an_instance_carries_is_observed() -> None:
+    program = heater()
+    groups = {item.name.partition(".")[0] for item in observed(program)}
+    assert groups == {"state", "equation", "timer", "memory"}
+    kinds = {item.name: item.kind for item in observed(program)}
+    assert kinds["equation.P"] == "real"
+    assert kinds["equation.low"] == kinds["memory.mode"] == kinds["timer.rest_heating"] == "whole"
+    assert [variable.name for variable in fed(program)] == ["input.T", "input.request"]

@@ -1,0 +1,151 @@
+"""Automata at the edges of the language: what is unusual is generated, compiled and equal too."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import pytest
+
+from language.program import Program
+from lockstep.compare import Verdict, compare
+from modewright.api import program
+from tests.lockstep.heater import column
+from tests.lockstep.programs import Tick, taped
+
+HEAD = """\
+language: 1
+automaton: edge
+period: 10 ms
+numbers: float64
+"""
+VALUES = (0.5, -0.0, 2.0, float("nan"), 1e308, -3.0, float("inf"), 0.25)
+
+
+def edge(folder: Path, body: str) -> Program:
+    path = folder / "edge.yaml"
+    path.write_text(HEAD + body)
+    return program(str(path))
+
+
+def verdict(used: Program) -> Verdict:
+    """Run eight ticks with special values in all inputs."""
+    inputs: list[Tick] = [
+        {v.name: value > 0.3 if v.type == "truth" else value for v in used.inputs}
+        for value in VALUES
+    ]
+    found = compare(taped(used, inputs))
+    assert found.ticks == len(VALUES)
+    return found
+
+
+CASES = {
+    "what is derived from tunables": """\
+parameters:
+  k: {value: 1.7, tunable: true}
+  d: {derived: k * 3 + 1 / k}
+  e: {derived: sqrt(d) - sin(d * 1 rad)}
+inputs: {u: {unit: "1"}}
+states: {x: {unit: "1", initial: e}}
+equations: {r: u * e + d}
+modes: {only: {update: {x: x + e}}}
+outputs: [r, x]
+""",
+    "tunables without anything derived": """\
+parameters: {k: {value: 1.7, tunable: true}}
+inputs: {u: {unit: "1"}}
+equations: {r: u * k}
+modes: {only: {}}
+outputs: [r]
+""",
+    "no inputs": """\
+states: {x: {unit: "1", initial: 1}}
+modes: {only: {update: {x: x * 1.1}}}
+outputs: [x]
+""",
+    "no outputs": """\
+inputs: {u: {unit: "1"}}
+states: {x: {unit: "1", initial: 1}}
+modes: {only: {update: {x: x * u}}}
+""",
+    "no real value": """\
+inputs: {u: {unit: "1"}}
+initial: a
+modes:
+  a: {transitions: {b: {when: u > 1}}}
+  b: {transitions: {a: {when: u < 0, wait: 10 ms}}}
+outputs: [mode]
+""",
+    "nothing but truth": """\
+inputs: {go: {type: bool}}
+equations: {q: not go, p: go and q or not q}
+modes: {only: {}}
+outputs: [q, p]
+""",
+    "the lowest and highest numbers of modes": """\
+inputs: {u: {unit: "1"}}
+equations: {r: u * 2}
+initial: a
+modes:
+  a: {number: -100, transitions: {b: {when: u > 1}}}
+  b: {number: 100, transitions: {a: {when: u < 0}}}
+outputs: [mode, r]
+""",
+    "the longest wait": """\
+inputs: {u: {unit: "1"}}
+equations: {r: u * 2}
+initial: a
+modes:
+  a: {transitions: {b: {when: u < 1, wait: 655.34 s}}}
+  b: {transitions: {a: {when: u > 0, wait: 10 ms}}}
+outputs: [mode, r]
+""",
+    "division by zero and overflow of literals": """\
+inputs: {u: {unit: "1"}}
+equations: {r: u / 0, s: 1.0 / 0 - u, t: 1.0e308 * 10 * u, v: 0.0 / 0.0}
+modes: {only: {}}
+outputs: [r, s, t, v]
+""",
+    "names of our own C": """\
+parameters: {self: {value: 2}, cal: {value: 3, tunable: true}, work: {value: 4}, constant: {value: 1}}
+inputs: {is_new: {unit: "1"}, out: {unit: "1"}}
+states: {state: {unit: "1", initial: 0}, equation: {unit: "1", initial: 1}}
+equations: {started: is_new * self * cal * work * constant, fired: out, record: out + 1}
+modes: {only: {update: {state: state + 1, equation: state}}}
+outputs: [started, fired, state, equation, record]
+""",
+    "an expression of many lines": f"""\
+inputs: {{u: {{unit: "1"}}, v: {{unit: "1"}}}}
+equations:
+  r: "{" - ".join(["(if u > 1 or v < 2 and not (u >= v) then u / 3 else -u * v / 7 / -u)"] * 20)}"
+modes: {{only: {{}}}}
+outputs: [r]
+""",
+    "deep parentheses": f"""\
+inputs: {{u: {{unit: "1"}}}}
+equations: {{r: "{"-(" * 60}u{")" * 60} ^ -3"}}
+modes: {{only: {{}}}}
+outputs: [r]
+""",
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_is_in_lockstep(case: str, tmp_path: Path) -> None:
+    found = verdict(edge(tmp_path, CASES[case]))
+    assert found.is_equal, str(found.first)
+
+
+def test_a_calibration_that_does_not_fit_the_solved_numbers_is_a_fault_in_both() -> None:
+    """The stamps of docs/language.md, section 9: compared by `init`, in C as in the engine."""
+    used = program("estimator_simple")
+    other = tuple(
+        dataclasses.replace(c, value=c.value * 2) if c.name == "solved.stamp_J_em" else c
+        for c in used.constants
+    )
+    stale = dataclasses.replace(used, constants=other)
+    bit = 1 << used.faults.index("stale_calibration")
+    for tried, wanted in ((used, 0), (stale, bit)):
+        tape = taped(tried, [{}])
+        assert column(tape, "memory.faults") == [wanted]
+        assert compare(tape).is_equal
