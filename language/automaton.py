@@ -91,9 +91,18 @@ def _set_values(
             label = f"`{name}` is derived: set what it follows from"
             problems.error("values", value.span, label)
         else:
-            changed = _with(entry.node, "value", value)
+            changed = _with(_with_unit(entry.node), "value", value)
             parameters = _with(parameters, name, changed)
     return _with(tree, "parameters", parameters) if values else tree
+
+
+def _with_unit(parameter: Table) -> Table:
+    """A value that replaces another one is in its unit, as if the spec gave that unit."""
+    old = parameter.get("value")
+    if "unit" in parameter.entries or not isinstance(old, Scalar):
+        return parameter
+    _, _, unit = old.text.strip().partition(" ")
+    return _with(parameter, "unit", Scalar(unit or "1", old.span))
 
 
 class _AutomatonReader(Reader):

@@ -103,7 +103,15 @@ def generate(
     reference: str, values: Values | None = None, root: Path | None = None
 ) -> dict[str, str]:
     """Return the C files of a sampled automaton by name. Raises SpecError."""
-    return c_files(program(reference, values, root))
+    project = Project(root or Path())
+    document = read_document(project.path_of(reference))
+    automaton = automaton_of(document, project, _scalars(values))
+    if not automaton.is_sampled:
+        problems = Problems()
+        label = f"`{automaton.name}` is continuous: C is printed for sampled automata"
+        problems.error("form", automaton.span, label, "give it a `period`")
+        raise SpecError(problems.found)
+    return c_files(program_of(automaton))
 
 
 def lockstep(

@@ -7,14 +7,17 @@ import tempfile
 import traceback
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
-import click
+import typer
 
 from codegen.build import ToolMissing
 from language.problem import SpecError, ordered, render_all
 from modewright.files import OutputError
 
 DONE, PROBLEMS, USAGE, TOOL, DEFECT, INTERRUPTED = 0, 1, 2, 3, 4, 130
+USAGE_ERROR: Any = typer.BadParameter.__mro__[1]
+"""The class of all usage errors; typer brings its own copy of click's."""
 EXIT_CODES = """Exit codes: 0 done; 1 the spec or data has problems, a check failed, lock-step
 differs; 2 wrong usage; 3 a tool is missing (its install line is printed); 4 a defect of
 modewright (one line and a report file); 130 interrupted."""
@@ -25,13 +28,13 @@ def exit_code(run: Callable[[], object]) -> int:
     try:
         code = run()
         return code if isinstance(code, int) else DONE
-    except click.UsageError as error:
+    except USAGE_ERROR as error:
         error.show()
         return USAGE
-    except (KeyboardInterrupt, click.Abort):
+    except (KeyboardInterrupt, typer.Abort):
         print("interrupted", file=sys.stderr)
         return INTERRUPTED
-    except click.exceptions.Exit as error:
+    except typer.Exit as error:
         return error.exit_code
     except SpecError as error:
         report(error)

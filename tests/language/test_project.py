@@ -197,11 +197,6 @@ def test_an_automaton_that_is_its_own_model_is_refused(tmp_path: Path) -> None:
     assert told(lambda: load_automaton("ball", project))
 
 
-@pytest.mark.xfail(
-    reason="project._expanded and api.check drop warnings where there is no error: an override by "
-    "an equal value is never told on its own",
-    strict=True,
-)
 def test_a_warning_of_a_variant_is_told(tmp_path: Path) -> None:
     same = variant("v", "ball", "parameters: {p: {value: 2 m}}")
     project_of(tmp_path, a=plain("ball"), v=same)

@@ -107,7 +107,11 @@ modes: {only: {}}
 outputs: [r, s, t, v]
 """,
     "names of our own C": """\
-parameters: {self: {value: 2}, cal: {value: 3, tunable: true}, work: {value: 4}, constant: {value: 1}}
+parameters:
+  self: {value: 2}
+  cal: {value: 3, tunable: true}
+  work: {value: 4}
+  constant: {value: 1}
 inputs: {is_new: {unit: "1"}, out: {unit: "1"}}
 states: {state: {unit: "1", initial: 0}, equation: {unit: "1", initial: 1}}
 equations: {started: is_new * self * cal * work * constant, fired: out, record: out + 1}

@@ -1,0 +1,143 @@
+"""System, values: what is set of an instance, in the file and by `--set`."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+
+from language.model import System
+from language.project import read_document
+from language.system import read_system
+from tests.language.making import SHIPPED, project_of, refusal, scalar
+from tests.language.test_system import FILTER, JOINED, PAIR, PLANT, lines, rig
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("values")
+    project_of(path, plant=PLANT, filter=FILTER)
+    return path
+
+
+def test_an_instance_has_values_of_its_own(folder: Path) -> None:
+    made = rig(folder, JOINED, "p: {of: plant, values: {k: 7 1/s}}, f: {of: filter}")
+    assert made.instances["p"].automaton.parameters["k"].value == 7
+    assert made.instances["f"].automaton.parameters["k"].value == Fraction(1, 2)
+
+
+@pytest.mark.parametrize(
+    ("instance", "label"),
+    [
+        ("f: {of: filter, values: {kk: 1}}", "there is no parameter `kk`"),
+        ("f: {of: filter, values: {k: 1 m}}", None),
+        ("f: {of: filter, offset: 3}", "`offset` is a time of at least 0 s"),
+        ("f: {of: filter, offset: -1 ms}", "`offset` is a time of at least 0 s"),
+        ("f: {of: filtr}", "there is no spec named `filtr`"),
+        ("f: {}", "`of` is missing"),
+        ("f: {of: rig_itself}", "there is no spec named `rig_itself`"),
+        ("f: {of: filter, value: {k: 1}}", "`value` is not a key of `instances.f`"),
+    ],
+)
+def test_an_instance_that_is_wrong_is_refused(
+    folder: Path, instance: str, label: str | None
+) -> None:
+    found = lines(folder, JOINED, f"p: {{of: plant}}, {instance}")
+    assert found
+    assert label is None or label in found
+
+
+def test_a_derived_parameter_is_not_set(folder: Path) -> None:
+    found = lines(folder, JOINED, "p: {of: plant, values: {derived_one: 1 1/s}}, f: {of: filter}")
+    assert found == ["`derived_one` is derived: set what it follows from"]
+
+
+def test_an_offset_is_a_time(folder: Path) -> None:
+    made = rig(folder, JOINED, "p: {of: plant}, f: {of: filter, offset: 2.5 ms}")
+    assert made.instances["f"].offset == Fraction(25, 10**4)
+    assert rig(folder).instances["f"].offset == 0
+
+
+def overridden(folder: Path, instances: str = PAIR, **texts: str) -> System:
+    values = {name.replace("__", "."): scalar(text) for name, text in texts.items()}
+    return rig(folder, JOINED, instances, "", values)
+
+
+def k_of(made: System, instance: str) -> object:
+    return made.instances[instance].automaton.parameters["k"].value
+
+
+def test_a_value_is_set_by_parameter_in_every_instance_that_has_it(folder: Path) -> None:
+    made = overridden(folder, own="8 m")
+    assert made.instances["f"].automaton.parameters["own"].value == 8
+
+
+def test_a_value_is_set_by_instance_and_parameter_in_that_one(folder: Path) -> None:
+    made = overridden(folder, p__k="9 1/s")
+    assert (k_of(made, "p"), k_of(made, "f")) == (9, Fraction(1, 2))
+    made = overridden(folder, f__k="9")
+    assert (k_of(made, "p"), k_of(made, "f")) == (2, 9)
+
+
+def test_a_value_set_goes_before_the_value_of_the_file(folder: Path) -> None:
+    instances = "p: {of: plant, values: {k: 7 1/s}}, f: {of: filter}"
+    assert k_of(overridden(folder, instances, p__k="9 1/s"), "p") == 9
+
+
+@pytest.mark.parametrize("first", [("f__k", "own"), ("own", "f__k")])
+def test_several_values_are_set_together(folder: Path, first: tuple[str, str]) -> None:
+    texts = {"f__k": "9", "own": "8 m"}
+    made = overridden(folder, **{name: texts[name] for name in first})
+    assert k_of(made, "f") == 9
+    assert made.instances["f"].automaton.parameters["own"].value == 8
+
+
+@pytest.mark.xfail(
+    reason="system._overrides_of: the later of `own` and `f.own` wins, not the more exact one",
+    strict=True,
+)
+def test_the_value_of_one_instance_goes_before_that_of_all(folder: Path) -> None:
+    made = overridden(folder, f__own="9 m", own="8 m")
+    assert made.instances["f"].automaton.parameters["own"].value == 9
+
+
+@pytest.mark.parametrize("name", ["kk", "p__own", "q__k", "p__kk"])
+def test_a_value_for_what_no_instance_has_is_refused(folder: Path, name: str) -> None:
+    problems = refusal(lambda: overridden(folder, **{name: "9"}))
+    shown = name.replace("__", ".")
+    assert problems[0].label in (
+        f"no instance has a parameter `{shown}`",
+        f"there is no parameter `{shown.rpartition('.')[2]}`",
+    )
+
+
+UNIT = (
+    "automaton._set_values: a parameter without `unit:` takes that of the new value; the problem, "
+)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        pytest.param("9 s", marks=pytest.mark.xfail(reason=UNIT + "the problem is elsewhere")),
+        "",
+        "x + 1",
+        "fast",
+    ],
+)
+def test_a_value_that_does_not_fit_is_refused_where_it_is_given(folder: Path, text: str) -> None:
+    (problem, *_) = refusal(lambda: overridden(folder, p__k=text))
+    assert problem.span.source.name == "here"
+
+
+def test_a_model_takes_the_value_of_its_observer() -> None:
+    shipped = read_document(SHIPPED.path_of("ev_driveline_ideal"))
+    made = read_system(
+        shipped, SHIPPED, {"m": scalar("1800 kg"), "est.k_hs": scalar("5000 N*m/rad")}
+    )
+    plant, est = (made.instances[name].automaton for name in ("plant", "est"))
+    assert plant.parameters["m"].value == est.parameters["m"].value == 1800
+    assert est.model is not None
+    assert est.model.parameters["k_hs"].value == 5000
+    assert plant.parameters["k_hs"].value == 4800
