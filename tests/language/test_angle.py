@@ -81,6 +81,14 @@ def test_a_product_or_quotient_of_two_with_dimensions_is_free(text: str, units: 
     assert not fitting(text, "V")
 
 
+@pytest.mark.parametrize(
+    "text", ["w + v / r_w", "v / r_w - w", "max(v / r_w, w)", "max(w, T / J * t)"]
+)
+def test_a_sum_of_a_free_value_and_an_exact_one_is_exact(text: str) -> None:
+    assert kind(text) == dimension("rad/s")
+    assert not fitting(text, "1/s")
+
+
 def test_angles_alone_multiply_exactly() -> None:
     assert angle("theta * theta_b") == 2
     assert angle("theta^3") == 3

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from language.load import load_automaton
-from tests.language.making import Project, automaton, project_of, told
+from tests.language.making import automaton, project_of, told
 
 CONTINUOUS = """language: 1
 automaton: model
@@ -30,7 +30,7 @@ RUNS = "runs: {of: model.only}"
 
 
 def sampled(folder: Path, more: str) -> list[str]:
-    project: Project = project_of(
+    project = project_of(
         folder, model=CONTINUOUS.replace("MORE", ""), sampled=SAMPLED.replace("MORE", more)
     )
     return told(lambda: load_automaton("sampled", project))

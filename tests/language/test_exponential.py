@@ -7,10 +7,13 @@ import math
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from engine.interpreter import Interpreter
 from tests.language.flowing import Flow
+from tests.language.making import solved
 
 EXACT = 1e-13
 """Relative: some ten roundings of 1.1e-16 a tick, over at most fifty ticks."""
@@ -56,6 +59,18 @@ def test_a_decay_and_a_ramp_are_exact(tmp_path: Path) -> None:
         "q": 0.25 * (1 - math.exp(-2 * t)) + 0.75 * t,
     }
     assert found == pytest.approx(expected, rel=EXACT)
+
+
+def test_two_half_steps_are_a_whole_one(tmp_path: Path) -> None:
+    """E = Eh^2, F = (I + Eh) Fh: what the step to the middle is made of, seen by no affine flow."""
+    numbers = solved(swing(tmp_path).program(period="0.4 s"))
+
+    def of(letter: str) -> NDArray[np.float64]:
+        names = [[f"solved.one_{letter}.{row}.{column}" for column in "xv"] for row in "xv"]
+        return np.array([[numbers[name] for name in row] for row in names])
+
+    assert np.allclose(of("Eh") @ of("Eh"), of("E"), rtol=EXACT, atol=0)
+    assert np.allclose((np.eye(2) + of("Eh")) @ of("Fh"), of("F"), rtol=EXACT, atol=0)
 
 
 def test_substeps_change_nothing_for_an_affine_flow(tmp_path: Path) -> None:

@@ -214,6 +214,11 @@ def test_a_constant_is_exact_and_has_a_dimension(text: str, value: Fraction, uni
     assert (found, kind.powers) == (value, dimension(unit).powers)
 
 
+def test_a_sum_with_a_free_value_has_the_angle_of_the_other() -> None:
+    for text in ("2 m/s / 1 m + 3 rad/s", "3 rad/s - 2 m/s / 1 m"):
+        assert constant(tree(text))[1] == dimension("rad/s")
+
+
 # Times.
 
 

@@ -112,23 +112,14 @@ def test_a_value_for_what_no_instance_has_is_refused(folder: Path, name: str) ->
     )
 
 
-UNIT = (
-    "automaton._set_values: a parameter without `unit:` takes that of the new value; the problem, "
-)
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        pytest.param("9 s", marks=pytest.mark.xfail(reason=UNIT + "the problem is elsewhere")),
-        "",
-        "x + 1",
-        "fast",
-    ],
-)
+@pytest.mark.parametrize("text", ["9 s", "", "x + 1", "fast"])
 def test_a_value_that_does_not_fit_is_refused_where_it_is_given(folder: Path, text: str) -> None:
     (problem, *_) = refusal(lambda: overridden(folder, p__k=text))
     assert problem.span.source.name == "here"
+
+
+def test_a_bare_value_is_in_the_unit_of_the_parameter(folder: Path) -> None:
+    assert k_of(overridden(folder, p__k="9"), "p") == 9
 
 
 def test_a_model_takes_the_value_of_its_observer() -> None:
