@@ -94,9 +94,12 @@ def write_harness(program: Program, folder: Path) -> list[Path]:
 def compile_program(sources: Sequence[Path], target: Path, flags: Sequence[str] = FLAGS) -> None:
     """Compile sources into an executable. Raises ToolMissing, BuildError."""
     command = [*compiler(), *flags, *WARNINGS, *map(str, sources)]
-    done = subprocess.run(
-        [*command, "-lm", "-o", str(target)], capture_output=True, text=True, timeout=SECONDS
-    )
+    try:
+        done = subprocess.run(
+            [*command, "-lm", "-o", str(target)], capture_output=True, text=True, timeout=SECONDS
+        )
+    except subprocess.TimeoutExpired:
+        raise BuildError(f"the compiler was not done after {SECONDS} s") from None
     if done.returncode != 0:
         raise BuildError(_first_error(done.stderr) or f"the compiler ended with {done.returncode}")
 
@@ -113,7 +116,10 @@ def executable(program: Program, flags: Sequence[str] = FLAGS) -> Iterator[Path]
 
 def run_executable(target: Path, records: bytes) -> bytes:
     """Run a harness on input records and return its output records. Raises BuildError."""
-    done = subprocess.run([str(target)], input=records, capture_output=True, timeout=SECONDS)
+    try:
+        done = subprocess.run([str(target)], input=records, capture_output=True, timeout=SECONDS)
+    except subprocess.TimeoutExpired:
+        raise BuildError(f"the compiled program was not done after {SECONDS} s") from None
     if done.returncode != 0:
         raise BuildError(f"the compiled program ended with {done.returncode}")
     return done.stdout

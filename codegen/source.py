@@ -180,8 +180,13 @@ def _block(
         "name": name,
         "parameters": ", ".join(parameters) or "void",
         "needs": usage.needs,
-        "lines": list(writer.lines(program.blocks[name])),
+        "lines": [_in_derive(name, line) for line in writer.lines(program.blocks[name])],
     }
+
+
+def _in_derive(block: str, line: str) -> str:
+    """`X_Derive` writes through its own pointer, not through an instance."""
+    return line.replace("self->derived.", "derived->") if block == "derive" else line
 
 
 def _callees_first(program: Program) -> list[str]:

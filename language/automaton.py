@@ -19,7 +19,7 @@ from language.model import (
 from language.overlay import lay, without
 from language.problem import Problems, nearest
 from language.project import Project, expanded, read_document
-from language.reader import Reader
+from language.reader import FILE_WORDS, Reader, check_name
 from language.units import SECOND, Unit, fits, parse_unit
 
 COMMON_KEYS = ("language", "automaton", "parameters", "inputs", "states", "equations")
@@ -56,6 +56,10 @@ def _with_model(
     if not isinstance(node, Scalar):
         return _set_values(tree, own, values, own, problems), None
     base = expanded(read_document(project.path_of(node.text, node.span)), project, problems)
+    if base.root.get("model") is not None:
+        label = f"`{base.name}` has a `model` itself: a model is a continuous automaton"
+        problems.error("model", node.span, label)
+        problems.stop_if_any()
     theirs = _parameters(base.root)
     shared = {key: entry for key, entry in own.entries.items() if key in theirs.entries}
     laid = lay(theirs, Table(shared, own.span), problems, template=True)
@@ -112,6 +116,10 @@ class _AutomatonReader(Reader):
         keys = (*COMMON_KEYS, *LOGIC_KEYS, *CLOCK_KEYS)
         tree = self.table(tree, f"automaton {document.name}", keys)
         self.at = document.name_span
+        check_name(document.name, document.name_span, self.problems)
+        if document.name in FILE_WORDS:
+            label = f"an automaton is not called `{document.name}`: generated code has that file"
+            self.problems.error("name", document.name_span, label)
         self.model = model
         period = self._time(tree.get("period"), "period")
         self.sampled = period is not None

@@ -9,11 +9,12 @@ from language.balance import coefficient_of
 from language.check_observer import check_observer
 from language.dimension import DimensionCheck, Kind, Scope
 from language.guards import report_overlaps
+from language.lower import parameter_kinds
 from language.model import Automaton, Formula, Mode
 from language.order import equation_order, report_circle, unreached
 from language.problem import Problems, Span, SpecError, nearest
 from language.syntax import Broken, Tree, names
-from language.units import SECOND, Dimension, product
+from language.units import SECOND, Dimension, common, fits, product
 from language.witness import report_refiring
 
 RESERVED_OUTPUTS = ("mode", "faults")
@@ -52,6 +53,7 @@ class _Check:
         self.problems = problems
         self.names: dict[str, Kind] = {}
         self.first: dict[str, Span] = {}
+        self.bare: dict[str, bool] = {}
 
     def run(self) -> Automaton:
         automaton = self.automaton
@@ -145,19 +147,21 @@ class _Check:
         before = self.names.get(name)
         if kind is None:
             return before
-        zero = getattr(formula.tree, "is_bare_zero", False)
-        if before is None or (isinstance(before, Dimension) and before.angle is None):
-            self.names[name] = kind
+        if before is None or getattr(formula.tree, "is_bare_zero", False):
+            self.names.setdefault(name, kind)
+            self.bare.setdefault(name, getattr(formula.tree, "is_bare_zero", False))
+            return self.names[name]
+        if self.bare.get(name):
+            self.names[name], self.bare[name] = kind, False
             return kind
-        if zero and before != "truth":
+        if isinstance(before, Dimension) and isinstance(kind, Dimension):
+            if fits(before, kind):
+                self.names[name] = common(before, kind)
+                return self.names[name]
+        elif before == kind:
             return before
-        different = (before == "truth") != (kind == "truth")
-        if not different and isinstance(before, Dimension) and isinstance(kind, Dimension):
-            exact = kind.angle is not None and kind.angle != before.angle
-            different = before.powers != kind.powers or exact
-        if different:
-            label = f"`{name}` is in `{kind}` here and in `{before}` in another mode"
-            self.problems.error("dimension", formula.span, label)
+        label = f"`{name}` is in `{kind}` here and in `{before}` in another mode"
+        self.problems.error("dimension", formula.span, label)
         return before
 
     def _flow(self, mode: Mode, check: DimensionCheck) -> None:
@@ -214,12 +218,21 @@ class _Check:
     def _fixed_wait(self, wait: Formula) -> None:
         for read in names(wait.tree):
             parameter = self.automaton.parameters.get(read.path)
-            if parameter and parameter.kind != "fixed":
+            if parameter and parameter_kinds(self.automaton)[read.path] != "fixed":
                 label = f"`{read.path}` is {parameter.kind}: a wait is made of fixed values"
                 self.problems.error("wait", read.span, label)
 
     def _writers(self, mode: Mode) -> None:
         automaton = self.automaton
+        if mode.observer and mode.run:
+            label = f"mode `{mode.name}` has both `observer` and `runs`: one carries the states"
+            self.problems.error("writer", mode.span, label)
+        wrong = ("flow",) if automaton.is_sampled else ("update", "observer", "run")
+        for what in wrong:
+            if getattr(mode, what):
+                other = "continuous" if automaton.is_sampled else "sampled"
+                label = f"`{'runs' if what == 'run' else what}` belongs to a {other} automaton"
+                self.problems.error("form", mode.span, label)
         writers: dict[str, str] = {}
         groups = (
             ("observer", mode.observer.states if mode.observer else ()),

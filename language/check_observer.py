@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from language.dimension import DimensionCheck, Kind
 from language.model import Automaton, Formula, Observer
 from language.problem import nearest
-from language.units import Dimension, product
+from language.syntax import names as names_of
+from language.units import Dimension, fits, product
 
 
 def check_observer(
@@ -15,19 +16,32 @@ def check_observer(
 ) -> None:
     """Report unknown names, and entries that do not fit dx/dt = A x + B u + f, y = C x."""
     problems = check.problems
-    for names, known, what in (
+    for listed, known, what in (
         (observer.states, automaton.states, "a state"),
         ((*observer.inputs, *observer.measures), automaton.inputs, "an input"),
     ):
-        for name in names:
+        for name in listed:
             if name not in known:
                 label = f"`{name}` is not {what}"
                 problems.error("name", observer.span, label, nearest(name, known))
+    for measure, state in observer.measures.items():
+        if state not in observer.states:
+            label = f"`{measure}` measures `{state}`, which is not a state of the observer"
+            problems.error("name", observer.span, label, nearest(state, observer.states))
+    for formula in observer.f.values():
+        for read in names_of(formula.tree):
+            if read.path in observer.states:
+                label = f"`f` reads the observer's own state `{read.path}`: that belongs into `A`"
+                problems.error("observer", read.span, label)
     named = (*observer.states, *observer.measures, *observer.inputs)
     sizes = {name: kind for name, kind in kinds.items() if isinstance(kind, Dimension)}
     if all(name in sizes for name in named):
         _check_matrices(observer, sizes, check)
         _check_vectors(observer, sizes, check)
+        for measure, state in observer.measures.items():
+            if not observer.c and state in sizes and not fits(sizes[measure], sizes[state]):
+                label = f"`{measure}` is in `{sizes[measure]}`, `{state}` is in `{sizes[state]}`"
+                problems.error("dimension", observer.span, label)
 
 
 def _check_matrices(

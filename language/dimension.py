@@ -187,13 +187,14 @@ class DimensionCheck:
     def _function(self, tree: Application, kinds: list[Dimension]) -> Dimension | None:
         name, first = tree.function, kinds[0]
         if name in SAME:
-            result: Dimension | None = first
+            base: Tree = tree.arguments[0]
+            sum_so_far: Dimension = first
             for argument, kind in zip(tree.arguments[1:], kinds[1:], strict=True):
-                if result is not None:
-                    result = self._together(
-                        tree.arguments[0], result, argument, kind, tree.span, name
-                    )
-            return result
+                joined = self._together(base, sum_so_far, argument, kind, tree.span, name)
+                if joined is None:
+                    return None
+                base, sum_so_far = (argument if _zero(base) else base), joined
+            return sum_so_far
         if name == "sqrt":
             result = root(first)
             if result is None:

@@ -75,7 +75,7 @@ def exponential(
             label = f"mode `{name}` is too fast for one step: |A h| = {norm:.3g} is above 4"
             needed = math.ceil(norm / LARGEST_NORM) if math.isfinite(norm) else "more"
             problems.error("step", span, label, f"{needed} times as many `substeps` are enough")
-            norm = LARGEST_NORM
+            continue
         terms = max(terms, taylor_terms(norm))
         numbers = _numbers(a, h)
         solved += _constants(field, name, numbers, depends_on)

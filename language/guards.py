@@ -15,7 +15,7 @@ def report_overlaps(automaton: Automaton, mode: Mode, problems: Problems) -> Non
     """Report pairs of one priority that are not proven disjoint, with a witness if one is found."""
     for position, later in enumerate(mode.transitions):
         for earlier in mode.transitions[:position]:
-            same = later.priority == earlier.priority
+            same = (later.priority or 0) == (earlier.priority or 0)
             if same and not excluded(earlier.when.tree, later.when.tree):
                 _report(automaton, earlier, later, problems)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from fractions import Fraction
 from functools import cache
 from importlib import resources
@@ -25,6 +26,7 @@ from language.syntax import (
     Relation,
     Tree,
     Truth,
+    depth,
 )
 from language.units import NO_UNIT, SYMBOLS, Unit, UnitError, parse_unit
 
@@ -33,8 +35,11 @@ MAX_TEXT = 2000
 """Longest expression read; longer ones want an equation of their own."""
 COMMA_HINT = "in `{...}` YAML ends a value at a comma: quote a value that has one"
 MAX_POWER = 8
-MAX_EXPONENT = 308
-"""Largest decimal exponent of a literal: beyond it a double overflows."""
+MAX_DEPTH = 100
+"""Deepest tree: a sum of 100 terms; more want an equation of their own."""
+LARGEST = Fraction(sys.float_info.max)
+MAX_EXPONENT = 330
+"""Largest decimal exponent that is looked at: beyond it a double over- or underflows."""
 
 
 def parse_expression(scalar: Scalar) -> Tree:
@@ -69,6 +74,15 @@ def decimal(text: str, span: Span) -> Fraction:
     return Fraction(text)
 
 
+def _in_range(value: Fraction, text: str, span: Span) -> Fraction:
+    if abs(value) > LARGEST:
+        problems = Problems()
+        label = f"`{text}` is out of the range of a double"
+        problems.error("number", span, label)
+        raise SpecError(problems.found)
+    return value
+
+
 def _exponent(text: str) -> int:
     parts = re.split("[eE]", text)
     return int(parts[1]) if len(parts) == 2 else 0
@@ -90,7 +104,13 @@ def _parse(scalar: Scalar, start: str) -> Any:
     problems.stop_if_any()
     try:
         tree = _parser(start).parse(text)
-        return _Build(span).transform(tree)
+        built = _Build(span).transform(tree)
+        if any(
+            depth(part) > MAX_DEPTH for part in (built if isinstance(built, tuple) else (built,))
+        ):
+            problems.error("expression", span, "the expression is nested too deeply")
+            problems.stop_if_any()
+        return built
     except lark.exceptions.VisitError as error:
         raise error.orig_exc from None
     except lark.exceptions.UnexpectedInput as error:
@@ -105,20 +125,24 @@ def _explain(
 ) -> tuple[Span, str, str]:
     column = getattr(error, "column", 0)
     found = str(getattr(error, "token", "")) or ""
-    ended = column < 1 or (not found and column > len(text)) or found == "$END"
+    ended = (
+        getattr(getattr(error, "token", None), "type", "") == "$END"
+        or column < 1
+        or (not found and column > len(text))
+        or found == "$END"
+    )
     place = span.inside(len(text)) if ended else span.inside(column - 1, len(found))
     if start == "balance" and "=" not in text:
         return span, "a balance is `coefficient * der(x) = ...`", ""
+    if text.count("(") > text.count(")"):
+        return place, "a `(` is not closed", COMMA_HINT
     if ended or not text.strip():
-        hint = COMMA_HINT if text.count("(") > text.count(")") else ""
-        return place, "the expression ends too early", hint
+        return place, "the expression ends too early", ""
     rest = text[column - 1 :]
     if found in ("<", "<=", ">", ">=", "==", "!="):
         return place, "one relation only", "write `a < b and b < c`"
     if rest.startswith("="):
         return place, "`=` is not part of an expression", "equality is written `==`"
-    if text.count("(") > text.count(")"):
-        return place, "a `(` is not closed", COMMA_HINT
     hint = "there is no implied multiplication" if re.match(r"[A-Za-z0-9(]", rest) else ""
     return place, f"`{rest.split(' ')[0][:20]}` was not expected here", hint
 
@@ -157,14 +181,14 @@ class _Build(lark.Transformer[Any, Any]):
 
     def number(self, items: list[Any]) -> Any:
         span = self._at(items[0])
-        return Number(decimal(str(items[0]), span), NO_UNIT, span)
+        return Number(_in_range(decimal(str(items[0]), span), str(items[0]), span), NO_UNIT, span)
 
     def quantity(self, items: list[Any]) -> Any:
         digits, _, text = str(items[0]).partition(" ")
         span = self._at(items[0])
         value = decimal(digits, span.inside(0, len(digits)))
         unit = _unit(text, span.inside(len(digits) + 1, len(text)))
-        return Number(value * unit.factor + unit.offset, unit, span)
+        return Number(_in_range(value * unit.factor + unit.offset, str(items[0]), span), unit, span)
 
     def true(self, items: list[Any]) -> Any:
         return Truth(True, self.text)

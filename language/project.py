@@ -18,6 +18,8 @@ KINDS = ("automaton", "system", "scenario", "map", "variant")
 LATER_KINDS = ("study", "test", "effect", "calibration")
 HEAD = re.compile(rf"^({'|'.join(KINDS + LATER_KINDS)}):\s*([^\s#]+)", re.MULTILINE)
 VERSION = "1"
+MAX_LAYERS = 20
+"""Most variants laid over each other."""
 
 
 @dataclass(frozen=True)
@@ -141,10 +143,10 @@ def _expanded(
     if document.kind != "variant":
         return document
     extends = _extends(document)
-    if extends.text in (*seen, document.name):
+    base = read_document(project.path_of(extends.text, extends.span))
+    if base.name in (*seen, document.name) or len(seen) > MAX_LAYERS:
         problems.error("variant", extends.span, f"`{extends.text}` extends itself")
     problems.stop_if_any()
-    base = read_document(project.path_of(extends.text, extends.span))
     base = _expanded(base, project, (*seen, document.name), problems)
     over = without(document.root, "language", "variant", "extends")
     root = lay(base.root, over, problems)

@@ -90,6 +90,13 @@ C_WORDS = frozenset(
         "asm",
     ]
 )
+C_MACRO = re.compile(
+    r"INFINITY|NAN|HUGE_VAL[FL]?|MATH_ERR\w*|math_errhandling|FP_\w+|(DBL|FLT|LDBL)_\w+|DECIMAL_DIG"
+    r"|U?INT\w*_(MAX|MIN|C)|(PTRDIFF|SIZE|WCHAR|WINT|SIG_ATOMIC)_(MAX|MIN)|NULL|errno|M_(E|PI\w*)"
+)
+"""Macros of the headers that generated code includes."""
+FILE_WORDS = frozenset({"main", "ha_math", "float", "math", "stdint", "stdbool", "string"})
+"""Names of files beside which an automaton's own files would stand."""
 NOWHERE = Span(Source(""), 0, 0)
 """The place of an absent mapping: nothing is ever reported there."""
 TEXT_KEYS = frozenset({"about", "req"})
@@ -106,7 +113,7 @@ def check_name(name: str, span: Span, problems: Problems) -> None:
     elif name.lower() in YAML_WORDS:
         label = f"`{name}` means something else to other YAML tools: they read true, false or null"
         problems.error("name", span, label, f"another name, like `{name}_1`")
-    elif name in C_WORDS:
+    elif name in C_WORDS or C_MACRO.fullmatch(name):
         label = f"`{name}` is a word of C, and generated code keeps the names of the model"
         problems.error("name", span, label)
 

@@ -175,7 +175,7 @@ def _improved(phi: Matrix, qd: Matrix, c: Matrix, r: Matrix, gain: Matrix) -> tu
 
     Newton's method on the Riccati equation, one step (Hewer 1971, IEEE Trans. Autom. Control 16,
     382-384): P = S P S' + Qd + K R K' with K = Phi L, S = Phi - K C. Only covariances are added:
-    nothing cancels; doubled as in Smith 1968 (SIAM J. Appl. Math. 16, 198-201). Stop: as `_doubled`.
+    nothing cancels; doubled as in Smith 1968 (SIAM J. Appl. Math. 16). Stop: as `_doubled`.
     """
     k = multiply(phi, gain)
     s = subtract(phi, multiply(k, c))

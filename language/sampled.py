@@ -98,6 +98,7 @@ class _Sampled:
         for mode in modes:
             blocks.update(self._phases(mode))
         blocks.update(self._entries())
+        self.problems.stop_if_any()
         program = assembled(automaton, blocks, self.constants, variables, self.transitions)
         program = dataclasses.replace(
             program,

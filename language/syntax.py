@@ -175,3 +175,12 @@ def form(part: object) -> object:
         kept = [item.name for item in dataclasses.fields(part) if item.name != "span"]
         return (type(part).__name__, *(form(getattr(part, name)) for name in kept))
     return part
+
+
+def depth(tree: Tree) -> int:
+    """Return the length of the longest way from a tree to a leaf."""
+    level, deepest = [tree], 0
+    while level:
+        deepest += 1
+        level = [child for part in level for child in children(part)]
+    return deepest

@@ -97,7 +97,7 @@ class _SystemReader(Reader):
 
     def _overrides_of(self, instance: str, automaton: Automaton) -> dict[str, Scalar]:
         found = {}
-        for name, value in self.overrides.items():
+        for name, value in sorted(self.overrides.items(), key=lambda item: "." in item[0]):
             owner, _, parameter = name.rpartition(".")
             if owner == instance or (not owner and parameter in automaton.parameters):
                 found[parameter] = value

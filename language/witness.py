@@ -57,7 +57,10 @@ class WitnessSearch:
             if arrived is None or not self._holds(back, there, arrived):
                 continue
             returned = self._reset(back, there, arrived)
-            if returned is not None and self._holds(out, here, returned):
+            if returned is None or not self._holds(out, here, returned):
+                continue
+            again = self._reset(out, here, returned)
+            if again is not None and self._holds(back, there, again):
                 return start
         return None
 
@@ -107,9 +110,9 @@ class WitnessSearch:
             low, high = (float(limits[0]), float(limits[1])) if limits else DEFAULT_RANGE
             fraction = _radical_inverse(index, PRIMES[position % len(PRIMES)])
             point[name] = low + fraction * (high - low)
-        for name, thing in self.automaton.inputs.items():
+        for position, (name, thing) in enumerate(self.automaton.inputs.items()):
             if thing.truth:
-                point[f"input.{name}"] = index % 2 == 0
+                point[f"input.{name}"] = bool(index >> position % 6 & 1)
             elif thing.default is not None:
                 point[f"input.{name}"] = float(thing.default)
         return point

@@ -45,11 +45,6 @@ def test_a_sampled_mode_updates_observes_or_runs(tmp_path: Path, more: str) -> N
     assert sampled(tmp_path, more) == []
 
 
-@pytest.mark.xfail(
-    reason="check reads `flow` of a sampled mode and `update` of a continuous one and drops them: "
-    "_check_sections looks at the top level only",
-    strict=True,
-)
 def test_what_belongs_to_the_other_kind_of_automaton_is_refused(tmp_path: Path) -> None:
     assert sampled(tmp_path, "flow: {x: der(x) = 3 m/s}")
     assert continuous("update: {x: 0 m}")
@@ -60,19 +55,10 @@ def test_a_continuous_mode_neither_runs_nor_observes(more: str) -> None:
     assert continuous(more)
 
 
-@pytest.mark.xfail(
-    reason="sampled._advance takes the observer and drops `runs`: check._writers compares only the "
-    "states that they write",
-    strict=True,
-)
 def test_a_mode_does_not_observe_and_run_at_once(tmp_path: Path) -> None:
     assert sampled(tmp_path, f"{RUNS}, {OBSERVER.replace('F', '')}")
 
 
-@pytest.mark.xfail(
-    reason="check_observer lets f read a state of the observer itself, which Phi knows nothing of",
-    strict=True,
-)
 def test_f_reads_no_state_of_its_observer(tmp_path: Path) -> None:
     assert sampled(tmp_path, OBSERVER.replace("F", "f: {z: x * 1 1/s},")) == []
     assert sampled(tmp_path, OBSERVER.replace("F", "f: {z: z * 1 1/s},"))

@@ -142,9 +142,6 @@ def test_a_value_that_is_not_finite_is_told_with_its_name() -> None:
     assert labels(problems) == ["parameter `b` is inf, not finite"]
 
 
-@pytest.mark.xfail(
-    reason="lower.rounded: a number past the largest double raises OverflowError", strict=True
-)
 @pytest.mark.parametrize("value", ["9.9e308", "1.0e308 km", "9" * 400])
 def test_a_value_past_the_largest_double_is_a_problem(value: str) -> None:
     assert refusal(lambda: program(clock(f"  a: {{value: {value}}}")))
@@ -247,11 +244,6 @@ def test_what_is_no_fixed_time_is_no_wait(wait: str, label: str) -> None:
     assert problem.label == label
 
 
-@pytest.mark.xfail(
-    reason="check._fixed_wait refuses every derived parameter, also those that are fixed because "
-    "they follow from fixed values alone; exact_value would take them",
-    strict=True,
-)
 def test_a_wait_may_follow_from_fixed_values() -> None:
     parameters = "  t_a: {value: 1 ms}\n  t_b: {derived: 3 * t_a, unit: s}"
     assert waiting(program(clock(parameters, wait="t_b"))).ticks == 3

@@ -146,10 +146,6 @@ def test_the_terms_are_enough_for_the_whole_range_of_a_tunable(tmp_path: Path) -
     assert series_length(made) == terms_of(Fraction(2))
 
 
-@pytest.mark.xfail(
-    reason="exponential reports |A h| and goes on to e^(A h), whose ValueError nobody catches",
-    strict=True,
-)
 @pytest.mark.parametrize(
     "flow", ["x: der(x) = -x / (1 s - 1 s)", "x: der(x) = 1.0e6 1/s * x", "x: 0 s * der(x) = -x"]
 )

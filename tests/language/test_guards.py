@@ -98,11 +98,6 @@ def test_equal_priorities_decide_nothing() -> None:
     assert len(overlaps("x > limit, priority: 3", "v > 0, priority: 3")) == 1
 
 
-@pytest.mark.xfail(
-    reason="guards.report_overlaps takes no priority and priority 0 for different, "
-    "field.by_priority for equal: the order in the file decides",
-    strict=True,
-)
 def test_no_priority_and_priority_0_are_the_same() -> None:
     assert len(overlaps("x > limit", "v > 0, priority: 0")) == 1
 

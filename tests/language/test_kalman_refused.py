@@ -60,12 +60,10 @@ def test_a_state_that_nothing_measures_and_that_grows_is_a_problem() -> None:
     assert "not detectable" in problem.label
 
 
-@pytest.mark.xfail(reason=MEASURED + "a misspelt one is a row of zeros, unseen", strict=True)
 def test_a_measured_state_that_is_none_is_refused() -> None:
     assert refused("measures: {y_x: x}", "measures: {y_x: xx}")
 
 
-@pytest.mark.xfail(reason=MEASURED + "their dimensions are not compared", strict=True)
 def test_a_measured_state_has_the_dimension_of_its_input() -> None:
     text = ONE.replace("y_x: {unit: m}", "y_x: {unit: V}").replace("initial: y_x", "initial: 0 m")
     assert told(lambda: program(text.replace("r: {value: 0.5 m^2}", "r: {value: 0.5 V^2}")))

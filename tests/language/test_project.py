@@ -175,11 +175,6 @@ def test_a_circle_of_variants_is_refused(tmp_path: Path, bases: dict[str, str]) 
     assert line.endswith("extends itself")
 
 
-@pytest.mark.xfail(
-    reason="project._expanded compares the texts of `extends`, so a circle by paths is followed "
-    "until RecursionError: compare the resolved paths",
-    strict=True,
-)
 @pytest.mark.parametrize("base", ["v.yaml", "./v.yaml"])
 def test_a_circle_of_variants_by_paths_is_refused(tmp_path: Path, base: str) -> None:
     project = project_of(tmp_path, v=variant("v", base))
@@ -187,9 +182,6 @@ def test_a_circle_of_variants_by_paths_is_refused(tmp_path: Path, base: str) -> 
     assert line.endswith("extends itself")
 
 
-@pytest.mark.xfail(
-    reason="automaton._with_model follows `model:` to itself until RecursionError", strict=True
-)
 def test_an_automaton_that_is_its_own_model_is_refused(tmp_path: Path) -> None:
     clocked = "period: 1 ms\nnumbers: float64\nmodel: ball\n"
     text = plain("ball").replace("flow: {x: der(x) = 0}\n", clocked)

@@ -93,10 +93,6 @@ def test_several_values_are_set_together(folder: Path, first: tuple[str, str]) -
     assert made.instances["f"].automaton.parameters["own"].value == 8
 
 
-@pytest.mark.xfail(
-    reason="system._overrides_of: the later of `own` and `f.own` wins, not the more exact one",
-    strict=True,
-)
 def test_the_value_of_one_instance_goes_before_that_of_all(folder: Path) -> None:
     made = overridden(folder, f__own="9 m", own="8 m")
     assert made.instances["f"].automaton.parameters["own"].value == 9

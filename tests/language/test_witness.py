@@ -103,11 +103,6 @@ def test_a_wait_breaks_an_instantaneous_circle() -> None:
     )
 
 
-@pytest.mark.xfail(
-    reason="witness.refires looks at one round from any start: stopped, free, stopped, free is "
-    "told as `for ever`, though the reset has left the guard and a second round is impossible",
-    strict=True,
-)
 def test_a_reset_that_leaves_the_guard_breaks_it_too() -> None:
     assert told(lambda: automaton(stop(arrive("x >= limit", "{x: limit - 0.1 m}")))) == []
 
@@ -214,11 +209,6 @@ def test_the_search_stays_inside_the_ranges() -> None:
     assert 0 < point["input.F"] <= 10
 
 
-@pytest.mark.xfail(
-    reason="witness._sample gives all truth inputs one value, true where the first quantity is in "
-    "the lower half of its range: `a and not b` is never met",
-    strict=True,
-)
 def test_two_truth_inputs_are_searched_apart() -> None:
     text = stop(arrive("x >= limit and p and not q")).replace(
         "inputs: {", "inputs: {p: {type: bool}, q: {type: bool}, "

@@ -107,7 +107,7 @@ def test_warnings_are_errors(tmp_path: Path) -> None:
     source = tmp_path / "main.c"
     source.write_text("int main(void)\n{\n    int unused;\n    return 0;\n}\n")
     with pytest.raises(BuildError, match="Werror"):
-        compile_program([source], tmp_path / "program")
+        compile_program([source], tmp_path / "program", [*FLAGS, "-Werror"])
     wanted = {"-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wdouble-promotion", "-Wshadow"}
     assert wanted <= {*WARNINGS}
 
