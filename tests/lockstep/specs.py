@@ -57,7 +57,7 @@ def specs(draw: Draw) -> Specs:
         "parameters:",
         f"  a: {{value: {draw(numbers())}}}",
         f"  b: {{value: {draw(numbers())}, tunable: true}}",
-        f"  c: {{derived: {draw(sums(('a', 'b'), 2))} + b}}",
+        f'  c: {{derived: "{draw(sums(("a", "b"), 2))} + b"}}',
         'inputs: {u: {unit: "1"}, v: {unit: "1"}}',
         "states:",
         f'  x: {{unit: "1", initial: "{draw(sums(("u", "a", "c"), 2))}"}}',

@@ -39,8 +39,13 @@ def test_random_programs_hold_every_kind_of_operation() -> None:
     """What no random program holds, their agreement says nothing about."""
     kinds: set[str] = set()
 
-    @settings(max_examples=12, phases=[Phase.generate], suppress_health_check=LARGE)
-    @settings(derandomize=True, database=None)
+    @settings(
+        max_examples=12,
+        phases=[Phase.generate],
+        suppress_health_check=LARGE,
+        derandomize=True,
+        database=None,
+    )
     @given(programs())
     def look(program: Program) -> None:
         text = repr(program.blocks)
