@@ -79,7 +79,7 @@ class _MapReader(Reader):
         shift, unit = (
             self.quantity(delay, "delay", delay.span, None) if delay else (Fraction(0), NO_UNIT)
         )
-        if delay and (not fits(unit.dimension, SECOND) or shift < 0):
+        if delay and ((shift and not fits(unit.dimension, SECOND)) or shift < 0):
             self.problems.error("unit", delay.span, "`delay` is a time of at least 0 s")
         time = table.get("time")
         return Column(

@@ -206,7 +206,11 @@ class _Build(lark.Transformer[Any, Any]):
         return Application(name.path, tuple(arguments), self._over(name, arguments[-1]))
 
     def negative(self, items: list[Any]) -> Any:
-        return Negative(items[0], items[0].span)
+        operand = items[0]
+        if isinstance(operand, Number) and operand.unit.offset:
+            below = 2 * operand.unit.offset - operand.value
+            return Number(below, operand.unit, operand.span)
+        return Negative(operand, operand.span)
 
     def not_(self, items: list[Any]) -> Any:
         return Not(items[0], items[0].span)

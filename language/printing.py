@@ -113,7 +113,8 @@ def _program_lines(program: Program) -> Iterator[str]:
         yield f"fault {bit} {fault}"
     for constant in program.constants:
         stamps = f" from {', '.join(constant.depends_on)}" if constant.depends_on else ""
-        yield f"{constant.name} = {constant.value!r} {constant.unit}{stamps}"
+        limits = f" in {constant.range[0]!r} .. {constant.range[1]!r}" if constant.range else ""
+        yield f"{constant.name} = {constant.value!r} {constant.unit}{limits}{stamps}"
     for variable in program.variables:
         size = f"[{variable.size}]" if variable.size else ""
         yield f"{variable.name}{size}: {variable.type} {variable.unit}"

@@ -85,7 +85,7 @@ class _ScenarioReader(Reader):
 
     def _constant(self, tree: Tree, unit: Unit) -> Fraction:
         value, dimension = constant(tree)
-        if not fits(dimension, unit.dimension) and value != 0:
+        if not fits(dimension, unit.dimension) and not getattr(tree, "is_bare_zero", False):
             label = f"this is in `{dimension}`, the state is in `{unit.dimension}`"
             self.problems.error("dimension", tree.span, label)
         return value

@@ -13,7 +13,7 @@ from language.model import Automaton, Connection, Instance, System, SystemInput
 from language.problem import Problems, Span, nearest
 from language.project import Project, expanded, read_document
 from language.reader import Reader
-from language.units import NUMBER, SECOND, Dimension, fits
+from language.units import SECOND, Dimension, fits
 
 SYSTEM_KEYS = ("language", "system", "inputs", "instances", "connections", "outputs")
 INSTANCE_KEYS = ("of", "values", "offset")
@@ -228,6 +228,7 @@ class _SystemReader(Reader):
 def _output_dimensions(instance: Instance) -> dict[str, Dimension]:
     automaton = instance.automaton
     return {
-        f"{instance.name}.{name}": automaton.dimensions.get(name, NUMBER)
+        f"{instance.name}.{name}": automaton.dimensions[name]
         for name in automaton.outputs
+        if name in automaton.dimensions
     }

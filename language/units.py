@@ -153,6 +153,8 @@ def power(a: Dimension, exponent: int) -> Dimension:
     """Return the dimension of a^exponent."""
     if a.is_number or exponent == 1:
         return a
+    if exponent == 0:
+        return NUMBER
     powers = tuple(exponent * x for x in a.powers)
     exact = a.angle is not None and a.is_bare
     return Dimension(powers, exponent * (a.angle or 0) if exact else None)

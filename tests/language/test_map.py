@@ -134,7 +134,6 @@ def test_all_mistakes_are_told_in_one_run() -> None:
     assert len(lines("a: {unit: m}, b: {to: u, sign: 3}, c: {to: v, delay: 1}")) == 3
 
 
-@pytest.mark.xfail(reason="map._column takes no bare 0 for a delay, system does", strict=True)
 def test_a_delay_of_a_bare_0_is_none() -> None:
     assert one("to: u, delay: 0").delay == 0
 

@@ -182,16 +182,10 @@ def test_a_start_value_that_is_wrong_is_refused(system: System, initial: str, la
     assert label in lines(system, "u: 0", initial)
 
 
-@pytest.mark.xfail(
-    reason="scenario.constant: minus a literal in degC is minus its kelvins, -283.15", strict=True
-)
 def test_a_start_value_below_zero_celsius_is_converted(system: System) -> None:
     assert run(system, "u: 0", "p.Tp: -10 degC").initial["p.Tp"] == Fraction(26315, 100)
 
 
-@pytest.mark.xfail(
-    reason="scenario._constant lets any zero pass, also one with another unit", strict=True
-)
 def test_a_zero_with_another_unit_is_refused(system: System) -> None:
     assert lines(system, "u: 0", "p.x: 0 s")
 

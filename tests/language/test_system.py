@@ -125,10 +125,6 @@ def test_an_input_that_nothing_is_connected_to_needs_a_default(folder: Path) -> 
     assert lines(folder, "f.in_x: p.x") == ["input `p.u` is not connected"]
 
 
-@pytest.mark.xfail(
-    reason="system._output_dimensions takes a truth value and a mode for numbers without unit",
-    strict=True,
-)
 @pytest.mark.parametrize("output", ["p.far", "p.mode", "f.fine"])
 def test_a_truth_value_or_a_mode_is_no_number(folder: Path, output: str) -> None:
     instances = f"{PAIR}, g: {{of: filter}}"
