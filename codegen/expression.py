@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Protocol
 
-from language.program import (
+from language.operation import (
     Binary,
     Call,
     Compare,

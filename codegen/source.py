@@ -14,8 +14,15 @@ from codegen.names import CNames, c_member, c_type, mode_constant, run_mode_cons
 from codegen.statement import Writer, wrapped
 from codegen.usage import Usage, locals_of, usages
 from language.elementary import FUNCTIONS
+from language.operation import Assign, Run
 from language.printing import digest
-from language.program import Assign, Constant, Function, Program, Run, Variable, short
+from language.program import (
+    Constant,
+    Function,
+    Program,
+    Variable,
+    short,
+)
 from language.wiring import reads, walk
 
 GROUPS = ("state", "equation", "before", "innovation", "timer")

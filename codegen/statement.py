@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from codegen.expression import Place, c_expression
 from codegen.usage import Usage
-from language.program import (
+from language.operation import (
     Assign,
     Block,
     Branch,
@@ -18,12 +18,11 @@ from language.program import (
     FaultBit,
     Loop,
     Op,
-    Program,
     Run,
     Store,
     Value,
-    short,
 )
+from language.program import Program, short
 
 INDENT = "    "
 WIDTH = 100

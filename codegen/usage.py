@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from language.program import (
+from language.operation import (
     Assign,
     Block,
     Branch,
@@ -13,10 +13,10 @@ from language.program import (
     Count,
     FaultBit,
     Loop,
-    Program,
     Run,
     Store,
 )
+from language.program import Program
 from language.wiring import expr_names, walk
 
 GROUP_OF = {

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from language.evaluate import ELEMENTARY, OPERATIONS, divide
-from language.program import (
+from language.operation import (
     Assign,
     Binary,
     Block,
@@ -17,11 +17,9 @@ from language.program import (
     Count,
     Expr,
     FaultBit,
-    Function,
     Item,
     Loop,
     Op,
-    Program,
     Ref,
     Run,
     Select,
@@ -29,6 +27,7 @@ from language.program import (
     Unary,
     Value,
 )
+from language.program import Function, Program
 
 Frame = list[Any]
 Read = Callable[[Frame], Any]

@@ -7,7 +7,17 @@ from dataclasses import dataclass, field
 
 from language.evaluate import Scalar, apply, divide, evaluate
 from language.matrix import Matrix
-from language.program import Assign, Binary, Block, Call, Expr, Ref, Select, Unary, Value
+from language.operation import (
+    Assign,
+    Binary,
+    Block,
+    Call,
+    Expr,
+    Ref,
+    Select,
+    Unary,
+    Value,
+)
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,9 @@ from language.lower import (
     rounded,
 )
 from language.model import Automaton, Formula
+from language.operation import Assign, Block
 from language.problem import Problems, SpecError
-from language.program import Assign, Block, Constant
+from language.program import Constant
 from language.syntax import Arithmetic, Name, Negative, Number, Power, Tree
 
 

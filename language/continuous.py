@@ -12,20 +12,18 @@ from language.field import Field, at_state, by_mode, enter, field_blocks, field_
 from language.lower import constant_names, equations
 from language.model import Automaton, Mode
 from language.motion import FLOW_HALVINGS, motion_blocks, motion_variables
-from language.problem import Problems
-from language.program import (
+from language.operation import (
     Assign,
     Binary,
     Block,
     Choose,
     Expr,
-    Program,
     Ref,
     Run,
-    TransitionInfo,
-    Variable,
     whole,
 )
+from language.problem import Problems
+from language.program import Program, TransitionInfo, Variable
 from language.rk4 import rk4
 from language.transition import transition_infos
 from language.wiring import (

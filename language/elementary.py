@@ -16,12 +16,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from language.program import (
+from language.operation import (
     Assign,
     Call,
     Compare,
     Expr,
-    Function,
     Op,
     Ref,
     Select,
@@ -32,6 +31,7 @@ from language.program import (
     real,
     subtract,
 )
+from language.program import Function
 
 ROUND = real(1.5 * 2.0**52)
 """Adding and subtracting it rounds |x| < 2^51 to the nearest whole number, ties to even (R6)."""

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 
 from language.elementary import FUNCTIONS
-from language.program import (
+from language.operation import (
     Assign,
     Binary,
     Call,

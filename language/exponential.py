@@ -15,13 +15,11 @@ from language.evaluate import Scalar
 from language.field import Field, at_state
 from language.matrix import Matrix, exponential as matrix_exponential, exponential_integral
 from language.motion import Method
-from language.problem import Problems, Span
-from language.program import (
+from language.operation import (
     Assign,
     Block,
     Branch,
     Compare,
-    Constant,
     Expr,
     Item,
     Loop,
@@ -29,7 +27,6 @@ from language.program import (
     Ref,
     Run,
     Store,
-    Variable,
     add,
     divide,
     multiply,
@@ -38,6 +35,8 @@ from language.program import (
     total,
     whole,
 )
+from language.problem import Problems, Span
+from language.program import Constant, Variable
 
 LARGEST_NORM = 4.0
 """|A h| up to which the Taylor sum is accurate and short (docs/language.md, section 9)."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from language.lower import Names, equations, expression, rate, reads_of
 from language.model import Automaton, Mode, Transition
-from language.program import (
+from language.operation import (
     Assign,
     Binary,
     Block,
@@ -19,9 +19,9 @@ from language.program import (
     Ref,
     Run,
     Value,
-    Variable,
     whole,
 )
+from language.program import Variable
 
 
 @dataclass(frozen=True)

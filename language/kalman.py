@@ -15,23 +15,21 @@ from language.evaluate import Scalar
 from language.lower import Names, expression, tunables_of
 from language.matrix import Matrix, exponential, exponential_integral, multiply
 from language.model import Automaton, Formula, Mode, Observer
-from language.problem import Problems
-from language.program import (
+from language.operation import (
     Assign,
     Block,
-    Constant,
     Expr,
-    ObserverInfo,
     Op,
     Ref,
     Select,
-    Variable,
     add,
     multiply as times,
     real,
     subtract,
     total,
 )
+from language.problem import Problems
+from language.program import Constant, ObserverInfo, Variable
 from language.riccati import discrete_noise, steady_gain
 
 

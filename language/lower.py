@@ -7,14 +7,11 @@ from fractions import Fraction
 
 from language.balance import coefficient_of
 from language.model import Automaton, Balance, Formula, Mode
-from language.order import equation_order
-from language.problem import SpecError
-from language.program import (
+from language.operation import (
     Assign,
     Binary,
     Call,
     Compare,
-    Constant,
     Expr,
     Op,
     Ref,
@@ -25,6 +22,9 @@ from language.program import (
     multiply,
     real,
 )
+from language.order import equation_order
+from language.problem import SpecError
+from language.program import Constant
 from language.syntax import (
     Application,
     Arithmetic,

@@ -13,13 +13,12 @@ from dataclasses import dataclass
 
 from language.field import Field, any_guard
 from language.model import Mode
-from language.program import (
+from language.operation import (
     Assign,
     Binary,
     Block,
     Branch,
     Call,
-    Constant,
     Expr,
     Item,
     Loop,
@@ -28,13 +27,13 @@ from language.program import (
     Run,
     Unary,
     Value,
-    Variable,
     add,
     multiply,
     real,
     subtract,
     whole,
 )
+from language.program import Constant, Variable
 
 MERGE = 2.0**-40
 """Events nearer than this part of the time (4096 ULPs) are one instant (rule 10): rounding of the

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator
 
-from language.program import (
+from language.operation import (
     Assign,
     Binary,
     Block,
@@ -19,7 +19,6 @@ from language.program import (
     Item,
     Loop,
     Op,
-    Program,
     Ref,
     Run,
     Select,
@@ -27,6 +26,7 @@ from language.program import (
     Unary,
     Value,
 )
+from language.program import Program
 
 INDENT = "    "
 

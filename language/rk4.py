@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from language.field import Field, at_state
 from language.motion import Method
-from language.program import (
+from language.operation import (
     Assign,
     Block,
     Expr,
@@ -15,7 +15,6 @@ from language.program import (
     Ref,
     Run,
     Store,
-    Variable,
     add,
     divide,
     multiply,
@@ -23,6 +22,7 @@ from language.program import (
     subtract,
     whole,
 )
+from language.program import Variable
 
 TERMS = 3
 

@@ -22,23 +22,22 @@ from language.field import (
 from language.lower import constant_names, rounded, tunables_of
 from language.model import Automaton, Formula, Mode, Run as ModelRun
 from language.motion import MERGE, RUN_HALVINGS, Method, motion_blocks, motion_variables
-from language.problem import Problems
-from language.program import (
+from language.operation import (
     Assign,
     Block,
     Branch,
     Compare,
-    Constant,
     Expr,
     FaultBit,
     Loop,
     Ref,
     Value,
-    Variable,
     real,
     subtract,
     whole,
 )
+from language.problem import Problems
+from language.program import Constant, Variable
 from language.rk4 import rk4
 
 EVENT_LIMIT = "event_limit"

@@ -14,25 +14,27 @@ from language.evaluate import Scalar
 from language.kalman import Kalman, kalman, observer_variables
 from language.lower import constant_names, equations, expression
 from language.model import Automaton, Mode
-from language.problem import Problems
-from language.program import (
+from language.operation import (
     Assign,
     Block,
     Branch,
     Choose,
     Compare,
-    Constant,
     Expr,
     FaultBit,
-    ModeInfo,
     Op,
-    Program,
     Ref,
     Run,
     Value,
-    Variable,
     real,
     whole,
+)
+from language.problem import Problems
+from language.program import (
+    Constant,
+    ModeInfo,
+    Program,
+    Variable,
 )
 from language.run import EVENT_LIMIT, run_block, run_motion
 from language.transition import enter_run, sampled_jump, transition_infos

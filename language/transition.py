@@ -10,8 +10,7 @@ from language.constants import exact_value
 from language.field import by_priority
 from language.lower import expression
 from language.model import Automaton, Mode
-from language.problem import Problems
-from language.program import (
+from language.operation import (
     Assign,
     Block,
     Branch,
@@ -20,9 +19,10 @@ from language.program import (
     Expr,
     Op,
     Ref,
-    TransitionInfo,
     whole,
 )
+from language.problem import Problems
+from language.program import TransitionInfo
 
 MAX_TICKS = 65534
 """Longest wait: the counters are uint16 and count one further (semantics, rule 4)."""

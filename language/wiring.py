@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from language.elementary import FUNCTIONS
 from language.lower import expression, rounded
 from language.model import Automaton
-from language.program import (
+from language.operation import (
     Assign,
     Binary,
     Block,
@@ -16,21 +16,23 @@ from language.program import (
     Call,
     Choose,
     Compare,
-    Constant,
     Count,
     Expr,
-    Function,
     Item,
     Loop,
-    ModeInfo,
     Op,
-    Program,
     Ref,
     Run,
     Select,
     Store,
-    TransitionInfo,
     Unary,
+)
+from language.program import (
+    Constant,
+    Function,
+    ModeInfo,
+    Program,
+    TransitionInfo,
     ValueType,
     Variable,
     Wire,

@@ -12,8 +12,8 @@ from language.constants import parameter_constants, values_of
 from language.evaluate import Scalar, evaluate
 from language.lower import constant_names, equations, expression
 from language.model import Automaton, Mode, Range, Transition
+from language.operation import Assign, Expr, Ref
 from language.problem import Problems
-from language.program import Assign, Expr, Ref
 from language.syntax import Name, Relation, Tree, names, walk
 
 SAMPLES = 64

@@ -13,8 +13,9 @@ import pytest
 import modewright as mw
 from codegen.names import CNames
 from codegen.source import c_files, math_files, version
+from language.operation import Assign
 from language.printing import digest
-from language.program import Assign, Program
+from language.program import Program
 from language.wiring import walk
 from modewright.api import program
 

@@ -1,4 +1,4 @@
-"""Interpreter: each operation of a Program means what language/program.py says, bit for bit."""
+"""Interpreter: each operation of a Program means what language/operation.py says, bit for bit."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hypothesis import given, strategies as st
 
 from engine.interpreter import Interpreter
 from language.elementary import FUNCTIONS
-from language.program import (
+from language.operation import (
     Assign,
     Binary,
     Block,
@@ -21,19 +21,16 @@ from language.program import (
     Call,
     Choose,
     Compare,
-    Constant,
     Count,
     Expr,
     FaultBit,
     Item,
     Loop,
-    Program,
     Ref,
     Run,
     Select,
     Store,
     Unary,
-    Variable,
     add,
     divide,
     multiply,
@@ -41,6 +38,7 @@ from language.program import (
     subtract,
     whole,
 )
+from language.program import Constant, Program, Variable
 
 ARITHMETIC = """
 1 / 0 = inf; 1 / -0.0 = -inf; -1 / 0 = -inf; -1 / -0.0 = inf; inf / -0.0 = -inf; 0 / 0 = nan;

@@ -14,8 +14,15 @@ from language.field import Field, field_blocks
 from language.lower import constant_names, expression
 from language.matrix import Matrix
 from language.model import Automaton
+from language.operation import (
+    Assign,
+    Block,
+    Expr,
+    Ref,
+    Select,
+    Value,
+)
 from language.problem import Problems
-from language.program import Assign, Block, Expr, Ref, Select, Value
 from tests.language.making import automaton, shipped, tree
 
 STATES = ("x", "v", "z")

@@ -12,8 +12,9 @@ from engine.interpreter import Interpreter
 from language.constants import constant_value, exact_value, parameter_constants, values_of
 from language.lower import parameter_kinds, parameter_order, rounded
 from language.model import Automaton, Formula
+from language.operation import Assign
 from language.problem import Problems
-from language.program import Assign, Program, TransitionInfo
+from language.program import Program, TransitionInfo
 from language.transition import MAX_TICKS
 from tests.language.making import automaton, labels, program, refusal, shipped, solved, told, tree
 

@@ -10,8 +10,8 @@ from hypothesis import assume, given, strategies as st
 from language.dimension import LATER, DimensionCheck, Kind, Scope
 from language.evaluate import evaluate
 from language.lower import expression
+from language.operation import Expr, Value
 from language.problem import Problems
-from language.program import Expr, Value
 from language.syntax import Application, Arithmetic, Choice, Name, Negative, Power, Relation, Tree
 from language.units import Dimension
 from tests.language.making import NOWHERE, automaton, dimension, told, tree

@@ -15,19 +15,18 @@ from hypothesis import example, given, settings, strategies as st
 
 from language import elementary
 from language.elementary import FUNCTIONS
-from language.program import (
+from language.operation import (
     Assign,
     Binary,
     Call,
     Compare,
     Expr,
-    Function,
     Ref,
     Select,
     Unary,
     Value,
-    short,
 )
+from language.program import Function, short
 
 Real = Callable[[float], float]
 

@@ -8,7 +8,7 @@ from hypothesis import given, strategies as st
 from language.evaluate import evaluate
 from language.guards import excluded
 from language.lower import expression
-from language.program import Expr, Value
+from language.operation import Expr, Value
 from tests.language.making import automaton, refusal, told, tree
 
 TEXT = """language: 1

@@ -9,9 +9,10 @@ import pytest
 from hypothesis import given, strategies as st
 
 from language.model import Formula, Mode
+from language.operation import Assign
 from language.order import chain, equation_order, report_circle
 from language.problem import Problems
-from language.program import Assign, short
+from language.program import short
 from language.syntax import names
 from tests.language.making import NOWHERE, labels, program, refusal, told, tree
 

@@ -9,8 +9,7 @@ from fractions import Fraction
 import pytest
 
 from language.load import automaton_of, program_of
-from language.printing import block_lines, digest, expr_text, program_text
-from language.program import (
+from language.operation import (
     Assign,
     Binary,
     Branch,
@@ -30,6 +29,7 @@ from language.program import (
     Unary,
     Value,
 )
+from language.printing import block_lines, digest, expr_text, program_text
 from language.project import read_document
 from tests.language.making import SHIPPED, program, shipped
 

@@ -9,7 +9,7 @@ import pytest
 
 from language.elementary import FUNCTIONS
 from language.load import program_of
-from language.program import (
+from language.operation import (
     Assign,
     Binary,
     Branch,
@@ -18,7 +18,6 @@ from language.program import (
     Compare,
     Item,
     Loop,
-    Program,
     Ref,
     Run,
     Select,
@@ -27,6 +26,7 @@ from language.program import (
     Value,
     real,
 )
+from language.program import Program
 from language.wiring import expr_names, finished, reads, walk
 from tests.language.making import program, shipped, stepper
 

@@ -10,7 +10,7 @@ from hypothesis import given, strategies as st
 from language.evaluate import evaluate
 from language.lower import expression
 from language.model import Automaton
-from language.program import Expr, Value
+from language.operation import Expr, Value
 from language.witness import WitnessSearch
 from tests.language.making import SHIPPED, automaton, refusal, told, tree
 

@@ -5,24 +5,26 @@ from __future__ import annotations
 from collections.abc import Iterable
 from fractions import Fraction
 
-from language.program import (
+from language.operation import (
     Assign,
     Block,
     Branch,
     Choose,
     Compare,
-    Constant,
     FaultBit,
-    ModeInfo,
-    Program,
     Ref,
     Run,
-    TransitionInfo,
     Value,
+    whole,
+)
+from language.program import (
+    Constant,
+    ModeInfo,
+    Program,
+    TransitionInfo,
     ValueType,
     Variable,
     Wire,
-    whole,
 )
 from language.wiring import finished
 

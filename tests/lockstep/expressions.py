@@ -10,7 +10,7 @@ from typing import Any
 from hypothesis import strategies as st
 
 from language.elementary import nearest
-from language.program import (
+from language.operation import (
     Binary,
     Call,
     Compare,

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from hypothesis import strategies as st
 
 from engine.interpreter import Interpreter
-from language.program import (
+from language.operation import (
     Assign,
     Block,
     Branch,
@@ -21,7 +21,6 @@ from language.program import (
     Item,
     Loop,
     Op,
-    Program,
     Ref,
     Run,
     Store,
@@ -31,6 +30,7 @@ from language.program import (
     subtract,
     whole,
 )
+from language.program import Program
 from lockstep.compare import Tape
 from tests.lockstep.assembly import CONDITIONS, EQUATIONS, INPUTS, MODES, SIZE, STATES, assembled
 from tests.lockstep.expressions import ANY, FINITE, Draw, Scope, reals, truths

@@ -8,8 +8,9 @@ from hypothesis import HealthCheck, Phase, given, note, settings
 
 from language.elementary import FUNCTIONS
 from language.evaluate import ELEMENTARY, OPERATIONS
+from language.operation import Assign, Expr, Op
 from language.printing import expr_text
-from language.program import Assign, Expr, Op, Program
+from language.program import Program
 from language.wiring import reads, walk
 from lockstep.compare import compare
 from tests.lockstep.programs import Tick, programs, taped, ticks

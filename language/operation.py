@@ -1,0 +1,186 @@
+"""Operation: expressions and operations of a Program; both back ends walk these and no others."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+
+@dataclass(frozen=True, slots=True)
+class Value:
+    """A value in the working type."""
+
+    value: float | int | bool
+
+
+@dataclass(frozen=True, slots=True)
+class Ref:
+    """The value of a variable or constant."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Item:
+    """One element of an array variable."""
+
+    name: str
+    index: Expr
+
+
+@dataclass(frozen=True, slots=True)
+class Unary:
+    """`-` of a real, `not` of a truth value."""
+
+    operator: Literal["-", "not"]
+    operand: Expr
+
+
+@dataclass(frozen=True, slots=True)
+class Binary:
+    """`+ - * /` of two reals or two whole numbers, `and or` of truth values (both evaluated)."""
+
+    operator: Literal["+", "-", "*", "/", "and", "or"]
+    left: Expr
+    right: Expr
+
+
+@dataclass(frozen=True, slots=True)
+class Compare:
+    """A relation; with a NaN it is false, except `!=`."""
+
+    operator: Literal["<", "<=", ">", ">=", "==", "!="]
+    left: Expr
+    right: Expr
+
+
+@dataclass(frozen=True, slots=True)
+class Select:
+    """`then` if the condition holds, else `other`; only the chosen one is evaluated."""
+
+    condition: Expr
+    then: Expr
+    other: Expr
+
+
+@dataclass(frozen=True, slots=True)
+class Call:
+    """An elementary operation (abs sqrt min max clip sign pow2 real) or a function."""
+
+    function: str
+    arguments: tuple[Expr, ...]
+
+
+Expr = Value | Ref | Item | Unary | Binary | Compare | Select | Call
+
+
+@dataclass(frozen=True, slots=True)
+class Assign:
+    """Set a variable; `key` cites the place in the spec."""
+
+    target: str
+    value: Expr
+    key: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Store:
+    """Set one element of an array."""
+
+    array: str
+    index: Expr
+    value: Expr
+
+
+@dataclass(frozen=True, slots=True)
+class Branch:
+    """Run one of two blocks."""
+
+    condition: Expr
+    then: Block
+    other: Block = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Choose:
+    """Run the block of the case that a whole-number variable has."""
+
+    selector: str
+    cases: tuple[tuple[int, Block], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Loop:
+    """Run a block a fixed number of times; the index counts from 0."""
+
+    count: int
+    index: str
+    body: Block
+
+
+@dataclass(frozen=True, slots=True)
+class Count:
+    """Count one up to `limit` (saturating) while the condition holds, else back to 0."""
+
+    timer: str
+    condition: Expr
+    limit: int
+    key: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class FaultBit:
+    """Set a latched fault bit."""
+
+    fault: str
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """Run a named block."""
+
+    block: str
+
+
+Op = Assign | Store | Branch | Choose | Loop | Count | FaultBit | Run
+Block = tuple[Op, ...]
+
+
+def real(value: float) -> Value:
+    """Return a real literal."""
+    return Value(float(value))
+
+
+def whole(value: int) -> Value:
+    """Return a whole-number literal."""
+    return Value(int(value))
+
+
+def add(left: Expr, right: Expr) -> Binary:
+    """Return left + right."""
+    return Binary("+", left, right)
+
+
+def subtract(left: Expr, right: Expr) -> Binary:
+    """Return left - right."""
+    return Binary("-", left, right)
+
+
+def multiply(left: Expr, right: Expr) -> Binary:
+    """Return left * right."""
+    return Binary("*", left, right)
+
+
+def divide(left: Expr, right: Expr) -> Binary:
+    """Return left / right."""
+    return Binary("/", left, right)
+
+
+def total(parts: list[Expr]) -> Expr:
+    """Return the sum from left to right, 0 for no parts."""
+    if not parts:
+        return real(0.0)
+    result = parts[0]
+    for part in parts[1:]:
+        result = add(result, part)
+    return result
