@@ -5,129 +5,34 @@ from __future__ import annotations
 import csv
 import subprocess
 import sys
-from collections.abc import Callable
-from dataclasses import dataclass
 from fractions import Fraction
-from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from engine.interpreter import Stepper
-from engine.recording import Recording, read_recording
-from engine.replay import Replay, replay, used_columns
-from engine.trajectory import Event
-from language.load import automaton_of, program_of
-from language.map import read_map
-from language.model import Automaton, RecordingMap
-from language.problem import Problems, SpecError, render_all
-from language.program import Program
-from language.project import Project, layered, read_document
-
-ROOT = Path(__file__).parents[2]
-PAPER = ROOT / "tests/data/paper"
-TWIN = ROOT / "tests/data/leaf_twin/drive_twin.csv"
-TWIN_SCRIPT = ROOT / "tests/make_leaf_twin.py"
-ESTIMATORS = ("estimator", "estimator_simple")
-
-Moment = tuple[int, int, int]
-"""A transition: its tick [ms], mode before, mode after."""
-
-TRACES = tuple(
-    f"{name}_1kHz{noise}" for name in ("tip_out", "tip_in", "step") for noise in ("", "_noisy")
+from engine.replay import Replay, used_columns
+from tests.engine.replaying import (
+    ARRIVAL,
+    ESTIMATORS,
+    PAPER,
+    POSITION_ERROR,
+    REAL_CROSSINGS,
+    TORQUE_ERROR,
+    TRACES,
+    TWIN,
+    TWIN_CROSSING,
+    TWIN_SCRIPT,
+    Loaded,
+    assert_one_clean_tip_out,
+    both,
+    first_negative_torque,
+    loaded,
+    own_events,
+    replayed_trace,
+    replayed_twin,
 )
-TORQUE_ERROR = 1.2
-"""Root mean square [N*m] against the half-shaft torque of the reference, of up to 580 N*m: it
-stems from the ticks in which one of the two is still in the gap, one tick of 10 at most."""
-POSITION_ERROR = 1e-5
-"""The same of theta_b [rad], of up to 0.0256 rad."""
-ARRIVAL = 3.0
-"""Contact is told at most so late [ms]: loss is seen up to 2 ms late, the wait takes a tick."""
-
-NEAR = 0.15
-"""The estimators leave drive contact that close [s] to the zero crossing of the torque report,
-which lags the command by 30 to 60 ms and is quantised."""
-QUIET = 5.0
-"""So long [s] before that, nothing happens."""
-TWIN_CROSSING = 8.25
-"""First row of the twin with a negative torque report [s]."""
-REAL_CROSSINGS = {"drive_eco.csv": 20.151, "drive_2.csv": 7.55}
-
-
-@dataclass(frozen=True)
-class Loaded:
-    """An automaton, its program, and a recording read for it."""
-
-    automaton: Automaton
-    program: Program
-    mapping: RecordingMap
-    recording: Recording
-
-    def replayed(self, ticked: Callable[[Stepper], None] | None = None) -> Replay:
-        return replay(self.automaton, self.program, self.recording, self.mapping, ticked=ticked)
-
-
-def loaded(
-    path: Path, map_name: str, name: str, variant: str | None = None, project: Project | None = None
-) -> Loaded:
-    project = project or Project(ROOT)
-    document = read_document(project.path_of(name))
-    if variant:
-        over = read_document(project.path_of(variant))
-        document = layered(document, over, project, Problems())
-    automaton = automaton_of(document, project)
-    mapping = read_map(read_document(project.path_of(map_name)), project)
-    used, _ = used_columns(automaton, mapping)
-    recording = read_recording(path, mapping, used)
-    return Loaded(automaton, program_of(automaton), mapping, recording)
-
-
-def reference_events(name: str) -> list[Moment]:
-    """Return the transitions of the reference."""
-    with (PAPER / f"est_paper_{name}_events.csv").open() as file:
-        rows = list(csv.DictReader(file))
-    return [(round(1000 * float(row["t"])), int(row["from"]), int(row["to"])) for row in rows]
-
-
-def own_events(result: Replay) -> list[Moment]:
-    numbers = {name: number for number, name in result.trajectory.modes["mode"].items()}
-    return [
-        (round(1000 * event.time), numbers[event.source], numbers[event.target])
-        for event in result.trajectory.events
-    ]
-
-
-def first_negative_torque(path: Path) -> float:
-    """Return where the torque report first is below zero after a pull [s]."""
-    with path.open() as file:
-        rows = [(float(row["t_s"]), float(row["em_torque_Nm"])) for row in csv.DictReader(file)]
-    return next(time for time, torque in rows if torque < 0)
-
-
-def assert_one_clean_tip_out(events: tuple[Event, ...], crossing: float) -> None:
-    """Quiet before; drive contact is left once, near the crossing; coast contact follows."""
-    left = [event for event in events if event.source == "drive"]
-    assert [abs(event.time - crossing) <= NEAR for event in left] == [True]
-    assert left[0].target == "gap"
-    (after,) = (event for event in events if left[0].time < event.time <= crossing + 2.0)
-    assert (after.source, after.target) == ("gap", "coast")
-    assert not [event for event in events if crossing - QUIET < event.time < left[0].time]
-
-
-@cache
-def replayed_trace(name: str) -> Replay:
-    return loaded(PAPER / f"est_paper_{name}.csv.gz", "reference_trace", "estimator").replayed()
-
-
-@cache
-def replayed_twin(name: str) -> Replay:
-    return loaded(TWIN, "leaf_can", name, "leaf").replayed()
-
-
-def both(name: str) -> tuple[list[Moment], list[Moment]]:
-    """Return our transitions in a reference trace, and those of the reference."""
-    return own_events(replayed_trace(name)), reference_events(name)
 
 
 @pytest.fixture(scope="module")
@@ -303,123 +208,3 @@ def test_a_real_leaf_leaves_drive_contact_once_and_reaches_coast_contact(
     assert crossing == REAL_CROSSINGS[file]
     result = loaded(path, "leaf_can", name, "leaf").replayed()
     assert_one_clean_tip_out(result.trajectory.events, crossing)
-
-
-ECHO = """language: 1
-automaton: echo
-period: 10 ms
-numbers: float64
-inputs:
-  a: {unit: A}
-  b: {unit: A, default: 7 A}
-equations: {total: a + b}
-initial: only
-modes: {only: {number: 0}}
-outputs: [total, mode]
-"""
-HEAD = "language: 1\nmap: bench\ntime: {column: t, unit: s}\ncolumns:\n"
-
-
-class TestAMap:
-    @pytest.fixture
-    def echoed(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Loaded]:
-        """Return a function that replays CSV text through `echo` with the columns of a map."""
-        monkeypatch.chdir(tmp_path)
-        folder = tmp_path / "spec"
-        folder.mkdir()
-
-        def loading(columns: str, text: str) -> Loaded:
-            (folder / "echo.yaml").write_text(ECHO, "utf-8")
-            (folder / "bench.yaml").write_text(HEAD + columns, "utf-8")
-            path = tmp_path / "x.csv"
-            path.write_text(text, "utf-8")
-            return loaded(path, "bench", "echo", project=Project(tmp_path))
-
-        return loading
-
-    def test_feeds_the_default_where_no_column_does(self, echoed: Callable[..., Loaded]) -> None:
-        result = echoed("  a: {to: a, unit: A}\n", "t,a\n0,1\n0.01,2\n").replayed()
-        assert result.trajectory.signals["total"].tolist() == [8.0, 9.0]
-
-    def test_may_feed_a_constant(self, echoed: Callable[..., Loaded]) -> None:
-        columns = "  a: {to: a, unit: A}\nconstants: {b: 500 mA}\n"
-        result = echoed(columns, "t,a\n0,1\n0.01,2\n").replayed()
-        assert result.trajectory.signals["total"].tolist() == [1.5, 2.5]
-
-    def test_takes_the_latest_value_up_to_and_at_the_tick(
-        self, echoed: Callable[..., Loaded]
-    ) -> None:
-        text = "t,a\n0,1\n0.001,2\n0.0099,3\n0.01,4\n0.011,5\n0.035,6\n0.04,7\n"
-        result = echoed("  a: {to: a, unit: A}\n", text).replayed()
-        assert result.trajectory.signals["in.a"].tolist() == [1.0, 4.0, 5.0, 5.0, 7.0]
-
-    def test_delays_a_column_by_exactly_its_delay(self, echoed: Callable[..., Loaded]) -> None:
-        columns = "  a: {to: a, unit: A, delay: 10 ms}\n  b: {to: b, unit: A}\n"
-        rows = "".join(f"{tick / 100},{tick},{tick}\n" for tick in range(5))
-        trajectory = echoed(columns, "t,a,b\n" + rows).replayed().trajectory
-        assert trajectory.times.tolist() == [0.01, 0.02, 0.03, 0.04]
-        assert trajectory.signals["in.a"].tolist() == [0.0, 1.0, 2.0, 3.0]
-        assert trajectory.signals["in.b"].tolist() == [1.0, 2.0, 3.0, 4.0]
-
-    def test_compares_an_output_at_the_ticks_with_a_new_value(
-        self, echoed: Callable[..., Loaded]
-    ) -> None:
-        columns = "  a: {to: a, unit: A}\n  y: {compare: total, unit: A, blank: skip}\n"
-        result = echoed(columns, "t,a,y\n0,1,8\n0.01,2,\n0.02,3,13\n").replayed()
-        (comparison,) = result.comparisons
-        assert comparison.largest == 3.0
-        assert comparison.rms == pytest.approx(3 / np.sqrt(2), rel=1e-15)
-
-    @pytest.mark.parametrize(
-        ("columns", "told"),
-        [
-            (
-                "  b: {to: b, unit: A}\n",
-                "spec/bench.yaml:2:6: error: "
-                "map `bench` gives no value for input `a` of `echo`\n"
-                "  map: bench\n"
-                "       ^^^^^",
-            ),
-            (
-                "  a: {to: a, unit: V}\n",
-                "spec/bench.yaml:5:3: error: column `a` is in `m^2*kg/s^3/A`\n"
-                "    a: {to: a, unit: V}\n"
-                "    ^\n"
-                "help: input `a` is in `A`",
-            ),
-            (
-                "  a: {to: a, unit: A}\n  c: {to: a, unit: A}\n",
-                "spec/bench.yaml:6:3: error: input `a` is fed twice\n"
-                "    c: {to: a, unit: A}\n"
-                "    ^",
-            ),
-            (
-                "  a: {to: a, unit: A}\n  c: {compare: totl, unit: A}\n",
-                "spec/bench.yaml:6:3: error: `totl` is not an output of `echo`\n"
-                "    c: {compare: totl, unit: A}\n"
-                "    ^\n"
-                "help: did you mean `total`?",
-            ),
-        ],
-        ids=["input without value", "dimension", "fed twice", "unknown output"],
-    )
-    def test_that_does_not_fit_is_told_with_its_place(
-        self, echoed: Callable[..., Loaded], columns: str, told: str
-    ) -> None:
-        with pytest.raises(SpecError) as caught:
-            echoed(columns, "t,a,b,c\n0,1,1,1\n")
-        assert render_all(caught.value.problems) == told
-
-    def test_that_leaves_no_tick_is_told(self, echoed: Callable[..., Loaded]) -> None:
-        ready = echoed("  a: {to: a, unit: A, delay: 1 s}\n", "t,a\n0,1\n0.5,2\n")
-        with pytest.raises(SpecError, match="ticks"):
-            ready.replayed()
-
-    def test_that_compares_another_dimension_is_told(self, echoed: Callable[..., Loaded]) -> None:
-        columns = "  a: {to: a, unit: A}\n  b: {compare: total, unit: rpm}\n"
-        with pytest.raises(SpecError):
-            echoed(columns, "t,a,b\n0,1,1\n")
-
-    def test_with_a_constant_that_does_not_fit_is_told(self, echoed: Callable[..., Loaded]) -> None:
-        with pytest.raises(SpecError, match="constant `b` is in"):
-            echoed("  a: {to: a, unit: A}\nconstants: {b: 5 V}\n", "t,a\n0,1\n")
