@@ -14,16 +14,14 @@ from engine.continuous import ContinuousRun, Stopped
 from engine.interpreter import Interpreter, Stepper
 from engine.trajectory import Event, Trajectory, column_array, fault_names
 from language.load import program_of
-from language.model import Automaton, Formula, Instance, Scenario, Stimulus, System
+from language.model import Automaton, Formula, Scenario, Stimulus, System
 from language.problem import Source, Span
-from language.program import Program, short
+from language.program import Program
 from language.syntax import Number
 from language.units import NO_UNIT
 
 Build = Callable[[Program], Stepper]
 Ticked = Callable[[str, Program, Stepper], None]
-MAX_SAMPLES = 20_000_000
-"""Most values kept of one run: 160 MB of doubles."""
 
 
 def simulate(
@@ -257,6 +255,3 @@ def _at(stimulus: Stimulus, time: Fraction) -> float:
         if start <= time:
             value = later
     return value.numerator / value.denominator
-
-
-__all__ = ["Instance", "short", "simulate"]

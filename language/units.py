@@ -176,8 +176,3 @@ def fits(a: Dimension, b: Dimension) -> bool:
 def common(a: Dimension, b: Dimension) -> Dimension:
     """Return the dimension of a sum of two that fit: the exact power of the angle wins."""
     return b if a.angle is None else a
-
-
-def unit_range(low: Fraction, high: Fraction, unit: Unit) -> tuple[Fraction, Fraction]:
-    """Return a range given in `unit` in SI."""
-    return unit.factor * low + unit.offset, unit.factor * high + unit.offset

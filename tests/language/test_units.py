@@ -21,7 +21,6 @@ from language.units import (
     power,
     product,
     root,
-    unit_range,
 )
 from tests.language.making import automaton, si
 
@@ -185,15 +184,6 @@ def test_mechanics_is_shown_in_newtons() -> None:
     assert shown == ["N*m", "N", "W", "Pa"]
     assert str(parse_unit("N*m*s/rad").dimension) == "N*m*s/rad"
     assert str(parse_unit("kg*m^2").dimension) == "m^2*kg"
-
-
-def test_a_range_is_converted_with_its_zero() -> None:
-    celsius = parse_unit("degC")
-    assert unit_range(Fraction(-10), Fraction(40), celsius) == (
-        Fraction(27315, 100) - 10,
-        Fraction(27315, 100) + 40,
-    )
-    assert unit_range(Fraction(-3), Fraction(3), parse_unit("mm"))[0] == Fraction(-3, 1000)
 
 
 def test_a_degree_celsius_in_a_product_is_a_kelvin() -> None:
