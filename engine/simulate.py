@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import heapq
+import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping
 from fractions import Fraction
@@ -15,13 +17,15 @@ from engine.interpreter import Interpreter, Stepper
 from engine.trajectory import Event, Trajectory, column_array, fault_names
 from language.load import program_of
 from language.model import Automaton, Formula, Scenario, Stimulus, System
-from language.problem import Source, Span
+from language.problem import Problems, Source, Span, SpecError
 from language.program import Program
 from language.syntax import Number
 from language.units import NO_UNIT
 
 Build = Callable[[Program], Stepper]
 Ticked = Callable[[str, Program, Stepper], None]
+MAX_INSTANTS = 100_000_000
+"""Most ticks and rows of one run: about an hour of the interpreter."""
 
 
 def simulate(
@@ -124,15 +128,24 @@ class _Simulation:
     def _instants(self) -> Iterator[Fraction]:
         """Yield every instant at which an input steps, an instance ticks or a row is kept."""
         horizon = self.scenario.horizon
-        instants = {time for s in self.scenario.inputs.values() for time, _ in s.steps}
+        steps = {time for s in self.scenario.inputs.values() for time, _ in s.steps}
         grids = [(Fraction(0), self.scenario.every)]
         for name, program in self.programs.items():
             if program.period is not None:
                 grids.append((self.system.instances[name].offset, program.period))
-        for start, period in grids:
-            count = int((horizon - start) // period) + 1 if horizon >= start else 0
-            instants.update(start + k * period for k in range(count))
-        yield from sorted(time for time in instants if time <= horizon)
+        count = sum(max(0, int((horizon - start) // period) + 1) for start, period in grids)
+        if count > MAX_INSTANTS:
+            label = f"the scenario has {count} ticks and rows; at most {MAX_INSTANTS} are run"
+            problems = Problems()
+            problems.error("range", self.scenario.span, label, "a shorter `horizon`")
+            raise SpecError(problems.found)
+        last = None
+        for time in heapq.merge(sorted(steps), *(_grid(*grid) for grid in grids)):
+            if time > horizon:
+                return
+            if time != last:
+                yield time
+            last = time
 
     def _instant(self, time: Fraction) -> None:
         for flow in self.flows.values():
@@ -255,3 +268,8 @@ def _at(stimulus: Stimulus, time: Fraction) -> float:
         if start <= time:
             value = later
     return value.numerator / value.denominator
+
+
+def _grid(start: Fraction, period: Fraction) -> Iterator[Fraction]:
+    """Yield start, start + period, start + 2 periods ... exactly."""
+    return (start + k * period for k in itertools.count())
