@@ -128,7 +128,7 @@ def test_no_fused_operation_even_where_the_cpu_has_them(name: str, tmp_path: Pat
 
 
 def test_the_search_for_fused_operations_finds_them(product: Tape, tmp_path: Path) -> None:
-    flags = ("-O2", "-march=native", "-ffp-contract=fast")
+    flags = ("-std=c99", "-O2", "-march=native", "-ffp-contract=fast")
     folder = tmp_path / "c"
     folder.mkdir()
     write_harness(product.program, folder)
