@@ -12,6 +12,14 @@ class OutputError(Exception):
     """An output cannot be written; the message says which and why."""
 
 
+def make_folder(folder: Path) -> None:
+    """Make a folder and those above it. Raises OutputError."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"{folder}: {error.strerror}") from None
+
+
 def require_writable(*paths: Path | None) -> None:
     """Raise OutputError, before any work is done, for a path that cannot be written."""
     for path in paths:

@@ -1,0 +1,38 @@
+"""Command check: all problems of specs."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from modewright.commands.options import Json
+from modewright.console import console
+from modewright.exits import PROBLEMS
+
+
+def check(
+    specs: Annotated[list[str] | None, typer.Argument(help="specs: names or files")] = None,
+    every: Annotated[bool, typer.Option("--all", help="every spec below spec/")] = False,
+    as_json: Json = False,
+) -> None:
+    """Report all problems of specs: `modewright check estimator spec/ev_driveline/plant.yaml`."""
+    from language.problem import ordered, render_all
+    from modewright import api, show
+    from modewright.generated import spec_files
+
+    names = list(specs or []) + ([str(path) for path in spec_files(Path())] if every else [])
+    if not names:
+        raise typer.BadParameter("name a spec, or use --all", param_hint="SPECS")
+    problems = ordered(problem for name in names for problem in api.check(name))
+    errors = [problem for problem in problems if problem.severity == "error"]
+    if as_json:
+        show.print_json({"problems": [show.problem_json(problem) for problem in problems]})
+    elif problems:
+        print(render_all(problems), file=sys.stderr)
+    if not as_json:
+        console.print(f"{len(names)} specs checked, {len(errors)} problems")
+    if errors:
+        raise typer.Exit(PROBLEMS)

@@ -1,0 +1,56 @@
+"""Command generate: C sources of sampled automata."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from modewright.commands.options import Sets, values_of
+from modewright.console import announce
+from modewright.exits import PROBLEMS
+from modewright.files import make_folder, write_files
+
+
+def generate(
+    automaton: Annotated[str | None, typer.Argument(help="a sampled automaton")] = None,
+    out: Annotated[Path, typer.Option("--out", "-o", help="folder to write to")] = Path(
+        "generated"
+    ),
+    sets: Sets = None,
+    every: Annotated[bool, typer.Option("--all", help="all of spec/ into generated/")] = False,
+    only_check: Annotated[
+        bool, typer.Option("--check", help="with --all: write nothing, fail where stale")
+    ] = False,
+) -> None:
+    """Print C sources: `modewright generate estimator --out build`, `modewright generate --all`."""
+    from modewright import api
+    from modewright.generated import generated_files
+
+    if every == (automaton is not None):
+        raise typer.BadParameter("name an automaton or use --all", param_hint="AUTOMATON")
+    if only_check:
+        _stop_where_stale()
+        return
+    if automaton is not None:
+        made = api.generate(automaton, values_of(sets))
+        files = {out / name: text.encode() for name, text in made.items()}
+    else:
+        files = generated_files(Path())
+    for folder in {path.parent for path in files}:
+        make_folder(folder)
+    write_files(files)
+    announce(list(files))
+
+
+def _stop_where_stale() -> None:
+    from modewright.generated import stale_files
+
+    lines = stale_files(Path())
+    for line in lines:
+        print(line, file=sys.stderr)
+    if lines:
+        print("run `modewright generate --all`", file=sys.stderr)
+        raise typer.Exit(PROBLEMS)
