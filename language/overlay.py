@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from language.document import Entry, Node, Scalar, Table
+from language.document import Entry, Items, Node, Scalar, Table
 from language.problem import Problems, nearest
 
 
@@ -22,7 +22,7 @@ def lay(base: Table, over: Table, problems: Problems, *, template: bool = False)
                 problems.error("overlay", entry.span, label, nearest(entry.key, base.entries))
             entries.pop(entry.key, None)
         elif present is None:
-            entries[entry.key] = entry
+            entries[entry.key] = _added(entry, base, problems)
         else:
             node = _combined(present, entry, problems, template)
             entries[entry.key] = Entry(entry.key, present.span, node)
@@ -42,11 +42,33 @@ def _is_removal(node: Node) -> bool:
     return isinstance(value, Scalar) and value.text == "true"
 
 
+def _added(entry: Entry, base: Table, problems: Problems) -> Entry:
+    """Nothing can be removed inside what is new."""
+    if not isinstance(entry.node, Table):
+        return entry
+    found = Problems()
+    made = lay(Table({}, entry.node.span), entry.node, found)
+    for problem in found.found:
+        hint = problem.help or nearest(entry.key, base.entries)
+        problems.error(problem.kind, problem.span, problem.label, hint)
+    return Entry(entry.key, entry.span, made)
+
+
 def _combined(base: Entry, over: Entry, problems: Problems, template: bool) -> Node:
     if isinstance(base.node, Table) and isinstance(over.node, Table):
         return lay(base.node, over.node, problems, template=template)
-    same = isinstance(base.node, Scalar) and isinstance(over.node, Scalar)
-    if same and not template and base.node.text == over.node.text:  # type: ignore[union-attr]
+    if not template and not isinstance(base.node, Table) and _value(base.node) == _value(over.node):
         label = f"`{over.key}` is overridden by the value that it has"
         problems.warning("overlay", over.span, label, f"it is given at {base.span}")
     return over.node
+
+
+def _value(node: Node) -> object:
+    """What a tree says, without its places."""
+    match node:
+        case Scalar():
+            return node.text
+        case Items():
+            return tuple(_value(item) for item in node.nodes)
+        case Table():
+            return {entry.key: _value(entry.node) for entry in node}

@@ -108,11 +108,15 @@ def expanded(document: Document, project: Project, problems: Problems | None = N
 
     Warnings are left in `problems`. Raises SpecError.
     """
-    return _expanded(document, project, (), problems or Problems())
+    problems = problems or Problems()
+    *variants, made = _layers(document, project)
+    for variant in reversed(variants):
+        made = _laid(made, variant, problems)
+    return made
 
 
 def layered(base: Document, over: Document, project: Project, problems: Problems) -> Document:
-    """Return `base` with the variant `over` laid over it.
+    """Return `base` with the variant `over` laid over it, under the name of the base.
 
     The variant must extend the base or something that the base was made from.
     """
@@ -122,40 +126,45 @@ def layered(base: Document, over: Document, project: Project, problems: Problems
         label = f"variant `{over.name}` extends `{wanted.text}`, not `{base.name}`"
         problems.error("variant", wanted.span, label)
     problems.stop_if_any()
-    body = without(over.root, "language", "variant", "extends")
-    root = lay(expanded(base, project).root, body, problems)
-    problems.stop_if_any()
-    return Document(expanded(base, project).kind, base.name, base.name_span, root, over.source)
+    made = _laid(expanded(base, project, problems), over, problems)
+    head = Entry(made.kind, base.name_span, Scalar(base.name, base.name_span))
+    root = Table({**made.root.entries, made.kind: head}, made.root.span)
+    return Document(made.kind, base.name, base.name_span, root, over.source)
 
 
 def lineage(document: Document, project: Project) -> list[str]:
     """Return the names of a document and of everything that it extends."""
-    names = [document.name]
-    while document.kind == "variant" and len(names) <= len(project.index):
-        document = read_document(project.path_of(_extends(document).text, _extends(document).span))
-        names.append(document.name)
-    return names
+    return [layer.name for layer in _layers(document, project)]
 
 
-def _expanded(
-    document: Document, project: Project, seen: tuple[str, ...], problems: Problems
-) -> Document:
-    if document.kind != "variant":
-        return document
-    extends = _extends(document)
-    base = read_document(project.path_of(extends.text, extends.span))
-    if base.name in (*seen, document.name) or len(seen) > MAX_LAYERS:
-        problems.error("variant", extends.span, f"`{extends.text}` extends itself")
+def _layers(document: Document, project: Project) -> list[Document]:
+    """Return a document and all that it extends, the base last. Raises SpecError for a circle."""
+    found = [document]
+    while found[-1].kind == "variant":
+        extends = _extends(found[-1])
+        base = read_document(project.path_of(extends.text, extends.span))
+        found.append(base)
+        names = [layer.name for layer in found]
+        problems = Problems()
+        if base.name in names[:-1]:
+            circle = " -> ".join(f"`{name}`" for name in names[names.index(base.name) :])
+            label = f"`{base.name}` extends itself: {circle}"
+            problems.error("variant", extends.span, label, "one of them extends a base")
+        elif len(found) > MAX_LAYERS:
+            label = f"more than {MAX_LAYERS} layers lie over each other"
+            problems.error("variant", extends.span, label)
+        problems.stop_if_any()
+    return found
+
+
+def _laid(base: Document, over: Document, problems: Problems) -> Document:
+    """Return a variant laid over its expanded base, with the variant's name."""
+    root = lay(base.root, without(over.root, "language", "variant", "extends"), problems)
     problems.stop_if_any()
-    base = _expanded(base, project, (*seen, document.name), problems)
-    over = without(document.root, "language", "variant", "extends")
-    root = lay(base.root, over, problems)
-    problems.stop_if_any()
-    entries = dict(root.entries)
-    name = Scalar(document.name, document.name_span)
-    entries[base.kind] = Entry(base.kind, document.name_span, name)
-    tree = Table(entries, document.root.span)
-    return Document(base.kind, document.name, document.name_span, tree, document.source)
+    name = Scalar(over.name, over.name_span)
+    entries = {**root.entries, base.kind: Entry(base.kind, over.name_span, name)}
+    tree = Table(entries, over.root.span)
+    return Document(base.kind, over.name, over.name_span, tree, over.source)
 
 
 def _extends(document: Document) -> Scalar:

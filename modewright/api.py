@@ -50,7 +50,7 @@ def check(reference: str, root: Path | None = None) -> list[Problem]:
     problems = Problems()
     try:
         document = read_document(project.path_of(reference))
-        base = expanded(document, project)
+        base = expanded(document, project, problems)
         if base.kind == "automaton":
             program_of(automaton_of(document, project, problems=problems))
         elif base.kind == "system":
@@ -61,8 +61,8 @@ def check(reference: str, root: Path | None = None) -> list[Problem]:
         else:
             _check_scenario(reference, project)
     except SpecError as error:
-        return list(error.problems)
-    return problems.found
+        return list(dict.fromkeys(error.problems))
+    return list(dict.fromkeys(problems.found))
 
 
 def load(

@@ -97,11 +97,18 @@ def test_an_override_by_an_equal_value_is_a_warning_that_names_the_first() -> No
     assert (problem.severity, problem.help) == ("warning", "it is given at base:1:6")
 
 
-@pytest.mark.xfail(
-    reason="overlay._combined compares scalars only, a list replaces too", strict=True
-)
 def test_an_override_by_an_equal_list_is_a_warning() -> None:
     assert laid("{a: [1, 2]}", "{a: [1, 2]}")[1]
+
+
+def test_an_override_by_another_list_is_no_warning() -> None:
+    assert laid("{a: [1, 2]}", "{a: [2, 1]}") == ({"a": ["2", "1"]}, [])
+
+
+@pytest.mark.parametrize("over", ["{b: {c: {remove: true}}}", "{b: {c: {d: {remove: true}}}}"])
+def test_inside_what_is_new_nothing_can_be_removed(over: str) -> None:
+    _, problems = laid("{a: {c: {d: 1}}}", over)
+    assert [problem.label[4:] for problem in problems] == ["cannot be removed: it is not there"]
 
 
 def test_over_a_template_an_equal_value_is_no_warning() -> None:

@@ -10,6 +10,8 @@ from language.document import Document
 from language.load import automaton_of, load_automaton
 from language.problem import Problems, Source, Span
 from language.project import Project, expanded, layered, lineage, read_document, shown
+from language.scenario import read_scenario
+from language.system import read_system
 from modewright.api import check
 from tests.language.making import SHIPPED, document, project_of, refusal, told
 
@@ -167,19 +169,32 @@ def test_a_variant_becomes_what_its_base_is(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "bases", [{"v": "v"}, {"v": "w", "w": "v"}, {"v": "w", "w": "z", "z": "w"}]
+    ("bases", "chain"),
+    [
+        ({"v": "v"}, "`v` extends itself: `v` -> `v`"),
+        ({"v": "w", "w": "v"}, "`v` extends itself: `v` -> `w` -> `v`"),
+        ({"v": "w", "w": "z", "z": "w"}, "`w` extends itself: `w` -> `z` -> `w`"),
+    ],
 )
-def test_a_circle_of_variants_is_refused(tmp_path: Path, bases: dict[str, str]) -> None:
+def test_a_circle_of_variants_is_refused_with_the_chain(
+    tmp_path: Path, bases: dict[str, str], chain: str
+) -> None:
     project = project_of(tmp_path, **{name: variant(name, base) for name, base in bases.items()})
-    (line,) = told(lambda: extended(project, "v"))
-    assert line.endswith("extends itself")
+    for make in (extended, lambda p, name: lineage(read_document(p.path_of(name)), p)):
+        assert told(lambda make=make: make(project, "v")) == [f"3:10 {chain}"]  # type: ignore[misc]
+
+
+def test_twenty_one_layers_are_too_many(tmp_path: Path) -> None:
+    chain = {f"v{k}": variant(f"v{k}", f"v{k + 1}") for k in range(20)}
+    project = project_of(tmp_path, **chain, v20=plain("v20"))
+    assert extended(project, "v1").kind == "automaton"
+    assert told(lambda: extended(project, "v0")) == ["3:10 more than 20 layers lie over each other"]
 
 
 @pytest.mark.parametrize("base", ["v.yaml", "./v.yaml"])
 def test_a_circle_of_variants_by_paths_is_refused(tmp_path: Path, base: str) -> None:
     project = project_of(tmp_path, v=variant("v", base))
-    (line,) = told(lambda: extended(project, "v"))
-    assert line.endswith("extends itself")
+    assert told(lambda: extended(project, "v")) == ["3:10 `v` extends itself: `v` -> `v`"]
 
 
 def test_an_automaton_that_is_its_own_model_is_refused(tmp_path: Path) -> None:
@@ -193,6 +208,65 @@ def test_a_warning_of_a_variant_is_told(tmp_path: Path) -> None:
     same = variant("v", "ball", "parameters: {p: {value: 2 m}}")
     project_of(tmp_path, a=plain("ball"), v=same)
     assert [problem.severity for problem in check("v", tmp_path)] == ["warning"]
+
+
+SYSTEM = """language: 1
+system: shelf
+inputs: {push: {unit: m}}
+instances: {one: {of: cart, values: {p: 3 m}}}
+connections: {one.u: push}
+outputs: {x: one.x}
+"""
+CART = PLAIN.replace("modes:", "inputs: {{u: {{unit: m}}}}\nmodes:") + "outputs: [x]\n"
+RUN = """language: 1
+scenario: run
+of: shelf
+horizon: 2 s
+initial: {one.x: 1 m}
+inputs: {push: {start: 1 m, steps: {1 s: 2 m}}}
+"""
+
+
+def test_a_system_is_extended(tmp_path: Path) -> None:
+    body = "instances: {one: {values: {p: 4 m}}, two: {of: cart}}\nconnections: {two.u: one.x}"
+    project = project_of(
+        tmp_path,
+        a=CART.format(name="cart"),
+        s=SYSTEM,
+        v=variant("v", "shelf", body.replace("one.x}", "push}")),
+    )
+    made = read_system(read_document(project.path_of("v")), project)
+    assert list(made.instances) == ["one", "two"]
+    assert [i.automaton.parameters["p"].value for i in made.instances.values()] == [4, 2]
+    assert check("v", tmp_path) == []
+
+
+def test_a_warning_of_a_variant_of_a_system_is_told(tmp_path: Path) -> None:
+    same = variant("v", "shelf", "instances: {one: {values: {p: 3 m}}}")
+    project_of(tmp_path, a=CART.format(name="cart"), s=SYSTEM, v=same)
+    assert [problem.severity for problem in check("v", tmp_path)] == ["warning"]
+
+
+def test_a_value_for_an_unknown_parameter_is_told_with_the_nearest(tmp_path: Path) -> None:
+    wrong = variant("v", "shelf", "instances: {one: {values: {pp: 3 m}}}")
+    project_of(tmp_path, a=CART.format(name="cart"), s=SYSTEM, v=wrong)
+    (problem,) = check("v", tmp_path)
+    assert (problem.label, problem.span.line) == ("there is no parameter `pp`", 4)
+
+
+def test_a_scenario_is_extended(tmp_path: Path) -> None:
+    body = "horizon: 3 s\ninputs: {push: {steps: {1 s: 5 m, 2 s: 6 m}}}"
+    project = project_of(
+        tmp_path, a=CART.format(name="cart"), s=SYSTEM, r=RUN, v=variant("v", "run", body)
+    )
+    system = read_system(read_document(project.path_of("shelf")), project)
+    made = read_scenario(read_document(project.path_of("v")), project, system)
+    assert (made.name, made.horizon, made.initial) == ("v", 3, {"one.x": 1})
+    assert made.inputs["push"].steps == ((0, 1), (1, 5), (2, 6))
+    assert check("v", tmp_path) == []
+    same = variant("w", "run", "inputs: {push: {start: 1 m}}")
+    project_of(tmp_path, w=same)
+    assert [problem.severity for problem in check("w", tmp_path)] == ["warning"]
 
 
 def test_a_variant_is_laid_over_what_it_extends_or_a_relative_of_it(tmp_path: Path) -> None:
