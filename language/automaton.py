@@ -10,6 +10,7 @@ from language.document import Document, Entry, Node, Scalar, Table
 from language.mode import ModeReader
 from language.model import (
     Automaton,
+    Formula,
     Input,
     Kind,
     Mode,
@@ -20,6 +21,7 @@ from language.overlay import lay, without
 from language.problem import Problems, nearest
 from language.project import Project, expanded, read_document
 from language.reader import FILE_WORDS, Reader, check_name
+from language.syntax import Broken
 from language.units import SECOND, Unit, fits, parse_unit
 
 COMMON_KEYS = ("language", "automaton", "parameters", "inputs", "states", "equations")
@@ -92,8 +94,10 @@ def _set_values(
             label = f"there is no parameter `{name}`"
             problems.error("name", value.span, label, nearest(name, known.entries))
         elif "derived" in entry.node.entries:
-            label = f"`{name}` is derived: set what it follows from"
-            problems.error("values", value.span, label)
+            label = f"`{name}` is derived: its value follows from others"
+            problems.error(
+                "values", value.span, label, f"set what it follows from, given at {entry.span}"
+            )
         else:
             changed = _with(_with_unit(entry.node), "value", value)
             parameters = _with(parameters, name, changed)
@@ -226,8 +230,8 @@ class _AutomatonReader(Reader):
             key = f"states.{entry.key}"
             initial = self.expression(table.get("initial"), f"{key}.initial", entry.span)
             limits = self.range(table.get("range"), unit)
-            if initial:
-                found[entry.key] = State(entry.key, unit, initial, limits, key, entry.span)
+            start = initial or Formula(Broken(entry.span), f"{key}.initial")
+            found[entry.key] = State(entry.key, unit, start, limits, key, entry.span)
         return found
 
     def _initial(self, tree: Table, modes: dict[str, Mode]) -> str:

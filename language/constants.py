@@ -35,7 +35,12 @@ def parameter_constants(automaton: Automaton, problems: Problems) -> dict[str, C
         else:
             value = rounded(parameter.value or Fraction(0))
         if not math.isfinite(value):
-            problems.error("value", parameter.span, f"parameter `{name}` is {value}, not finite")
+            problems.error(
+                "value",
+                parameter.span,
+                f"parameter `{name}` is {value}, not finite",
+                "look for a division by zero or a huge power",
+            )
             value = 0.0
         found[name] = constant_of(automaton, name, kinds[name], value)
         values[found[name].name] = value
@@ -72,7 +77,12 @@ def constant_value(
         problems.error("constant", formula.span, label)
         raise SpecError(problems.found) from None
     if not math.isfinite(value):
-        problems.error("value", formula.span, f"this is {value}, not a finite number")
+        problems.error(
+            "value",
+            formula.span,
+            f"this is {value}, not a finite number",
+            "look for a division by zero or a huge power",
+        )
         raise SpecError(problems.found)
     return value
 

@@ -44,6 +44,8 @@ def program_of(automaton: Automaton) -> Program:
     return continuous_program(automaton, problems)
 
 
-def command_line_value(text: str, option: str = "--set") -> Scalar:
-    """Return a value given on the command line, as a scalar with a place."""
-    return Scalar(text, Span(Source(option, (text,)), 1, 1, max(1, len(text))))
+def command_line_value(text: str, option: str = "--set", name: str = "") -> Scalar:
+    """Return a value given on the command line, as a scalar with a place in `name=value`."""
+    shown = f"{name}={text}" if name else text
+    place = Span(Source(option, (shown,)), 1, 1 + len(shown) - len(text), max(1, len(text)))
+    return Scalar(text, place)

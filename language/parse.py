@@ -12,7 +12,7 @@ from typing import Any
 import lark
 
 from language.document import Scalar
-from language.problem import Problems, Span, SpecError, nearest
+from language.problem import Problems, Span, SpecError
 from language.syntax import (
     Application,
     Arithmetic,
@@ -28,7 +28,7 @@ from language.syntax import (
     Truth,
     depth,
 )
-from language.units import NO_UNIT, SYMBOLS, Unit, UnitError, parse_unit
+from language.units import NO_UNIT, Unit, UnitError, parse_unit, unit_hint
 
 DECIMAL = re.compile(r"(0|[1-9]\d*)(\.\d+)?([eE][-+]?\d+)?")
 MAX_TEXT = 2000
@@ -144,6 +144,8 @@ def _explain(
     if rest.startswith("="):
         return place, "`=` is not part of an expression", "equality is written `==`"
     hint = "there is no implied multiplication" if re.match(r"[A-Za-z0-9(]", rest) else ""
+    if re.match(r",\d", rest):
+        hint = "a decimal point is a point: `12.5`"
     return place, f"`{rest.split(' ')[0][:20]}` was not expected here", hint
 
 
@@ -152,9 +154,7 @@ def _unit(text: str, span: Span) -> Unit:
         return parse_unit(text)
     except UnitError as error:
         problems = Problems()
-        unknown = re.findall(r"[A-Za-z]+", text)
-        wrong = next((symbol for symbol in unknown if symbol not in SYMBOLS), "")
-        hint = nearest(wrong, SYMBOLS) or "a product is written with `*`: `2 * x`"
+        hint = unit_hint(text) or "a product is written with `*`: `2 * x`"
         problems.error("unit", span, str(error), hint)
         raise SpecError(problems.found) from None
 
@@ -219,7 +219,12 @@ class _Build(lark.Transformer[Any, Any]):
         base, token = items
         if abs(int(token)) > MAX_POWER:
             problems = Problems()
-            problems.error("power", self._at(token), f"a power is at most {MAX_POWER}")
+            problems.error(
+                "power",
+                self._at(token),
+                f"a power is at most {MAX_POWER}",
+                "multiply two powers: `x^8 * x`",
+            )
             raise SpecError(problems.found)
         return Power(base, int(token), base.span)
 

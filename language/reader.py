@@ -11,7 +11,7 @@ from language.model import Formula, Range
 from language.parse import COMMA_HINT, parse_expression
 from language.problem import Problems, Source, Span, SpecError, nearest
 from language.syntax import Broken, Negative, Number, Tree
-from language.units import NO_UNIT, SYMBOLS, Unit, UnitError, fits, parse_unit
+from language.units import NO_UNIT, UNKNOWN_UNIT, Unit, UnitError, fits, parse_unit, unit_hint
 
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,30}")
 GRAMMAR_WORDS = frozenset(
@@ -202,6 +202,8 @@ class Reader:
         if node is None:
             return default
         text = self.text(node, what, node.span)
+        if not isinstance(node, Scalar):
+            return default
         if not re.fullmatch(r"-?(0|[1-9]\d{0,8})", text) or not low <= int(text) <= high:
             label = f"`{what}` is a whole number from {low} to {high}"
             self.problems.error("number", node.span, label)
@@ -216,10 +218,8 @@ class Reader:
         try:
             return parse_unit(text) if text else NO_UNIT
         except UnitError as error:
-            symbols = re.findall(r"[A-Za-z]+", text)
-            wrong = next((symbol for symbol in symbols if symbol not in SYMBOLS), "")
-            self.problems.error("unit", node.span, str(error), nearest(wrong, SYMBOLS))
-            return NO_UNIT
+            self.problems.error("unit", node.span, str(error), unit_hint(text))
+            return UNKNOWN_UNIT
 
     def expression(self, node: Node | None, key: str, span: Span) -> Formula | None:
         """Return an expression, or None with the problem reported."""
@@ -240,7 +240,7 @@ class Reader:
             label = f"`{what}` is a number with a unit, not an expression"
             self.problems.error("number", formula.span, label)
         if literal is None:
-            return Fraction(0), unit or NO_UNIT
+            return Fraction(0), unit or UNKNOWN_UNIT
         value, own = literal
         if unit is None:
             return value, own
@@ -254,14 +254,19 @@ class Reader:
     def range(self, node: Node | None, unit: Unit) -> Range | None:
         """Return `[low, high]` in SI."""
         bounds = self.items(node, "range")
-        if node is None:
+        if not isinstance(node, Items):
             return None
         if len(bounds) != 2:
             self.problems.error("form", node.span, "a range is `[low, high]`")
             return None
         low, high = (self.quantity(item, "range", item.span, unit)[0] for item in bounds)
         if low >= high:
-            self.problems.error("range", node.span, "the range is empty: low is not below high")
+            self.problems.error(
+                "range",
+                node.span,
+                "the range is empty: low is not below high",
+                "write the smaller bound first",
+            )
             return None
         return low, high
 

@@ -51,7 +51,8 @@ class _SystemReader(Reader):
         for entry in self.named(tree.get("instances"), "instances"):
             with self.problems.collecting():
                 instances[entry.key] = self._instance(entry)
-        self._unused_overrides(instances)
+        if not self.problems.has_errors:
+            self._unused_overrides(instances)
         self.problems.stop_if_any()
         connections = self._connections(tree, inputs, instances)
         self._unconnected(connections, instances)

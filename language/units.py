@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import re
 from dataclasses import dataclass
 from fractions import Fraction
@@ -88,8 +89,27 @@ class UnitError(ValueError):
 
 
 NUMBER = Dimension()
+UNKNOWN = Dimension((), None)
+"""What is in a unit that was reported: it fits everything, so that nothing is reported twice."""
 SECOND = Dimension((0, 0, 1, 0, 0))
 NO_UNIT = Unit("1", Fraction(1), NUMBER)
+UNKNOWN_UNIT = Unit("?", Fraction(1), UNKNOWN)
+
+OFTEN_WRITTEN = {
+    **dict.fromkeys(("Nm", "NM"), "N*m"),
+    **dict.fromkeys(("Nms", "Nm*s"), "N*m*s"),
+    **dict.fromkeys(("kmh", "kph", "km/hr"), "km/h"),
+    **dict.fromkeys(("sec", "seconds", "S"), "s"),
+    **dict.fromkeys(("msec", "millis"), "ms"),
+    **dict.fromkeys(("meter", "metre", "meters", "metres"), "m"),
+    **dict.fromkeys(("degree", "degrees"), "deg"),
+    **dict.fromkeys(("radian", "radians"), "rad"),
+    **dict.fromkeys(("RPM", "U/min", "1/min"), "rpm"),
+    **dict.fromkeys(("C", "celsius", "Celsius"), "degC"),
+    **dict.fromkeys(("Kg", "KG"), "kg"),
+    "kmph": "km/h",
+}
+"""Units as people write them, and how they are written here."""
 
 
 def _power(name: str, power: int) -> str:
@@ -139,6 +159,8 @@ def product(a: Dimension, b: Dimension, sign: int = 1) -> Dimension:
     A factor that is a pure number keeps the power of the other; of two quantities with
     dimensions, or one and an angle, the result is free; angles alone multiply exactly.
     """
+    if UNKNOWN in (a, b):
+        return UNKNOWN
     powers = tuple(x + sign * y for x, y in zip(a.powers, b.powers, strict=True))
     if b.is_number:
         return a
@@ -162,6 +184,8 @@ def power(a: Dimension, exponent: int) -> Dimension:
 
 def root(a: Dimension) -> Dimension | None:
     """Return the dimension of sqrt(a), or None where a power is odd."""
+    if a == UNKNOWN:
+        return UNKNOWN
     odd_angle = a.angle is not None and a.angle % 2 != 0
     if any(x % 2 for x in a.powers) or odd_angle:
         return None
@@ -170,9 +194,31 @@ def root(a: Dimension) -> Dimension | None:
 
 def fits(a: Dimension, b: Dimension) -> bool:
     """Tell whether two quantities may be added, compared, assigned: rule 20."""
+    if UNKNOWN in (a, b):
+        return True
     return a.powers == b.powers and (a.angle is None or b.angle is None or a.angle == b.angle)
 
 
 def common(a: Dimension, b: Dimension) -> Dimension:
     """Return the dimension of a sum of two that fit: the exact power of the angle wins."""
+    if UNKNOWN in (a, b):
+        return UNKNOWN
     return b if a.angle is None else a
+
+
+def unit_hint(text: str) -> str:
+    """Return "did you mean `N*m`?" for a text that is no unit, or an empty text."""
+    if text in OFTEN_WRITTEN:
+        return f"did you mean `{OFTEN_WRITTEN[text]}`?"
+    changed = re.sub(r"[A-Za-z]+", lambda match: _nearest_symbol(match.group()), text)
+    try:
+        return f"did you mean `{parse_unit(changed).text}`?"
+    except UnitError:
+        return "a unit is written like `N*m`, `kg*m^2`, `1/s`" if " " in text else ""
+
+
+def _nearest_symbol(symbol: str) -> str:
+    if symbol in SYMBOLS:
+        return symbol
+    found = difflib.get_close_matches(symbol, SYMBOLS, n=1)
+    return OFTEN_WRITTEN.get(symbol, found[0] if found else symbol)

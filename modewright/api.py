@@ -199,4 +199,4 @@ def _check_scenario(reference: str, project: Project) -> None:
 
 
 def _scalars(values: Values | None) -> dict[str, Scalar]:
-    return {name: command_line_value(text) for name, text in (values or {}).items()}
+    return {name: command_line_value(text, name=name) for name, text in (values or {}).items()}

@@ -50,7 +50,7 @@ def test_an_instance_that_is_wrong_is_refused(
 
 def test_a_derived_parameter_is_not_set(folder: Path) -> None:
     found = lines(folder, JOINED, "p: {of: plant, values: {derived_one: 1 1/s}}, f: {of: filter}")
-    assert found == ["`derived_one` is derived: set what it follows from"]
+    assert found == ["`derived_one` is derived: its value follows from others"]
 
 
 def test_an_offset_is_a_time(folder: Path) -> None:

@@ -1,0 +1,1 @@
+simulate ev_driveline tip_out 'k_h=5000 N*m/rad'

@@ -1,0 +1,1 @@
+simulate ev_driveline tip_out 'J_v=100 kg*m^2'

@@ -1,0 +1,1 @@
+simulate ev_driveline tip_out 'm=1200 kg'
