@@ -48,9 +48,10 @@ def _added(entry: Entry, base: Table, problems: Problems) -> Entry:
         return entry
     found = Problems()
     made = lay(Table({}, entry.node.span), entry.node, found)
+    near = nearest(entry.key, base.entries)
     for problem in found.found:
-        hint = problem.help or nearest(entry.key, base.entries)
-        problems.error(problem.kind, problem.span, problem.label, hint)
+        hint = problem.help or (f"`{entry.key}` is new: {near}" if near else "")
+        problems.error("overlay", problem.span, problem.label, hint)
     return Entry(entry.key, entry.span, made)
 
 

@@ -20,7 +20,7 @@ from language.problem import Problem, SpecError
 HERE = Path(__file__).parent
 ROOT = HERE.parent.parent
 ENDINGS = (".yaml", ".csv", ".command")
-REPAIRS = (re.compile(r"did you mean `(.+?)`\?"), re.compile(r"^write `(\S+?)`:"))
+REPAIRS = (re.compile(r"^did you mean `(.+?)`\?"), re.compile(r"^write `(\S+?)`:"))
 """Helps that give the very text to write at the place of the problem."""
 
 
