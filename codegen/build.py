@@ -14,6 +14,7 @@ from pathlib import Path
 
 from codegen.names import CNames
 from codegen.source import c_files, render
+from language.missing import ToolMissing as ToolMissing
 from language.program import Program, Variable
 
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-fast-math", "-fno-math-errno")
@@ -35,10 +36,6 @@ WARNINGS = [
 ]
 SECONDS = 120
 """Longest compilation or run before it is given up."""
-
-
-class ToolMissing(Exception):
-    """A program that is needed is not installed; the message says how to get it."""
 
 
 class BuildError(Exception):

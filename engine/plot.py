@@ -1,122 +1,216 @@
-"""Plot: a trajectory as a picture, modes as a coloured band above the signals."""
+"""Plot: runs as a picture: modes as coloured bands above the signals, mode changes marked."""
 
 from __future__ import annotations
 
+import fnmatch
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from engine.trajectory import Trajectory, Values
+from engine.band import PALETTE, Band, draw_band
+from engine.trajectory import Trajectory
+from language.problem import nearest
 
-PALETTE = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#777777")
-"""Colours that colour-blind readers tell apart (Tol 2021, bright)."""
+QUANTITIES = {
+    "1": "number", "A": "current", "K": "temperature", "N": "force", "N*m": "torque",
+    "Pa": "pressure", "V": "voltage", "W": "power", "m": "length", "m/s": "speed",
+    "m/s^2": "acceleration", "rad": "angle", "rad/s": "angular speed",
+    "rad/s^2": "angular acceleration", "s": "time",
+}  # fmt: skip
+"""What is written beside a unit on an axis."""
+FAR = 6.0
+"""Ratio of peaks from which two neighbours in size do not share an axis: the smaller looks flat."""
+MOST_MARKERS = 200
+"""Most mode changes marked in a panel; beyond, lines would be a grey area."""
 
 
 @dataclass(frozen=True)
 class Line:
-    """One curve: its signal in the trajectory, its label, a factor to the shown unit."""
+    """One curve: its signal, its label, a factor to the shown unit, the run that it is of."""
 
     signal: str
     label: str
     factor: float = 1.0
     dashed: bool = False
+    run: int = 0
+    colour: int | None = None
 
 
 @dataclass(frozen=True)
 class Panel:
-    """Curves over one axis."""
+    """Curves over one axis; `height` in inches."""
 
     title: str
     lines: Sequence[Line]
+    height: float = 2.0
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A drawn figure; a notebook shows it, `data` gives the bytes of a file."""
+
+    figure: Figure
+
+    def data(self, form: str = "png") -> bytes:
+        """Return the picture as `png`, `svg` or `pdf`, without a date."""
+        buffer = io.BytesIO()
+        metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(form, {})
+        with matplotlib.rc_context({"svg.hashsalt": "modewright"}):
+            self.figure.savefig(buffer, format=form, dpi=130, metadata=metadata)
+        return buffer.getvalue()
+
+    def save(self, path: str | Path) -> None:
+        """Write the picture; the ending of the name says in which format."""
+        Path(path).write_bytes(self.data(Path(path).suffix.lower()[1:]))
+
+    def _repr_png_(self) -> bytes:
+        return self.data()
 
 
 def picture(
-    trajectory: Trajectory,
+    runs: Sequence[Trajectory],
     panels: Sequence[Panel],
-    mode_signals: Mapping[str, str],
+    bands: Sequence[Band],
     title: str,
-    form: str = "png",
     span: tuple[float, float] | None = None,
-) -> bytes:
-    """Return a picture: one band per mode signal (label -> signal), then the panels."""
-    heights = [0.28] * len(mode_signals) + [2.0] * len(panels)
+) -> Picture:
+    """Return a picture: the bands, then the panels, over one axis of time [s]."""
+    heights = [0.28] * len(bands) + [panel.height for panel in panels] or [1.0]
     figure = Figure(figsize=(9.0, 1.2 + sum(heights)), layout="constrained")
     rows = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)
     axes = [row[0] for row in rows]
-    window = span or _window(trajectory)
-    for axis, (label, signal) in zip(axes, mode_signals.items(), strict=False):
-        _mode_band(axis, trajectory, signal, label, window)
-    for axis, panel in zip(axes[len(mode_signals) :], panels, strict=True):
-        _panel(axis, trajectory, panel, window)
+    window = span or _window(runs)
+    for axis, band in zip(axes, bands, strict=False):
+        draw_band(axis, runs[band.run], band, window)
+    for axis, panel in zip(axes[len(bands) :], panels, strict=True):
+        _panel(axis, runs, panel, window)
+        axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=8, frameon=False)
     axes[0].set_title(title, loc="left", fontsize=11)
     axes[-1].set_xlabel("time [s]")
+    axes[-1].tick_params(labelbottom=True)
     axes[-1].set_xlim(*window)
-    buffer = io.BytesIO()
-    metadata = {"Date": None} if form == "svg" else {}
-    with matplotlib.rc_context({"svg.hashsalt": "modewright"}):
-        figure.savefig(buffer, format=form, dpi=130, metadata=metadata)
-    return buffer.getvalue()
+    return Picture(figure)
 
 
-def all_panels(trajectory: Trajectory) -> list[Panel]:
-    """Return one panel per unit with every real signal of the trajectory."""
-    by_unit: dict[str, list[Line]] = {}
-    for name, values in trajectory.signals.items():
-        if values.dtype == np.float64:
-            by_unit.setdefault(trajectory.units[name], []).append(Line(name, name))
-    return [Panel(f"[{unit}]", lines) for unit, lines in by_unit.items()]
+def overview(
+    runs: Sequence[Trajectory],
+    patterns: Sequence[str] = (),
+    span: tuple[float, float] | None = None,
+    title: str = "",
+    labels: Sequence[str] = ("A", "B"),
+) -> Picture:
+    """Return a picture of all signals (or those that match a pattern) of one run or two.
 
-
-def _window(trajectory: Trajectory) -> tuple[float, float]:
-    times = trajectory.times
-    return (float(times[0]), float(times[-1])) if len(times) > 1 else (0.0, 1.0)
-
-
-def _mode_band(
-    axis: Axes, trajectory: Trajectory, signal: str, label: str, window: tuple[float, float]
-) -> None:
-    names = trajectory.modes[signal]
-    colours = {number: PALETTE[k % len(PALETTE)] for k, number in enumerate(sorted(names))}
-    for start, end, number in _stretches(trajectory.times, trajectory.signals[signal]):
-        axis.axvspan(start, end, color=colours[number], alpha=0.75, lw=0)
-        left, right = max(start, window[0]), min(end, window[1])
-        if right - left > 0.07 * (window[1] - window[0]):
-            text = names[number]
-            middle = 0.5 * (left + right)
-            axis.text(middle, 0.5, text, ha="center", va="center", fontsize=8, color="white")
-    axis.set_yticks([0.5], [label], fontsize=8)
-    axis.set_ylim(0.0, 1.0)
-    axis.tick_params(length=0, labelbottom=False)
-    for side in axis.spines.values():
-        side.set_visible(False)
-
-
-def _stretches(times: Values, modes: Values) -> list[tuple[float, float, int]]:
-    """Return the stretches of equal mode as start, end, number."""
-    if len(times) == 0:
-        return []
-    changes = np.flatnonzero(np.diff(modes)) + 1
-    starts = np.concatenate(([0], changes))
-    ends = np.concatenate((changes, [len(times) - 1]))
-    return [
-        (float(times[a]), float(times[b]), int(modes[a])) for a, b in zip(starts, ends, strict=True)
+    The second run is dashed, in the colours of the first. Raises ValueError for an unknown signal.
+    """
+    _require_matches(runs, patterns)
+    two = len(runs) > 1
+    bands = [
+        Band(name.removesuffix(".mode") + (f", {labels[run]}" if two else ""), name, run)
+        for name in dict.fromkeys(name for each in runs for name in each.modes)
+        for run, each in enumerate(runs)
+        if name in each.modes and name in each.signals and _matches(name, patterns)
     ]
+    title = title or " and ".join(dict.fromkeys(run.name for run in runs))
+    return picture(runs, panels_by_unit(runs, patterns, labels), bands, title, span)
 
 
-def _panel(axis: Axes, trajectory: Trajectory, panel: Panel, window: tuple[float, float]) -> None:
-    shown = (trajectory.times >= window[0]) & (trajectory.times <= window[1])
+def panels_by_unit(
+    runs: Sequence[Trajectory], patterns: Sequence[str] = (), labels: Sequence[str] = ("A", "B")
+) -> list[Panel]:
+    """Return panels of signals by unit, those far apart in size in panels of their own."""
+    by_unit: dict[str, list[str]] = {}
+    for run in runs:
+        for name in run.signals:
+            of_unit = by_unit.setdefault(run.units[name], [])
+            if name not in run.modes and name not in of_unit and _matches(name, patterns):
+                of_unit.append(name)
+    panels = []
+    for unit, names in by_unit.items():
+        for group in _groups(names, runs):
+            lines = [
+                Line(name, f"{name}, {labels[k]}" if len(runs) > 1 else name, 1.0, k > 0, k, colour)
+                for colour, name in enumerate(group)
+                for k, run in enumerate(runs)
+                if name in run.signals
+            ]
+            panels.append(Panel(axis_title(unit), lines))
+    return panels
+
+
+def _groups(names: Sequence[str], runs: Sequence[Trajectory]) -> list[list[str]]:
+    """Return names in groups of similar size, none with more than there are colours."""
+    peaks = {name: max(_peak(run, name) for run in runs) for name in names}
+    groups: list[list[str]] = []
+    last = 0.0
+    for name in sorted(names, key=lambda name: -peaks[name]):
+        if not groups or 0.0 < peaks[name] * FAR < last:
+            groups.append([])
+        groups[-1].append(name)
+        last = peaks[name]
+    found = []
+    for group in groups:
+        kept = [name for name in names if name in group]
+        parts = -(-len(kept) // len(PALETTE))
+        size = -(-len(kept) // parts)
+        found += [kept[start : start + size] for start in range(0, len(kept), size)]
+    return found
+
+
+def _peak(run: Trajectory, name: str) -> float:
+    """Return the largest finite magnitude of a signal, 0 if there is none."""
+    values = np.abs(run.signals.get(name, np.zeros(0)).astype(np.float64))
+    return float(np.max(values, initial=0.0, where=np.isfinite(values)))
+
+
+def axis_title(unit: str) -> str:
+    """Return what is written at an axis: the quantity and its unit."""
+    return f"{QUANTITIES.get(unit, '')} [{unit}]".strip()
+
+
+def _matches(name: str, patterns: Sequence[str]) -> bool:
+    return not patterns or any(fnmatch.fnmatchcase(name, pattern) for pattern in patterns)
+
+
+def _require_matches(runs: Sequence[Trajectory], patterns: Sequence[str]) -> None:
+    known = list(dict.fromkeys(name for run in runs for name in run.signals))
+    for pattern in patterns:
+        if not fnmatch.filter(known, pattern):
+            hint = nearest(pattern, known) or f"signals: {', '.join(known)}"
+            raise ValueError(f"no signal matches `{pattern}`: {hint}")
+
+
+def _window(runs: Sequence[Trajectory]) -> tuple[float, float]:
+    times = [float(run.times[k]) for run in runs if len(run.times) for k in (0, -1)]
+    return (min(times), max(times)) if len(set(times)) > 1 else (0.0, 1.0)
+
+
+def _panel(
+    axis: Axes, runs: Sequence[Trajectory], panel: Panel, window: tuple[float, float]
+) -> None:
     for k, line in enumerate(panel.lines):
-        values = trajectory.signals[line.signal] * line.factor
-        style = "--" if line.dashed else "-"
-        colour = PALETTE[k % len(PALETTE)]
+        run = runs[line.run]
+        shown = (run.times >= window[0]) & (run.times <= window[1])
+        values = run.signals[line.signal]
+        colour = PALETTE[(k if line.colour is None else line.colour) % len(PALETTE)]
+        style = "steps-post" if values.dtype == np.int64 else "default"
         axis.plot(
-            trajectory.times[shown], values[shown], style, color=colour, lw=1.2, label=line.label
-        )
-    axis.set_ylabel(panel.title)
+            run.times[shown], values[shown] * line.factor, "--" if line.dashed else "-",
+            color=colour, lw=1.2, label=line.label, drawstyle=style,
+        )  # fmt: skip
+    _mark_events(axis, runs[0], window)
+    axis.set_ylabel(panel.title, fontsize=9)
     axis.grid(alpha=0.3)
-    axis.legend(loc="upper right", fontsize=8, framealpha=0.9)
+
+
+def _mark_events(axis: Axes, run: Trajectory, window: tuple[float, float]) -> None:
+    instants = sorted({e.time for e in run.events if window[0] <= e.time <= window[1]})
+    for k, time in enumerate(instants[:MOST_MARKERS]):
+        label = "mode changes" if k == 0 else None
+        axis.axvline(time, color="black", lw=0.7, ls=":", alpha=0.55, label=label, zorder=0)

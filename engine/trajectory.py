@@ -6,13 +6,20 @@ import csv
 import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from language.missing import ToolMissing
 from language.program import Program
 
+if TYPE_CHECKING:
+    from engine.plot import Picture
+
 Values = NDArray[np.float64] | NDArray[np.int64]
+TIME = "t [s]"
+"""Head of the first column of every table of samples."""
 
 
 @dataclass(frozen=True)
@@ -53,10 +60,46 @@ class Trajectory:
         """Return the samples as CSV: a head line with units, shortest exact decimals."""
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(["t [s]", *(f"{name} [{self.units[name]}]" for name in self.signals)])
+        writer.writerow(heads(self))
         columns = [values.tolist() for values in (self.times, *self.signals.values())]
         writer.writerows(zip(*columns, strict=True))
         return text.getvalue()
+
+    def frame(self) -> Any:
+        """Return a pandas DataFrame over time: reals in SI, modes by name, `attrs["units"]`.
+
+        Raises ToolMissing.
+        """
+        try:
+            import pandas
+        except ImportError:
+            raise ToolMissing(
+                "a frame needs the package `pandas`: pip install 'modewright[frame]'"
+            ) from None
+        index = pandas.Index(self.times, name=TIME)
+        columns = {
+            name: pandas.Categorical.from_codes(
+                np.searchsorted(sorted(self.modes[name]), values),
+                [self.modes[name][number] for number in sorted(self.modes[name])],
+            )
+            if name in self.modes
+            else values
+            for name, values in self.signals.items()
+        }
+        frame = pandas.DataFrame(columns, index=index)
+        frame.attrs["units"] = dict(self.units)
+        return frame
+
+    def plot(self, signals: Sequence[str] = (), span: tuple[float, float] | None = None) -> Picture:
+        """Return a picture: signals by unit (patterns such as `plant.*`; all), modes, events."""
+        from engine.plot import overview  # matplotlib takes a second: only if asked for
+
+        return overview([self], signals, span)
+
+
+def heads(trajectory: Trajectory) -> list[str]:
+    """Return the heads of a table of samples: `name [unit]`, the time first."""
+    return [TIME, *(f"{name} [{trajectory.units[name]}]" for name in trajectory.signals)]
 
 
 def column_array(kind: str, values: Sequence[float | int | bool]) -> Values:

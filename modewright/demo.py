@@ -6,6 +6,7 @@ from pathlib import Path
 
 from rich.console import Console
 
+from engine.band import Band
 from engine.plot import Line, Panel, picture
 from modewright import api, show
 from modewright.files import write_files
@@ -29,10 +30,14 @@ def run(folder: Path, console: Console) -> bool:
         Line("est.theta_b", "estimator, 1 kHz", 1e3, dashed=True),
     ]
     panels = [Panel("half-shaft torque [N*m]", torque), Panel("position in the gap [mrad]", gap)]
-    bands = {"plant": "plant.mode", "1 kHz": "est.mode", "100 Hz": "simple.mode"}
+    bands = [
+        Band("plant", "plant.mode"),
+        Band("1 kHz", "est.mode"),
+        Band("100 Hz", "simple.mode"),
+    ]
     title = "Tip-out: contact is lost, the gap is crossed, the estimators follow"
     path = folder / "tip_out.png"
-    write_files({path: picture(trajectory, panels, bands, title, span=WINDOW)})
+    write_files({path: picture([trajectory], panels, bands, title, WINDOW).data()})
     console.print(show.events_table(trajectory.events))
     console.print()
     show.print_verdicts(console, verdicts)

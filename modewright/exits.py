@@ -11,6 +11,7 @@ from typing import Any
 
 import typer
 
+from language.missing import ToolMissing
 from language.problem import SpecError, ordered, render_all
 from modewright.files import OutputError
 
@@ -41,13 +42,13 @@ def exit_code(run: Callable[[], object]) -> int:
     except OutputError as error:
         print(f"error: {error}", file=sys.stderr)
         return PROBLEMS
+    except ToolMissing as error:
+        print(f"error: {error}", file=sys.stderr)
+        return TOOL
     except BrokenPipeError:
         sys.stderr.close()
         return DONE
     except Exception as error:
-        if _is_missing_tool(error):
-            print(f"error: {error}", file=sys.stderr)
-            return TOOL
         print(f"error: a defect of modewright: {_first_line(error)}", file=sys.stderr)
         print(f"a report is in {_write_report()}", file=sys.stderr)
         return DEFECT
@@ -59,12 +60,6 @@ def report(error: SpecError) -> None:
     count = sum(problem.severity == "error" for problem in problems)
     print(render_all(problems), file=sys.stderr)
     print(f"\n{count} {'problem' if count == 1 else 'problems'}", file=sys.stderr)
-
-
-def _is_missing_tool(error: Exception) -> bool:
-    from codegen.build import ToolMissing  # a second of imports, only if something went wrong
-
-    return isinstance(error, ToolMissing)
 
 
 def _first_line(error: Exception) -> str:

@@ -23,7 +23,10 @@ Sets = Annotated[
     list[str] | None,
     typer.Option("--set", help="a parameter value: 'k_hs=6000 N*m/rad', 'est.t_wait=2 ms'"),
 ]
-Out = Annotated[Path | None, typer.Option("--out", "-o", help="write the samples to this CSV file")]
+Out = Annotated[
+    Path | None,
+    typer.Option("--out", "-o", help="write the run: .csv (with a side file) or .parquet"),
+]
 Plot = Annotated[
     Path | None, typer.Option("--plot", "-p", help="write a picture: .png, .svg or .pdf")
 ]
@@ -39,6 +42,12 @@ def values_of(sets: Sequence[str] | None) -> dict[str, str]:
             raise typer.BadParameter(f"`{text}` is not `parameter=value`", param_hint="--set")
         found[name.strip()] = value.strip()
     return found
+
+
+def require_run(path: Path | None) -> None:
+    """Raise OutputError, before any work is done, for a run in a format that is not known."""
+    if path and path.suffix.lower() not in (".csv", ".parquet"):
+        raise OutputError(f"{path}: a run ends with .csv or .parquet")
 
 
 def graphic_format(path: Path) -> str:

@@ -7,7 +7,16 @@ from typing import Annotated
 
 import typer
 
-from modewright.commands.options import Json, Out, Plot, Sets, graphic_format, stop_where, values_of
+from modewright.commands.options import (
+    Json,
+    Out,
+    Plot,
+    Sets,
+    graphic_format,
+    require_run,
+    stop_where,
+    values_of,
+)
 from modewright.console import announce, console
 from modewright.files import require_writable, write_files
 
@@ -28,14 +37,16 @@ def replay(
 
     `modewright replay estimator drive.csv --map leaf_can --variant leaf --plot drive.png`
     """
+    from engine.run_file import run_files
     from modewright import api, show
 
+    require_run(out)
     require_writable(out, plot)
     replayed = api.replay(estimator, recording, mapping, variant, values_of(sets))
     trajectory, verdict = replayed.result.trajectory, replayed.verdict
     files: dict[Path, bytes] = {}
     if out:
-        files[out] = trajectory.csv().encode()
+        files |= run_files(trajectory, out)
     if plot:
         from modewright.replay_picture import replay_picture
 

@@ -15,6 +15,7 @@ from modewright.commands.options import (
     Sets,
     System,
     graphic_format,
+    require_run,
     stop_where,
     values_of,
 )
@@ -34,23 +35,20 @@ def simulate(
     as_json: Json = False,
 ) -> None:
     """Simulate a system: `modewright simulate ev_driveline -s tip_out --plot tip_out.png`."""
+    from engine.run_file import run_files
     from modewright import api, show
 
+    require_run(out)
     require_writable(out, plot)
     trajectory = api.simulate(system, scenario, values_of(sets), reference=reference)
-    bands = {
-        name.removesuffix(".mode"): name for name in trajectory.modes if name in trajectory.signals
-    }
     files: dict[Path, bytes] = {}
     if out:
-        files[out] = trajectory.csv().encode()
+        files |= run_files(trajectory, out)
     if plot:
-        from engine.plot import all_panels, picture
+        from engine.plot import overview
 
         title = f"{system}, scenario {scenario}"
-        files[plot] = picture(
-            trajectory, all_panels(trajectory), bands, title, graphic_format(plot)
-        )
+        files[plot] = overview([trajectory], title=title).data(graphic_format(plot))
     write_files(files)
     if as_json:
         show.print_json(show.trajectory_json(trajectory))

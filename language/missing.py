@@ -1,0 +1,7 @@
+"""Missing: what is not installed, and how to get it."""
+
+from __future__ import annotations
+
+
+class ToolMissing(Exception):
+    """A program or package that is needed is not installed; the message says how to get it."""
