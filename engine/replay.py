@@ -63,7 +63,7 @@ def used_columns(automaton: Automaton, mapping: RecordingMap) -> tuple[list[str]
                 hint = nearest(column.compare, automaton.outputs)
                 problems.error("name", column.span, label, hint)
             else:
-                want = automaton.dimensions.get(column.compare, NUMBER)
+                want = automaton.dimensions.get(automaton.source_of(column.compare), NUMBER)
                 _check_dimension(column, want, f"output `{column.compare}`", problems)
             used.append(column.name)
             continue

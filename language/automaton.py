@@ -4,17 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from fractions import Fraction
-from typing import cast
+from typing import Literal, cast
 
 from language.document import Document, Entry, Node, Scalar, Table
+from language.element import ElementReader
 from language.mode import ModeReader
 from language.model import (
     Automaton,
+    Fitting,
     Formula,
     Input,
     Kind,
     Mode,
     Parameter,
+    Range,
     State,
 )
 from language.overlay import lay, without
@@ -25,8 +28,12 @@ from language.syntax import Broken
 from language.units import SECOND, Unit, fits, parse_unit
 
 COMMON_KEYS = ("language", "automaton", "parameters", "inputs", "states", "equations")
-LOGIC_KEYS = ("flow", "initial", "modes", "templates", "outputs")
+LOGIC_KEYS = ("flow", "terms", "initial", "modes", "templates", "outputs", "elements", "places")
 CLOCK_KEYS = ("period", "step", "numbers", "model")
+FITTING_KEYS = ("neutral", "starts", "per", "form")
+FORMS = ("constant", "constant_or_random_walk")
+Per = Literal["model", "recording"]
+Form = Literal["constant", "constant_or_random_walk"]
 DEFAULT_STEP = Fraction(1, 1000)
 """Major step of a continuous automaton that gives none."""
 
@@ -131,6 +138,8 @@ class _AutomatonReader(Reader):
         own = {e.key: self._parameter(e) for e in self.named(tree.get("parameters"), "parameters")}
         modes = ModeReader(self.problems, model).modes(tree, self.at)
         initial = self._initial(tree, modes)
+        laid_on = ElementReader(self.problems)
+        outputs = laid_on.outputs(tree.get("outputs"))
         automaton = Automaton(
             name=document.name,
             period=period,
@@ -141,8 +150,11 @@ class _AutomatonReader(Reader):
             states=self._states(tree),
             modes=modes,
             initial=initial,
-            outputs={item.text: item.span for item in self.items(tree.get("outputs"), "outputs")},
+            outputs=outputs.spans,
             span=document.name_span,
+            sources=outputs.sources,
+            elements=laid_on.elements(tree.get("elements")),
+            places=laid_on.places(tree.get("places")),
         )
         self._check_sections(tree)
         return automaton
@@ -158,7 +170,7 @@ class _AutomatonReader(Reader):
             self.problems.error("form", node.span, "`numbers` belongs to a sampled automaton")
 
     def _check_sections(self, tree: Table) -> None:
-        for key in ("flow", "step") if self.sampled else ("model",):
+        for key in ("flow", "terms", "step") if self.sampled else ("model",):
             node = tree.get(key)
             if node is not None:
                 other = "continuous" if self.sampled else "sampled"
@@ -178,7 +190,7 @@ class _AutomatonReader(Reader):
         return Fraction(1, 1000)
 
     def _parameter(self, entry: Entry) -> Parameter:
-        keys = ("value", "unit", "range", "tunable", "derived")
+        keys = ("value", "unit", "range", "tunable", "derived", *FITTING_KEYS)
         table = self.table(entry.node, f"parameters.{entry.key}", keys)
         key = f"parameters.{entry.key}"
         unit_node = table.get("unit")
@@ -201,7 +213,27 @@ class _AutomatonReader(Reader):
         if limits and value is not None and not limits[0] <= value <= limits[1]:
             place = cast(Scalar, table.get("value")).span
             self.problems.error("range", place, f"the value of `{entry.key}` is outside its range")
-        return Parameter(entry.key, kind, unit, value, derived, limits, key, entry.span)
+        fitting = self._fitting(table, unit, limits)
+        return Parameter(entry.key, kind, unit, value, derived, limits, key, entry.span, fitting)
+
+    def _fitting(self, table: Table, unit: Unit, limits: Range | None) -> Fitting:
+        node = table.get("neutral")
+        neutral: Fraction | Literal["absent"] | None = None
+        if isinstance(node, Scalar) and node.text == "absent":
+            neutral = "absent"
+        elif node is not None:
+            neutral, _ = self.quantity(node, "neutral", node.span, unit)
+            if limits and not limits[0] <= neutral <= limits[1]:
+                self.problems.error("range", node.span, "the neutral value is outside the range")
+        starts = []
+        for item in self.items(table.get("starts"), "starts"):
+            start, _ = self.quantity(item, "starts", item.span, unit)
+            if limits and not limits[0] <= start <= limits[1]:
+                self.problems.error("range", item.span, "this start is outside the range")
+            starts.append(start)
+        per = self.choice(table.get("per"), "per", ("model", "recording"), "model")
+        form = self.choice(table.get("form"), "form", FORMS, "constant")
+        return Fitting(neutral, tuple(starts), cast(Per, per), cast(Form, form))
 
     def _input(self, entry: Entry) -> Input:
         keys = ("unit", "range", "default", "type")

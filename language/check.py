@@ -6,6 +6,7 @@ import dataclasses
 from collections.abc import Iterable, Mapping
 
 from language.balance import coefficient_of
+from language.check_element import check_laid_on
 from language.check_observer import check_observer
 from language.dimension import DimensionCheck, Kind, Scope
 from language.guards import report_overlaps
@@ -64,6 +65,7 @@ class _Check:
             with self.problems.collecting():
                 self._mode(mode)
         self._outputs()
+        check_laid_on(automaton, self.names, self.problems)
         self._sampled_ranges()
         known = {name: kind for name, kind in self.names.items() if isinstance(kind, Dimension)}
         return dataclasses.replace(automaton, dimensions=known)
@@ -253,7 +255,8 @@ class _Check:
     def _outputs(self) -> None:
         automaton = self.automaton
         equations = _equation_names(automaton.modes.values())
-        for name, span in automaton.outputs.items():
+        for output, span in automaton.outputs.items():
+            name = automaton.source_of(output)
             if name == "mode" or name in automaton.states:
                 continue
             if name not in equations:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -24,15 +25,21 @@ REFUSED_TOKENS = {
 
 @dataclass(frozen=True)
 class Scalar:
-    """A leaf: its text as written (quotes removed), resolved by who reads it."""
+    """A leaf: its text as written (quotes removed), resolved by who reads it.
+
+    `changes` are the places of the overlays that rewrote a part of the text, in order.
+    """
 
     text: str
     span: Span
     quoted: bool = False
+    changes: tuple[Span, ...] = ()
 
     @property
     def text_span(self) -> Span:
         """The place of the first character of the text itself, behind an opening quote."""
+        if self.changes:
+            return dataclasses.replace(self.span, whole=True)
         return self.span.inside(1, len(self.text)) if self.quoted else self.span
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 from language.document import Entry, Node, Table
 from language.model import Automaton, Balance, Formula, Mode, Transition
 from language.observer import read_observer, read_run
@@ -9,9 +11,9 @@ from language.overlay import lay, without
 from language.parse import parse_balance
 from language.problem import Problems, Span, nearest
 from language.reader import Reader
-from language.syntax import Broken, Tree
+from language.syntax import Arithmetic, Broken, Tree
 
-MODE_KEYS = ("number", "equations", "flow", "update", "observer", "runs", "transitions")
+MODE_KEYS = ("number", "equations", "flow", "terms", "update", "observer", "runs", "transitions")
 TRANSITION_KEYS = ("to", "when", "wait", "priority", "reset")
 
 
@@ -65,6 +67,8 @@ class ModeReader(Reader):
             equations[name] = formula
         flow = self._flow(root.get("flow"), "flow")
         flow.update(self._flow(table.get("flow"), f"{key}.flow"))
+        self._add_terms(flow, root.get("terms"), "terms")
+        self._add_terms(flow, table.get("terms"), f"{key}.terms")
         observer_node, run_node = table.get("observer"), table.get("runs")
         return Mode(
             name=entry.key,
@@ -101,6 +105,20 @@ class ModeReader(Reader):
                 left, right = parse_balance(scalar)
             found[entry.key] = Balance(entry.key, left, right, f"{key}.{entry.key}")
         return found
+
+    def _add_terms(self, flow: dict[str, Balance], node: Node | None, key: str) -> None:
+        """Add named summands to the right sides of balances, in the order of layers."""
+        for entry in self.named(node, key):
+            terms = self._formulas(entry.node, f"{key}.{entry.key}")
+            if entry.key not in flow:
+                label = f"there is no balance of `{entry.key}` that a term could be added to"
+                self.problems.error("name", entry.span, label, nearest(entry.key, flow))
+                continue
+            balance = flow[entry.key]
+            right = balance.right
+            for formula in terms.values():
+                right = Arithmetic("+", right, formula.tree, formula.span)
+            flow[entry.key] = dataclasses.replace(balance, right=right)
 
     def _transitions(self, node: Node | None, source: str) -> list[Transition]:
         found = []

@@ -29,6 +29,20 @@ class Formula:
 
 
 @dataclass(frozen=True)
+class Fitting:
+    """What a fit needs to know of a parameter (SI).
+
+    `neutral` is the value at which the effect that brought it vanishes, `absent` where there is
+    none; `starts` are values to start from; `per` is `recording` for one value each.
+    """
+
+    neutral: Fraction | Literal["absent"] | None = None
+    starts: tuple[Fraction, ...] = ()
+    per: Literal["model", "recording"] = "model"
+    form: Literal["constant", "constant_or_random_walk"] = "constant"
+
+
+@dataclass(frozen=True)
 class Parameter:
     """A value in SI (exact) or, if derived, an expression of other parameters."""
 
@@ -40,6 +54,7 @@ class Parameter:
     range: Range | None
     key: str
     span: Span
+    fitting: Fitting = Fitting()
 
 
 @dataclass(frozen=True)
@@ -138,6 +153,18 @@ class Mode:
 
 
 @dataclass(frozen=True)
+class Element:
+    """A part of the physics on which effects may be laid; `far` are what acts at its far end."""
+
+    name: str
+    kind: Literal["elastic", "inertia"]
+    parts: Mapping[str, Formula]
+    far: Mapping[str, Span]
+    key: str
+    span: Span
+
+
+@dataclass(frozen=True)
 class Automaton:
     """A hybrid automaton: sampled if it has a period, continuous otherwise."""
 
@@ -153,6 +180,13 @@ class Automaton:
     outputs: Mapping[str, Span]
     span: Span
     dimensions: Mapping[str, Dimension] = field(default_factory=dict, repr=False)
+    sources: Mapping[str, str] = field(default_factory=dict)
+    elements: Mapping[str, Element] = field(default_factory=dict)
+    places: Mapping[str, Mapping[str, Formula]] = field(default_factory=dict)
+
+    def source_of(self, output: str) -> str:
+        """Return the state or equation that an output reads: its own name unless it says more."""
+        return self.sources.get(output, output)
 
     @property
     def is_sampled(self) -> bool:

@@ -16,23 +16,34 @@ NEAREST_CUTOFF = 0.6
 
 @dataclass(frozen=True)
 class Source:
-    """A text that spans point into: the name shown to the user and the lines of the text."""
+    """A text that spans point into: the name shown to the user and the lines of the text.
+
+    `layer` says which effect its lines were laid by, `laid` where that was asked for.
+    """
 
     name: str
     lines: tuple[str, ...] = field(repr=False, default=())
+    layer: str = ""
+    laid: Span | None = field(repr=False, default=None)
 
 
 @dataclass(frozen=True)
 class Span:
-    """A place in a source: line and column count from 1, width in characters (at least 1)."""
+    """A place in a source: line and column count from 1, width in characters (at least 1).
+
+    A `whole` place is that of a text that an overlay rewrote: its parts have no other place.
+    """
 
     source: Source
     line: int
     column: int
     width: int = 1
+    whole: bool = False
 
     def inside(self, offset: int, width: int = 1) -> Span:
         """Return the span `offset` characters into this one."""
+        if self.whole:
+            return self
         return Span(self.source, self.line, self.column + offset, max(1, width))
 
     def __str__(self) -> str:
@@ -110,6 +121,8 @@ def render(problem: Problem) -> str:
         rows += [f"  {text}", "  " + " " * (span.column - 1) + "^" * width]
     if problem.help:
         rows.append(f"help: {problem.help}")
+    if span.source.laid:
+        rows.append(f"in {span.source.layer}, laid at {span.source.laid}")
     return "\n".join(rows)
 
 

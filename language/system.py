@@ -229,7 +229,7 @@ class _SystemReader(Reader):
 def _output_dimensions(instance: Instance) -> dict[str, Dimension]:
     automaton = instance.automaton
     return {
-        f"{instance.name}.{name}": automaton.dimensions[name]
+        f"{instance.name}.{name}": automaton.dimensions[automaton.source_of(name)]
         for name in automaton.outputs
-        if name in automaton.dimensions
+        if automaton.source_of(name) in automaton.dimensions
     }

@@ -70,17 +70,18 @@ def state_variables(automaton: Automaton) -> list[Variable]:
 def output_wires(automaton: Automaton) -> tuple[Wire, ...]:
     """Return the outputs in the order of the file."""
     found = []
-    for name in automaton.outputs:
+    for output in automaton.outputs:
+        name = automaton.source_of(output)
         if name == "mode":
-            found.append(Wire("mode", "memory.mode", "whole", "1"))
+            found.append(Wire(output, "memory.mode", "whole", "1"))
             continue
         if name in automaton.states:
             unit = str(automaton.states[name].unit.dimension)
-            found.append(Wire(name, f"state.{name}", "real", unit))
+            found.append(Wire(output, f"state.{name}", "real", unit))
             continue
         dimension = automaton.dimensions.get(name)
         kind: ValueType = "real" if dimension else "truth"
-        found.append(Wire(name, f"equation.{name}", kind, str(dimension or "1")))
+        found.append(Wire(output, f"equation.{name}", kind, str(dimension or "1")))
     return tuple(found)
 
 

@@ -1,0 +1,94 @@
+"""Rewrite: change names in the text of an expression, token by token."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+
+NUMBER = r"\d(?:[eE][-+]\d|[0-9A-Za-z_.])*"
+UNIT = r"(?:1/)?[A-Za-z]+(?:\^-?\d)?(?:[*/][A-Za-z]+(?:\^-?\d)?)*"
+WORDS = frozenset(["if", "then", "else", "and", "or", "not", "true", "false"])
+TOKEN = re.compile(
+    rf"(?P<number>{NUMBER}(?: (?!(?:{'|'.join(sorted(WORDS))})\b){UNIT})?)"
+    r"|(?P<name>\$?[A-Za-z]\w*(?: *\. *[A-Za-z]\w*)*)"
+    r"|(?P<mark><=|>=|==|!=|[-+*/^()<>=,])"
+    r"|(?P<blank>\s+)|(?P<other>.)"
+)
+"""The tokens of `expression.lark`, and holes such as `$speed`."""
+ATOM = re.compile(r"\$?[A-Za-z]\w*|\d+(\.\d+)?")
+"""What can stand for a name as it is; anything else gets parentheses."""
+
+
+def substituted(text: str, new: Mapping[str, str]) -> tuple[str, frozenset[str]]:
+    """Return an expression in which names are replaced, and the names that were found.
+
+    A name is replaced where it is read: not as a function, nor as a part of a path, a unit or
+    another name, nor in `der(x)`, which says whose balance it is. What is put for a name is one
+    operand: an expression gets parentheses.
+    """
+    tokens = list(_tokens(text))
+    found: set[str] = set()
+    parts = []
+    for position, (kind, part) in enumerate(tokens):
+        if kind == "name" and part in new and _is_read(tokens, position):
+            found.add(part)
+            part = new[part] if ATOM.fullmatch(new[part]) else f"({new[part]})"
+        parts.append(part)
+    return "".join(parts), frozenset(found)
+
+
+def reads(text: str) -> list[str]:
+    """Return the names that an expression reads, as written, from left to right."""
+    tokens = list(_tokens(text))
+    return [
+        part
+        for position, (kind, part) in enumerate(tokens)
+        if kind == "name" and part not in WORDS and _is_read(tokens, position)
+    ]
+
+
+def sides(balance: str) -> tuple[str, str]:
+    """Return the left and the right side of a balance; the right one is empty without a `=`."""
+    left, _, right = balance.partition("=")
+    return left.strip(), right.strip()
+
+
+def summands(text: str) -> list[tuple[str, str]]:
+    """Return the top-level summands of an expression with their signs, `+` or `-`."""
+    found: list[tuple[str, str]] = []
+    sign, part, depth, operand = "+", "", 0, False
+    if text.split(" ", 1)[0] == "if":
+        return [("+", text)]
+    for kind, token in _tokens(text):
+        depth += (token == "(") - (token == ")")
+        if depth == 0 and kind == "mark" and token in "+-" and operand:
+            found.append((sign, part.strip()))
+            sign, part, operand = token, "", False
+            continue
+        if kind != "blank":
+            operand = kind != "mark" or token == ")"
+        part += token
+    return [*found, (sign, part.strip())]
+
+
+def joined(parts: list[tuple[str, str]]) -> str:
+    """Return summands with their signs as one expression; `0` where there are none."""
+    text = ""
+    for sign, part in parts:
+        if text:
+            text += f" {sign} {part}"
+        else:
+            text = part if sign == "+" else f"-{part}"
+    return text or "0"
+
+
+def _tokens(text: str) -> Iterator[tuple[str, str]]:
+    for match in TOKEN.finditer(text):
+        yield str(match.lastgroup), match.group()
+
+
+def _is_read(tokens: list[tuple[str, str]], position: int) -> bool:
+    """Tell whether the name at a position is read: no function, not what `der` or `in` takes."""
+    after = [part for kind, part in tokens[position + 1 :] if kind != "blank"][:1]
+    before = [part for kind, part in tokens[:position] if kind != "blank"][-2:]
+    return after != ["("] and before not in (["der", "("], ["in", "("])
