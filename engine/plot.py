@@ -79,17 +79,23 @@ def picture(
     bands: Sequence[Band],
     title: str,
     span: tuple[float, float] | None = None,
+    shaded: Sequence[tuple[float, float]] = (),
 ) -> Picture:
-    """Return a picture: the bands, then the panels, over one axis of time [s]."""
+    """Return a picture: the bands, then the panels, over one axis of time [s].
+
+    The windows `shaded` [s] are drawn red behind the panels.
+    """
     heights = [0.28] * len(bands) + [panel.height for panel in panels] or [1.0]
     figure = Figure(figsize=(9.0, 1.2 + sum(heights)), layout="constrained")
     rows = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)
     axes = [row[0] for row in rows]
-    window = span or _window(runs)
+    window = _window(runs, span)
     for axis, band in zip(axes, bands, strict=False):
         draw_band(axis, runs[band.run], band, window)
     for axis, panel in zip(axes[len(bands) :], panels, strict=True):
         _panel(axis, runs, panel, window)
+        for start, end in shaded:
+            axis.axvspan(start, end, color=PALETTE[1], alpha=0.2, lw=0, zorder=-1)
         axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=8, frameon=False)
     axes[0].set_title(title, loc="left", fontsize=11)
     axes[-1].set_xlabel("time [s]")
@@ -186,9 +192,16 @@ def _require_matches(runs: Sequence[Trajectory], patterns: Sequence[str]) -> Non
             raise ValueError(f"no signal matches `{pattern}`: {hint}")
 
 
-def _window(runs: Sequence[Trajectory]) -> tuple[float, float]:
+def _window(runs: Sequence[Trajectory], span: tuple[float, float] | None) -> tuple[float, float]:
+    """Return what is shown: the span, its infinite ends replaced by those of the runs [s]."""
     times = [float(run.times[k]) for run in runs if len(run.times) for k in (0, -1)]
-    return (min(times), max(times)) if len(set(times)) > 1 else (0.0, 1.0)
+    whole = (min(times), max(times)) if len(set(times)) > 1 else (0.0, 1.0)
+    if span is None:
+        return whole
+    start, end = (
+        given if np.isfinite(given) else own for given, own in zip(span, whole, strict=True)
+    )
+    return (start, end) if start < end else whole
 
 
 def _panel(

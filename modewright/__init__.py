@@ -9,35 +9,50 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from engine.difference import RunDifference
+    from engine.plot import Picture
     from engine.trajectory import Event, Trajectory
     from language.problem import Problem, SpecError, render_all
     from lockstep.compare import Verdict
     from modewright.api import Loaded, Replayed, check, generate, load, lockstep, replay, simulate
+    from modewright.runs import compare, plot, read, save
 
 __all__ = [
     "Event",
     "Loaded",
+    "Picture",
     "Problem",
     "Replayed",
+    "RunDifference",
     "SpecError",
     "Trajectory",
     "Verdict",
     "check",
+    "compare",
     "generate",
     "load",
     "lockstep",
+    "plot",
+    "read",
     "render_all",
     "replay",
+    "save",
     "simulate",
 ]
 
 PLACES = {
     "Event": "engine.trajectory",
+    "Picture": "engine.plot",
     "Problem": "language.problem",
+    "RunDifference": "engine.difference",
     "SpecError": "language.problem",
     "Trajectory": "engine.trajectory",
     "Verdict": "lockstep.compare",
+    "compare": "modewright.runs",
+    "plot": "modewright.runs",
+    "read": "modewright.runs",
     "render_all": "language.problem",
+    "save": "modewright.runs",
 }
 """Where a name of the public API is defined, if not in `modewright.api`."""
 

@@ -9,22 +9,24 @@ from typing import Annotated
 import typer
 
 from modewright.commands.check import check
+from modewright.commands.compare import compare
 from modewright.commands.demo import demo
 from modewright.commands.explain import explain
 from modewright.commands.generate import generate
 from modewright.commands.lockstep import lockstep
+from modewright.commands.plot import plot
 from modewright.commands.replay import replay
 from modewright.commands.simulate import simulate
 from modewright.console import configure
 from modewright.exits import EXIT_CODES, exit_code
 from modewright.files import require_writable
 
-COMMANDS = (check, simulate, lockstep, replay, generate, explain, demo)
+COMMANDS = (check, simulate, lockstep, replay, plot, compare, generate, explain, demo)
 
 app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
-    rich_markup_mode="markdown",
+    rich_markup_mode=None,
     help="Hybrid automata in YAML: simulate them, print them as C, keep both in lock-step.",
     epilog=EXIT_CODES,
 )

@@ -3,20 +3,36 @@
 from __future__ import annotations
 
 import logging
+import os
 import sys
 import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from rich.console import Console
+if TYPE_CHECKING:
+    from rich.console import Console
 
-console = Console()
-"""Results on stdout; silenced by --quiet."""
+PLAIN_WIDTH = 160
+"""Columns of a table in a pipe or a file, where there is no window to fit."""
 log = logging.getLogger("modewright")
+
+
+@cache
+def console() -> Console:
+    """Return the console for results: stdout, without colours in pipes and under NO_COLOR."""
+    from rich.console import Console  # a quarter of the time of --help, which needs none
+
+    has_width = sys.stdout.isatty() or "COLUMNS" in os.environ
+    return Console(width=None if has_width else PLAIN_WIDTH)
 
 
 def configure(quiet: bool = False, verbose: bool = False, log_file: Path | None = None) -> None:
     """Set how much is told: --quiet only problems, --verbose each step, --log-file all of it."""
-    console.quiet = quiet
+    if quiet or console.cache_info().currsize:
+        console().quiet = quiet
     for handler in list(log.handlers):
         log.removeHandler(handler)
         handler.close()
@@ -32,11 +48,27 @@ def configure(quiet: bool = False, verbose: bool = False, log_file: Path | None 
         log.addHandler(logging.NullHandler())
 
 
-def announce(files: list[Path]) -> None:
+@contextmanager
+def working(what: str) -> Iterator[None]:
+    """Show on a terminal that work goes on, and for how long; log when it is done."""
+    from rich.console import Console
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    start = time.monotonic()
+    screen = Console(stderr=True)
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    is_hidden = not screen.is_terminal or console().quiet
+    with Progress(*columns, console=screen, transient=True, disable=is_hidden) as progress:
+        progress.add_task(what, total=None)
+        yield
+    log.info("%s: %.2f s", what, time.monotonic() - start)
+
+
+def announce(files: Sequence[Path]) -> None:
     """Tell which files were written."""
     for path in files:
         log.info("wrote %s", path)
-        console.print(f"wrote {path}", highlight=False, soft_wrap=True)
+        console().print(f"wrote {path}", highlight=False, soft_wrap=True)
 
 
 def _plain(handler: logging.Handler, form: str) -> logging.Handler:

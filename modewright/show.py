@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
+from engine.difference import ModeSequence, RunDifference
 from engine.trajectory import Event, Trajectory
 from language.problem import Problem
 from lockstep.compare import Verdict
@@ -26,7 +29,7 @@ def print_json(value: Mapping[str, Any]) -> None:
 def events_table(events: Sequence[Event]) -> Table:
     """Return a table of transitions."""
     table = Table(
-        "time [s]", "automaton", "from", "to", box=None, pad_edge=False, header_style="bold"
+        escape("time [s]"), "automaton", "from", "to", box=None, pad_edge=False, header_style="bold"
     )
     for event in events[:MOST_EVENTS]:
         table.add_row(
@@ -139,3 +142,64 @@ def print_replay(console: Console, replayed: Replayed) -> None:
         console.print(f"`{name}` of the map is not read: there is no such input", highlight=False)
     if replayed.verdict:
         print_verdicts(console, [replayed.verdict])
+
+
+def print_difference(console: Console, found: RunDifference) -> None:
+    """Print the differences of two runs: signals, modes, transitions, and when they part."""
+    table = Table(
+        "signal", "unit", "RMS", "largest", escape("at [s]"), escape("beyond from [s]"),
+        box=None, pad_edge=False, header_style="bold",
+    )  # fmt: skip
+    for item in found.signals:
+        first = "" if item.first is None else f"[red]{item.first:.9g}[/]"
+        at = f"{item.at:.6g}" if item.largest else ""
+        table.add_row(item.name, item.unit, f"{item.rms:.4g}", f"{item.largest:.4g}", at, first)
+    console.print(table)
+    for sequence in found.sequences:
+        console.print(_sequence_line(sequence), highlight=False)
+    for window in found.windows[:MOST_EVENTS]:
+        span = f"{window.start:.9g} s to {window.end:.9g} s"
+        text = f"{window.signal}: {span}: {window.a} in A, {window.b} in B"
+        console.print(text, highlight=False, soft_wrap=True)
+    if len(found.windows) > MOST_EVENTS:
+        console.print(f"{len(found.windows) - MOST_EVENTS} more windows of disagreement")
+    for names, letter in ((found.only_a, "A"), (found.only_b, "B")):
+        if names:
+            console.print(f"only in {letter}: {', '.join(names)}", highlight=False, soft_wrap=True)
+    if found.uncovered:
+        console.print(f"{found.uncovered:.6g} s are in one of the runs only", highlight=False)
+    if found.first:
+        console.print(f"they part at {found.first[0]:.9g} s: {found.first[1]}", highlight=False)
+    console.print(
+        f"{found.samples} samples: {'within' if found.is_within else 'NOT within'} tolerance"
+    )
+
+
+def difference_json(found: RunDifference) -> dict[str, Any]:
+    """Return the differences of two runs as plain data; what is infinite is null."""
+    return {
+        "within": found.is_within,
+        "span": list(found.span),
+        "samples": found.samples,
+        "signals": [_finite(vars(item)) for item in found.signals],
+        "mode_windows": [vars(window) for window in found.windows],
+        "transitions": [vars(sequence) for sequence in found.sequences],
+        "only_a": list(found.only_a),
+        "only_b": list(found.only_b),
+        "uncovered": found.uncovered,
+        "first": list(found.first) if found.first else None,
+    }
+
+
+def _sequence_line(sequence: ModeSequence) -> str:
+    counts = f"{sequence.count_a} transitions in A, {sequence.count_b} in B"
+    same = f"the same, at most {sequence.apart:.3g} s apart"
+    told = same if sequence.parted is None else f"not the same from number {sequence.parted + 1} on"
+    return f"{sequence.instance or 'automaton'}: {counts}, {told}"
+
+
+def _finite(values: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        name: None if isinstance(value, float) and not math.isfinite(value) else value
+        for name, value in values.items()
+    }

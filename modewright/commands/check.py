@@ -18,7 +18,12 @@ def check(
     every: Annotated[bool, typer.Option("--all", help="every spec below spec/")] = False,
     as_json: Json = False,
 ) -> None:
-    """Report all problems of specs: `modewright check estimator spec/ev_driveline/plant.yaml`."""
+    """Report all problems of specs, with places and help.
+
+    \b
+    modewright check estimator spec/ev_driveline/plant.yaml
+    modewright check --all --json
+    """
     from language.problem import ordered, render_all
     from modewright import api, show
     from modewright.generated import spec_files
@@ -33,6 +38,6 @@ def check(
     elif problems:
         print(render_all(problems), file=sys.stderr)
     if not as_json:
-        console.print(f"{len(names)} specs checked, {len(errors)} problems")
+        console().print(f"{len(names)} specs checked, {len(errors)} problems")
     if errors:
         raise typer.Exit(PROBLEMS)

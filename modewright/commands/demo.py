@@ -17,12 +17,13 @@ def demo(
         "build"
     ),
 ) -> None:
-    """Simulate the tip-out of the paper, compare engine and C, draw the picture.
+    """Show the product: a tip-out, engine against C, a picture.
 
-    `modewright demo --out build`
+    \b
+    modewright demo --out build
     """
     from modewright import demo as shown
 
     make_folder(out)
-    if not shown.run(out, console):
+    if not shown.run(out, console()):
         raise typer.Exit(PROBLEMS)

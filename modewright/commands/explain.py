@@ -12,7 +12,11 @@ from modewright.commands.options import Sets, values_of
 def explain(
     automaton: Annotated[str, typer.Argument(help="an automaton: name or file")], sets: Sets = None
 ) -> None:
-    """Print the Program that engine and generator share: `modewright explain estimator`."""
+    """Print the Program that engine and generator share.
+
+    \b
+    modewright explain estimator
+    """
     from language.printing import program_text
     from modewright import api
 

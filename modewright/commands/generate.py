@@ -25,7 +25,12 @@ def generate(
         bool, typer.Option("--check", help="with --all: write nothing, fail where stale")
     ] = False,
 ) -> None:
-    """Print C sources: `modewright generate estimator --out build`, `modewright generate --all`."""
+    """Print a sampled automaton as C99.
+
+    \b
+    modewright generate estimator --out build
+    modewright generate --all --check
+    """
     from modewright import api
     from modewright.generated import generated_files
 

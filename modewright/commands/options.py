@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -30,6 +32,11 @@ Out = Annotated[
 Plot = Annotated[
     Path | None, typer.Option("--plot", "-p", help="write a picture: .png, .svg or .pdf")
 ]
+Signals = Annotated[
+    list[str] | None, typer.Option(help="only signals that match: 'plant.*' (repeatable)")
+]
+From = Annotated[float | None, typer.Option("--from", help="start of the window [s]")]
+To = Annotated[float | None, typer.Option("--to", help="end of the window [s]")]
 Json = Annotated[bool, typer.Option("--json", help="print the result as JSON")]
 
 
@@ -42,6 +49,25 @@ def values_of(sets: Sequence[str] | None) -> dict[str, str]:
             raise typer.BadParameter(f"`{text}` is not `parameter=value`", param_hint="--set")
         found[name.strip()] = value.strip()
     return found
+
+
+def span_of(start: float | None, end: float | None) -> tuple[float, float] | None:
+    """Return the window of --from and --to [s]; None if neither is given."""
+    if start is None and end is None:
+        return None
+    span = (-math.inf if start is None else start, math.inf if end is None else end)
+    if not span[0] < span[1]:
+        raise typer.BadParameter("the window is empty", param_hint="--from, --to")
+    return span
+
+
+@contextmanager
+def usage_errors() -> Iterator[None]:
+    """Tell a ValueError of the API as wrong usage (exit code 2)."""
+    try:
+        yield
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from None
 
 
 def require_run(path: Path | None) -> None:

@@ -17,7 +17,7 @@ from modewright.commands.options import (
     stop_where,
     values_of,
 )
-from modewright.console import announce, console
+from modewright.console import announce, console, working
 from modewright.files import require_writable, write_files
 
 
@@ -35,14 +35,16 @@ def replay(
 ) -> None:
     """Run an estimator on a recording, engine and C in lock-step.
 
-    `modewright replay estimator drive.csv --map leaf_can --variant leaf --plot drive.png`
+    \b
+    modewright replay estimator drive.csv --map leaf_can --variant leaf --plot drive.png
     """
     from engine.run_file import run_files
     from modewright import api, show
 
     require_run(out)
     require_writable(out, plot)
-    replayed = api.replay(estimator, recording, mapping, variant, values_of(sets))
+    with working(f"replaying {recording.name}"):
+        replayed = api.replay(estimator, recording, mapping, variant, values_of(sets))
     trajectory, verdict = replayed.result.trajectory, replayed.verdict
     files: dict[Path, bytes] = {}
     if out:
@@ -56,6 +58,6 @@ def replay(
     if as_json:
         show.print_json(show.replay_json(replayed))
     else:
-        show.print_replay(console, replayed)
+        show.print_replay(console(), replayed)
         announce(list(files))
     stop_where(verdict is not None and not verdict.is_equal, trajectory)

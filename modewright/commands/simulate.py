@@ -19,7 +19,7 @@ from modewright.commands.options import (
     stop_where,
     values_of,
 )
-from modewright.console import announce, console
+from modewright.console import announce, console, working
 from modewright.files import require_writable, write_files
 
 
@@ -34,13 +34,19 @@ def simulate(
     ] = False,
     as_json: Json = False,
 ) -> None:
-    """Simulate a system: `modewright simulate ev_driveline -s tip_out --plot tip_out.png`."""
+    """Simulate a system through a scenario.
+
+    \b
+    modewright simulate ev_driveline -s tip_out --plot tip_out.png
+    modewright simulate ev_driveline -s tip_out --set 'k_hs=6000 N*m/rad' --out run.csv
+    """
     from engine.run_file import run_files
     from modewright import api, show
 
     require_run(out)
     require_writable(out, plot)
-    trajectory = api.simulate(system, scenario, values_of(sets), reference=reference)
+    with working(f"simulating {system}, {scenario}"):
+        trajectory = api.simulate(system, scenario, values_of(sets), reference=reference)
     files: dict[Path, bytes] = {}
     if out:
         files |= run_files(trajectory, out)
@@ -53,7 +59,7 @@ def simulate(
     if as_json:
         show.print_json(show.trajectory_json(trajectory))
     else:
-        console.print(show.events_table(trajectory.events))
+        console().print(show.events_table(trajectory.events))
     stop_where(trajectory.stopped is not None, trajectory)
     if not as_json:
         announce(list(files))
