@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
-import networkx as nx
-
+from language.graph import chain, circle, reachable, topological, turned
 from language.model import Mode
 from language.problem import Problems, Span, SpecError
 from language.syntax import Tree, names
@@ -16,48 +15,43 @@ def equation_order(mode: Mode) -> list[str]:
 
     Ties are broken by the order in the file. Raises SpecError naming an algebraic loop.
     """
-    trees = {name: formula.tree for name, formula in mode.equations.items()}
-    graph = _reading(trees)
-    place = {name: position for position, name in enumerate(trees)}
-    try:
-        return list(nx.lexicographical_topological_sort(graph, key=lambda name: place[name]))
-    except nx.NetworkXUnfeasible:
-        loop = [edge[0] for edge in nx.find_cycle(graph)]
-        problems = Problems()
-        label = f"an algebraic loop in mode `{mode.name}`: {chain(loop)}"
-        hint = "each reads the one before it at the same instant; one of them has to be a state"
-        problems.error("loop", mode.equations[loop[0]].span, label, hint)
-        raise SpecError(problems.found) from None
+    edges = _reading({name: formula.tree for name, formula in mode.equations.items()})
+    found = topological(edges)
+    if found is not None:
+        return found
+    loop = circle(edges)
+    problems = Problems()
+    label = f"an algebraic loop in mode `{mode.name}`: {chain(loop)}"
+    spans = {name: formula.span for name, formula in mode.equations.items()}
+    hint = "each reads the one before it at the same instant; one of them has to be a state"
+    problems.error("loop", spans[loop[0]], label, hint + _places(loop, spans))
+    raise SpecError(problems.found)
 
 
 def report_circle(
     trees: Mapping[str, Tree], spans: Mapping[str, Span], what: str, problems: Problems
 ) -> None:
     """Report names whose values follow from each other in a circle."""
-    try:
-        loop = [edge[0] for edge in nx.find_cycle(_reading(trees))]
-    except nx.NetworkXNoCycle:
-        return
-    problems.error("loop", spans[loop[0]], f"`{what}` values in a circle: {chain(loop)}")
+    loop = circle(_reading(trees))
+    if loop:
+        label = f"`{what}` values in a circle: {chain(loop)}"
+        hint = "one of them is given by a value of its own" + _places(loop, spans)
+        problems.error("loop", spans[loop[0]], label, hint)
 
 
 def unreached(modes: Mapping[str, Mode], initial: str) -> list[str]:
     """Return the modes that no chain of transitions from the initial mode enters."""
-    graph: nx.DiGraph[str] = nx.DiGraph()
-    graph.add_nodes_from(modes)
-    for mode in modes.values():
-        graph.add_edges_from((mode.name, transition.target) for transition in mode.transitions)
-    return [name for name in modes if name != initial and not nx.has_path(graph, initial, name)]
+    edges = {
+        mode.name: [transition.target for transition in mode.transitions] for mode in modes.values()
+    }
+    found = reachable(edges, initial)
+    return [name for name in modes if name not in found]
 
 
-def chain(loop: list[str]) -> str:
-    """Return a loop as text, back to its first member."""
-    return " -> ".join(f"`{name}`" for name in [*loop, loop[0]])
+def _places(loop: Sequence[str], spans: Mapping[str, Span]) -> str:
+    return "".join(f"; `{name}` is at {spans[name]}" for name in loop[1:])
 
 
-def _reading(trees: Mapping[str, Tree]) -> nx.DiGraph[str]:
-    graph: nx.DiGraph[str] = nx.DiGraph()
-    graph.add_nodes_from(trees)
-    for name, tree in trees.items():
-        graph.add_edges_from((read.path, name) for read in names(tree) if read.path in trees)
-    return graph
+def _reading(trees: Mapping[str, Tree]) -> dict[str, list[str]]:
+    """From each name to those that read it."""
+    return turned({name: [read.path for read in names(tree)] for name, tree in trees.items()})

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from fractions import Fraction
 
-import networkx as nx
-
 from language.document import Document, Entry, Scalar, Table
+from language.graph import chain, circle, topological
 from language.load import automaton_of
 from language.model import Automaton, Connection, Instance, System, SystemInput
 from language.problem import Problems, Span, nearest
@@ -201,23 +200,19 @@ class _SystemReader(Reader):
         span: Span,
     ) -> tuple[str, ...]:
         """Instances at one instant run in the order of direct feed-through (rule 19)."""
-        graph: nx.DiGraph[str] = nx.DiGraph()
-        graph.add_nodes_from(instances)
+        edges: dict[str, list[str]] = {name: [] for name in instances}
         for connection in connections.values():
             if isinstance(connection.source, str) and "." in connection.source:
                 owner, target = connection.source.partition(".")[0], connection.target[0]
                 self._both_continuous(instances[owner], instances[target], connection)
                 if instances[target].automaton.is_sampled:
-                    graph.add_edge(owner, target)
-        try:
-            place = {name: position for position, name in enumerate(instances)}
-            return tuple(nx.lexicographical_topological_sort(graph, key=lambda name: place[name]))
-        except nx.NetworkXUnfeasible:
-            loop = [edge[0] for edge in nx.find_cycle(graph)]
-            chain = " -> ".join(f"`{name}`" for name in [*loop, loop[0]])
-            label = f"instances read each other at the same instant: {chain}"
-            self.problems.error("loop", span, label)
-            return tuple(instances)
+                    edges[owner].append(target)
+        found = topological(edges)
+        if found is None:
+            label = f"instances read each other at the same instant: {chain(circle(edges))}"
+            hint = "an output that reads no input of its tick breaks the circle: a state"
+            self.problems.error("loop", span, label, hint)
+        return tuple(found or instances)
 
     def _both_continuous(self, owner: Instance, target: Instance, at: Connection) -> None:
         if not owner.automaton.is_sampled and not target.automaton.is_sampled:

@@ -8,28 +8,10 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
 
-import pint
+from language.symbols import BASE_SYMBOLS, OFTEN_WRITTEN, SYMBOLS
 
-SYMBOLS: dict[str, tuple[str, int]] = {
-    # symbol: (definition in pint's words, power of the angle)
-    **dict.fromkeys(("m", "mm", "cm", "km", "kg", "s", "ms", "us", "A", "V", "W", "kW"), ("", 0)),
-    **dict.fromkeys(("N", "kN", "mN", "J", "kJ", "Pa", "kPa", "MPa", "bar", "Hz", "kHz"), ("", 0)),
-    **dict.fromkeys(("kV", "mV", "mA", "Wh", "kWh", "K", "L"), ("", 0)),
-    "g": ("gram", 0),
-    "h": ("hour", 0),
-    "min": ("minute", 0),
-    "degC": ("kelvin", 0),
-    "percent": ("percent", 0),
-    "rad": ("radian", 1),
-    "mrad": ("milliradian", 1),
-    "deg": ("degree", 1),
-    "rev": ("turn", 1),
-    "rpm": ("turn / minute", 1),
-}
 CELSIUS_OFFSET = Fraction(27315, 100)
 """0 degC in kelvin."""
-BASE = ("meter", "kilogram", "second", "ampere", "kelvin")
-BASE_SYMBOLS = ("m", "kg", "s", "A", "K")
 
 MECHANICAL: dict[tuple[int, ...], str] = {
     (2, 1, -2): "N*m",
@@ -95,39 +77,9 @@ SECOND = Dimension((0, 0, 1, 0, 0))
 NO_UNIT = Unit("1", Fraction(1), NUMBER)
 UNKNOWN_UNIT = Unit("?", Fraction(1), UNKNOWN)
 
-OFTEN_WRITTEN = {
-    **dict.fromkeys(("Nm", "NM"), "N*m"),
-    **dict.fromkeys(("Nms", "Nm*s"), "N*m*s"),
-    **dict.fromkeys(("kmh", "kph", "km/hr"), "km/h"),
-    **dict.fromkeys(("sec", "seconds", "S"), "s"),
-    **dict.fromkeys(("msec", "millis"), "ms"),
-    **dict.fromkeys(("meter", "metre", "meters", "metres"), "m"),
-    **dict.fromkeys(("degree", "degrees"), "deg"),
-    **dict.fromkeys(("radian", "radians"), "rad"),
-    **dict.fromkeys(("RPM", "U/min", "1/min"), "rpm"),
-    **dict.fromkeys(("C", "celsius", "Celsius"), "degC"),
-    **dict.fromkeys(("Kg", "KG"), "kg"),
-    "kmph": "km/h",
-}
-"""Units as people write them, and how they are written here."""
-
 
 def _power(name: str, power: int) -> str:
     return name if power == 1 else f"{name}^{power}"
-
-
-@cache
-def _registry() -> pint.UnitRegistry[Fraction]:
-    return pint.UnitRegistry(non_int_type=Fraction)
-
-
-@cache
-def _symbol(symbol: str) -> tuple[Fraction, tuple[int, ...], int]:
-    definition, angle = SYMBOLS[symbol]
-    quantity = _registry().Quantity(Fraction(1), definition or symbol).to_base_units()
-    exponents = dict(quantity.unit_items())
-    powers = tuple(int(str(exponents.get(name, 0))) for name in BASE)
-    return Fraction(quantity.magnitude), powers, angle
 
 
 @cache
@@ -139,13 +91,13 @@ def parse_unit(text: str) -> Unit:
         raise UnitError(f"`{text}` is not written as a unit")
     body = text.removeprefix("1/")
     sign = -1 if body != text else 1
-    factor, powers, angle = Fraction(1), [0] * len(BASE), 0
+    factor, powers, angle = Fraction(1), [0] * len(BASE_SYMBOLS), 0
     for operator, symbol, exponent in PIECE.findall(body):
         if symbol not in SYMBOLS:
             raise UnitError(f"`{symbol}` is not a unit")
         power = int(exponent or 1) * (-1 if operator == "/" else sign)
         sign = 1
-        value, base, turn = _symbol(symbol)
+        value, base, turn = SYMBOLS[symbol]
         factor *= value**power
         powers = [old + power * new for old, new in zip(powers, base, strict=True)]
         angle += power * turn

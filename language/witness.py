@@ -6,7 +6,9 @@ guards are evaluated at the very values shown; that it finds nothing proves noth
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections import ChainMap
+from collections.abc import Iterator, Mapping, MutableMapping
+from dataclasses import dataclass
 
 from language.constants import parameter_constants, values_of
 from language.evaluate import Scalar, evaluate
@@ -15,6 +17,7 @@ from language.model import Automaton, Mode, Range, Transition
 from language.operation import Assign, Expr, Ref
 from language.problem import Problems
 from language.syntax import Name, Relation, Tree, names, walk
+from language.wiring import expr_names
 
 SAMPLES = 64
 """Points of the search; a guard of one or two linear relations is met within a few."""
@@ -23,7 +26,16 @@ DEFAULT_RANGE = (-10.0, 10.0)
 PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37)
 SHOWN_DIGITS = 4
 
-Point = dict[str, Scalar]
+Point = MutableMapping[str, Scalar]
+
+
+@dataclass(frozen=True)
+class Lowered:
+    """An expression with the equations that it needs, in order, and what they read from outside."""
+
+    steps: tuple[tuple[str, Expr], ...]
+    value: Expr
+    reads: tuple[str, ...]
 
 
 class WitnessSearch:
@@ -38,6 +50,8 @@ class WitnessSearch:
             **{name: Ref(f"state.{name}") for name in automaton.states},
         }
         self.constants = values_of(parameter_constants(automaton, Problems()))
+        self.lowered: dict[tuple[str, int], Lowered | None] = {}
+        self.samples: dict[int, Point] = {}
 
     def both(self, first: Transition, second: Transition) -> Point | None:
         """Return values at which two guards of one mode hold together, if some are found."""
@@ -92,7 +106,9 @@ class WitnessSearch:
             part for guard in guards for part in walk(guard) if isinstance(part, Relation)
         ]
         for index in range(1, SAMPLES + 1):
-            point = self._sample(index)
+            if index not in self.samples:
+                self.samples[index] = self._sample(index)
+            point = self.samples[index]
             for boundary in boundaries:
                 moved = self._on_boundary(boundary, point, mode)
                 if moved is not None:
@@ -101,7 +117,7 @@ class WitnessSearch:
 
     def _sample(self, index: int) -> Point:
         ranges: dict[str, Range | None] = {}
-        point: Point = {}
+        point: dict[str, Scalar] = {}
         for name, thing in self.automaton.inputs.items():
             ranges[f"input.{name}"] = thing.range
         for name, state in self.automaton.states.items():
@@ -122,31 +138,52 @@ class WitnessSearch:
             if isinstance(side, Name) and side.path in self.automaton.states:
                 value = self._value(other, mode, point)
                 if value is not None:
-                    return {**point, f"state.{side.path}": value}
+                    return ChainMap({f"state.{side.path}": value}, point)
         return None
 
     def _holds(self, transition: Transition, mode: Mode, point: Point) -> bool:
         return bool(self._value(transition.when.tree, mode, point))
 
     def _reset(self, transition: Transition, mode: Mode, point: Point) -> Point | None:
-        after = dict(point)
+        after: dict[str, Scalar] = {}
         for name, formula in transition.reset.items():
             value = self._value(formula.tree, mode, point)
             if value is None:
                 return None
             after[f"state.{name}"] = value
-        return after
+        return ChainMap(after, point)
 
     def _value(self, tree: Tree, mode: Mode, point: Point) -> Scalar | None:
+        key = (mode.name, id(tree))
+        if key not in self.lowered:
+            self.lowered[key] = self._lower(tree, mode)
+        lowered = self.lowered[key]
+        if lowered is None:
+            return None
+        values: dict[str, Scalar] = {}
+        try:
+            for name in lowered.reads:
+                values[name] = point[name] if name in point else self.constants[name]
+            for target, value in lowered.steps:
+                values[target] = evaluate(value, values)
+            return evaluate(lowered.value, values)
+        except (KeyError, OverflowError):
+            return None
+
+    def _lower(self, tree: Tree, mode: Mode) -> Lowered | None:
         known = dict(self.known)
-        values: dict[str, Scalar] = {**self.constants, **point}
+        steps: list[tuple[str, Expr]] = []
         try:
             for op in equations(mode, known, "equation.", "", [n.path for n in names(tree)]):
                 assert isinstance(op, Assign)
-                values[op.target] = evaluate(op.value, values)
-            return evaluate(expression(tree, known), values)
-        except (KeyError, OverflowError):
+                steps.append((op.target, op.value))
+            value = expression(tree, known)
+        except KeyError:
             return None
+        own = {target for target, _ in steps}
+        read = {name for part in (value, *(step[1] for step in steps)) for name in expr_names(part)}
+        outside = {name for name in read - own if not name.startswith("call ")}
+        return Lowered(tuple(steps), value, tuple(sorted(outside)))
 
 
 def report_refiring(automaton: Automaton, problems: Problems) -> None:

@@ -8,9 +8,10 @@ from fractions import Fraction
 import pytest
 from hypothesis import given, strategies as st
 
+from language.graph import chain
 from language.model import Formula, Mode
 from language.operation import Assign
-from language.order import chain, equation_order, report_circle
+from language.order import equation_order, report_circle
 from language.problem import Problems
 from language.program import short
 from language.syntax import names

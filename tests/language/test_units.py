@@ -6,13 +6,13 @@ import math
 from fractions import Fraction
 
 import mpmath
+import pint
 import pytest
 from hypothesis import given, strategies as st
 
+from language.symbols import BASE_SYMBOLS, OFTEN_WRITTEN, SYMBOLS
 from language.units import (
-    BASE_SYMBOLS,
     NO_UNIT,
-    SYMBOLS,
     Dimension,
     UnitError,
     common,
@@ -21,6 +21,7 @@ from language.units import (
     power,
     product,
     root,
+    unit_hint,
 )
 from tests.language.making import automaton, si
 
@@ -105,6 +106,40 @@ def test_a_unit_of_turning_has_pi_to_more_digits_than_a_double(symbol: str) -> N
         assert abs(written / exact - 1) < mpmath.mpf(10) ** -35
         assert unit.factor.numerator / unit.factor.denominator == float(exact)
     assert unit.dimension == Dimension((0, 0, seconds, 0, 0), 1)
+
+
+PINT_NAMES = {"g": "gram", "h": "hour", "min": "minute", "degC": "kelvin", "rev": "turn"}
+"""What pint calls a symbol, where it is another name or means another thing."""
+
+
+@pytest.fixture(scope="module")
+def registry() -> pint.UnitRegistry[Fraction]:
+    return pint.UnitRegistry(non_int_type=Fraction)
+
+
+@pytest.mark.parametrize("symbol", sorted(SYMBOLS))
+def test_factors_and_powers_are_exactly_those_of_pint(
+    symbol: str, registry: pint.UnitRegistry[Fraction]
+) -> None:
+    quantity = registry.Quantity(Fraction(1), PINT_NAMES.get(symbol, symbol)).to_base_units()
+    factor, powers, _ = SYMBOLS[symbol]
+    assert factor == quantity.magnitude
+    bases = ("meter", "kilogram", "second", "ampere", "kelvin")
+    found = {name: power for name, power in quantity.unit_items() if name != "radian"}
+    assert found == {name: power for name, power in zip(bases, powers, strict=True) if power}
+
+
+@pytest.mark.parametrize("written", sorted(OFTEN_WRITTEN))
+def test_a_unit_as_people_write_it_is_proposed_as_it_is_written_here(written: str) -> None:
+    with pytest.raises(UnitError):
+        parse_unit(written)
+    assert parse_unit(OFTEN_WRITTEN[written]).text in unit_hint(written)
+
+
+def test_a_symbol_inside_a_unit_is_repaired_inside_it() -> None:
+    assert unit_hint("m/sec") == "did you mean `m/s`?"
+    assert unit_hint("kg*m^2/Rad") == "did you mean `kg*m^2/rad`?"
+    assert unit_hint("furlong") == ""
 
 
 def test_every_symbol_is_told_of_here() -> None:

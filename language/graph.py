@@ -1,0 +1,82 @@
+"""Graph: names that read each other, in order; circles; what can be reached."""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Iterable, Mapping, Sequence
+
+Edges = Mapping[str, Iterable[str]]
+"""From each name to the names that come after it, all of them keys."""
+
+
+def topological(edges: Edges) -> list[str] | None:
+    """Return the names so that each comes before those that it leads to, None in a circle.
+
+    Of several that may come next, the first in the order of the keys does (Kahn 1962, with a heap).
+    """
+    names = list(edges)
+    place = {name: position for position, name in enumerate(names)}
+    after = {name: set(targets) for name, targets in edges.items()}
+    waiting = dict.fromkeys(names, 0)
+    for targets in after.values():
+        for target in targets:
+            waiting[target] += 1
+    free = [place[name] for name in names if not waiting[name]]
+    found: list[str] = []
+    while free:
+        name = names[heapq.heappop(free)]
+        found.append(name)
+        for target in after[name]:
+            waiting[target] -= 1
+            if not waiting[target]:
+                heapq.heappush(free, place[target])
+    return found if len(found) == len(names) else None
+
+
+def circle(edges: Edges) -> list[str]:
+    """Return the members of a circle, each leading to the next; an empty list if there is none."""
+    done: set[str] = set()
+    for start in edges:
+        path: dict[str, None] = {}
+        stack = [(start, iter(list(edges[start])))] if start not in done else []
+        path.update(dict.fromkeys([start] if stack else []))
+        while stack:
+            name, targets = stack[-1]
+            target = next((t for t in targets if t not in done), None)
+            if target is None:
+                done.add(name)
+                del path[name]
+                stack.pop()
+            elif target in path:
+                members = list(path)
+                return members[members.index(target) :]
+            else:
+                path[target] = None
+                stack.append((target, iter(list(edges[target]))))
+    return []
+
+
+def reachable(edges: Edges, start: str) -> set[str]:
+    """Return what can be reached from a name, the name included."""
+    found, stack = {start}, [start]
+    while stack:
+        for target in edges.get(stack.pop(), ()):
+            if target not in found:
+                found.add(target)
+                stack.append(target)
+    return found
+
+
+def turned(edges: Edges) -> dict[str, list[str]]:
+    """Return the edges in the other direction; what is no key is left out."""
+    found: dict[str, list[str]] = {name: [] for name in edges}
+    for name, targets in edges.items():
+        for target in targets:
+            if target in found:
+                found[target].append(name)
+    return found
+
+
+def chain(loop: Sequence[str]) -> str:
+    """Return a circle as text, back to its first member."""
+    return " -> ".join(f"`{name}`" for name in [*loop, loop[0]])
