@@ -62,7 +62,8 @@ def decimal(text: str, span: Span) -> Fraction:
         hint = f"write `{digits}.0e{exponent}`: other YAML tools read `{text}` as a text"
         problems.error("number", span, f"`{text}` has an exponent but no point", hint)
     elif re.fullmatch(r"0\d+.*", text):
-        hint = f"write `{text.lstrip('0') or '0'}`: other YAML tools read `{text}` as octal"
+        shorter = re.sub(r"^0+(?=\d)", "", text)
+        hint = f"write `{shorter}`: other YAML tools read `{text}` as octal"
         problems.error("number", span, f"`{text}` starts with a zero", hint)
     elif not DECIMAL.fullmatch(text):
         problems.error(
@@ -169,8 +170,15 @@ class _Build(lark.Transformer[Any, Any]):
     def _at(self, token: lark.Token) -> Span:
         return self.text.inside(token.start_pos or 0, len(token))
 
+    def _between(self, first: lark.Token, last: lark.Token) -> Span:
+        width = (last.end_pos or 0) - (first.start_pos or 0)
+        return self.text.inside(first.start_pos or 0, width)
+
     def _over(self, first: Any, last: Any) -> Span:
-        start, end = first.span, last.span
+        """Return the place from one part to another; a part is a tree or a token."""
+        start, end = (
+            self._at(part) if isinstance(part, lark.Token) else part.span for part in (first, last)
+        )
         return Span(start.source, start.line, start.column, end.column + end.width - start.column)
 
     def expression(self, items: list[Any]) -> Any:
@@ -191,29 +199,28 @@ class _Build(lark.Transformer[Any, Any]):
         return Number(_in_range(value * unit.factor + unit.offset, str(items[0]), span), unit, span)
 
     def true(self, items: list[Any]) -> Any:
-        return Truth(True, self.text)
+        return Truth(True, self._at(items[0]))
 
     def false(self, items: list[Any]) -> Any:
-        return Truth(False, self.text)
+        return Truth(False, self._at(items[0]))
 
     def path(self, items: list[Any]) -> Any:
-        first, last = items[0], items[-1]
-        width = (last.end_pos or 0) - (first.start_pos or 0)
-        return Name(".".join(items), self.text.inside(first.start_pos or 0, width))
+        return Name(".".join(items), self._between(items[0], items[-1]))
 
     def call(self, items: list[Any]) -> Any:
-        name, *arguments = items
-        return Application(name.path, tuple(arguments), self._over(name, arguments[-1]))
+        name, *arguments, close = items
+        return Application(name.path, tuple(arguments), self._over(name, close))
 
     def negative(self, items: list[Any]) -> Any:
-        operand = items[0]
+        minus, operand = items
         if isinstance(operand, Number) and operand.unit.offset:
             below = 2 * operand.unit.offset - operand.value
             return Number(below, operand.unit, operand.span)
-        return Negative(operand, operand.span)
+        return Negative(operand, self._over(minus, operand))
 
     def not_(self, items: list[Any]) -> Any:
-        return Not(items[0], items[0].span)
+        word, operand = items
+        return Not(operand, self._over(word, operand))
 
     def power_of(self, items: list[Any]) -> Any:
         base, token = items
@@ -226,7 +233,7 @@ class _Build(lark.Transformer[Any, Any]):
                 "multiply two powers: `x^8 * x`",
             )
             raise SpecError(problems.found)
-        return Power(base, int(token), base.span)
+        return Power(base, int(token), self._over(base, token))
 
     def binary(self, items: list[Any]) -> Any:
         left, operator, right = items

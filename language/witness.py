@@ -7,7 +7,7 @@ guards are evaluated at the very values shown; that it finds nothing proves noth
 from __future__ import annotations
 
 from collections import ChainMap
-from collections.abc import Iterator, Mapping, MutableMapping
+from collections.abc import Callable, Iterator, Mapping, MutableMapping
 from dataclasses import dataclass
 
 from language.constants import parameter_constants, values_of
@@ -24,7 +24,8 @@ SAMPLES = 64
 DEFAULT_RANGE = (-10.0, 10.0)
 """Searched where a state or input gives no range, in SI."""
 PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37)
-SHOWN_DIGITS = 4
+SHOWN_DIGITS = (4, 6, 9, 12)
+"""Digits of the values shown: the first number of them at which the guards still hold."""
 
 Point = MutableMapping[str, Scalar]
 
@@ -57,32 +58,40 @@ class WitnessSearch:
         """Return values at which two guards of one mode hold together, if some are found."""
         mode = self.automaton.modes[first.source]
         for point in self._points([first.when.tree, second.when.tree], mode):
-            if self._holds(first, mode, point) and self._holds(second, mode, point):
-                return point
+            if self._hold(first, second, point):
+                return _shortened(point, lambda shorter: self._hold(first, second, shorter))
         return None
+
+    def _hold(self, first: Transition, second: Transition, point: Point) -> bool:
+        mode = self.automaton.modes[first.source]
+        return self._holds(first, mode, point) and self._holds(second, mode, point)
 
     def refires(self, out: Transition, back: Transition) -> Point | None:
         """Return values at which `out` and `back` fire in turn for ever, if some are found."""
-        here, there = self.automaton.modes[out.source], self.automaton.modes[out.target]
+        there = self.automaton.modes[out.target]
         for start in self._points([out.when.tree, back.when.tree], there):
-            if not self._holds(out, here, start):
-                continue
-            arrived = self._reset(out, here, start)
-            if arrived is None or not self._holds(back, there, arrived):
-                continue
-            returned = self._reset(back, there, arrived)
-            if returned is None or not self._holds(out, here, returned):
-                continue
-            again = self._reset(out, here, returned)
-            if again is not None and self._holds(back, there, again):
-                return start
+            if self._refires_at(out, back, start):
+                return _shortened(start, lambda shorter: self._refires_at(out, back, shorter))
         return None
+
+    def _refires_at(self, out: Transition, back: Transition, start: Point) -> bool:
+        here, there = self.automaton.modes[out.source], self.automaton.modes[out.target]
+        if not self._holds(out, here, start):
+            return False
+        arrived = self._reset(out, here, start)
+        if arrived is None or not self._holds(back, there, arrived):
+            return False
+        returned = self._reset(back, there, arrived)
+        if returned is None or not self._holds(out, here, returned):
+            return False
+        again = self._reset(out, here, returned)
+        return again is not None and self._holds(back, there, again)
 
     def shown(self, point: Point, trees: list[Tree]) -> str:
         """Return the values of the names that some trees read, directly or through equations."""
         wanted = self._read(trees)
         texts = [
-            f"{name} = {float(value):.{SHOWN_DIGITS}g}"
+            f"{name} = {_shortest(float(value))}"
             for name, value in ((n.partition(".")[2], v) for n, v in point.items())
             if name in wanted
         ]
@@ -229,6 +238,23 @@ def _has_boundary(guard: Tree, states: Mapping[str, object]) -> bool:
             if any(isinstance(side, Name) and side.path in states for side in sides):
                 return True
     return False
+
+
+def _shortened(point: Point, holds: Callable[[Point], bool]) -> Point:
+    """Return a point with as few digits as still show what it shows."""
+    for digits in SHOWN_DIGITS:
+        shorter: Point = {
+            name: value if isinstance(value, bool) else float(f"{value:.{digits}g}")
+            for name, value in point.items()
+        }
+        if holds(shorter):
+            return shorter
+    return point
+
+
+def _shortest(value: float) -> str:
+    """Return the shortest text that reads back as the value, without a needless `.0`."""
+    return next(text for n in (4, 6, 9, 12, 15, 17) if float(text := f"{value:.{n}g}") == value)
 
 
 def _radical_inverse(index: int, base: int) -> float:

@@ -175,10 +175,6 @@ def test_both_guards_hold_at_the_values_that_are_shown(p: str, q: str) -> None:
     assert holds(p, values, made) and holds(q, values, made)
 
 
-@pytest.mark.xfail(
-    reason="witness.shown rounds to 4 digits: x = 0.1234 is not >= the limit of 0.123441",
-    strict=True,
-)
 def test_both_guards_hold_at_the_values_that_are_shown_on_an_uneven_boundary() -> None:
     text = stop(
         "p: {to: stopped, when: x >= limit}, q: {to: stopped, when: x <= limit}",
