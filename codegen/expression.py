@@ -28,7 +28,7 @@ class Place(Protocol):
         """Return a number as it is written beside a whole-number variable: a mode by its name."""
 
 
-LIBRARY: Mapping[str, str] = {"abs": "fabs", "sqrt": "sqrt", "real": "(double)"}
+LIBRARY: Mapping[str, str] = {"abs": "fabs", "sqrt": "sqrt", "floor": "floor", "real": "(double)"}
 """Operations that C gives exactly; all others are in ha_math."""
 LOGIC: Mapping[str, str] = {"and": "&&", "or": "||"}
 CHAINS: Mapping[str, str] = {"+": "+-", "-": "+-", "*": "*/", "/": "*/"}

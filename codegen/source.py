@@ -13,7 +13,7 @@ from codegen.expression import c_expression, literal
 from codegen.names import CNames, c_member, c_type, mode_constant, run_mode_constant
 from codegen.statement import Writer, wrapped
 from codegen.usage import Usage, locals_of, usages
-from language.elementary import FUNCTIONS
+from language.functions import FUNCTIONS
 from language.operation import Assign, Run
 from language.printing import digest
 from language.program import (
@@ -115,7 +115,7 @@ def _context(program: Program) -> dict[str, Any]:
         "blocks": [block for block in blocks if block["name"] not in ENTRIES],
         "entries": {block["name"]: block for block in blocks if block["name"] in ENTRIES},
         "uses_math": bool(called & {*FUNCTIONS, *INLINE}),
-        "uses_libm": bool(called & {"abs", "sqrt"}),
+        "uses_libm": bool(called & {"abs", "sqrt", "floor"}),
     }
 
 
@@ -233,4 +233,6 @@ def _function(function: Function) -> dict[str, Any]:
         assert isinstance(op, Assign)
         left = "return " if op.target == "work.y" else f"const double {place(op.target)} = "
         lines += wrapped(left, c_expression(op.value, place), "")
-    return {"name": function.name, "about": function.about, "lines": lines}
+    parameters = ", ".join(f"double {name}" for name in function.parameters)
+    about = function.about
+    return {"name": function.name, "parameters": parameters, "about": about, "lines": lines}

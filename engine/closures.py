@@ -42,23 +42,23 @@ class Compiler:
         self.faults = {name: 1 << bit for bit, name in enumerate(program.faults)}
         fixed = ("constant.", "solved.")
         self.fixed = {c.name: c.value for c in program.constants if c.name.startswith(fixed)}
-        self.functions: dict[str, Callable[[float], float]] = {}
+        self.functions: dict[str, Callable[..., float]] = {}
         for function in sorted(program.functions, key=lambda f: _depth(f, program.functions)):
             self.functions[function.name] = self._function(function)
         self.blocks: dict[str, list[Action]] = {name: [] for name in program.blocks}
         for name, block in program.blocks.items():
             self.blocks[name].extend(self._action(op) for op in block)
 
-    def _function(self, function: Function) -> Callable[[float], float]:
+    def _function(self, function: Function) -> Callable[..., float]:
         slots = {name: slot for slot, name in enumerate(_locals(function))}
         outer, self.slots = self.slots, slots
         actions = [self._action(op) for op in function.body]
         self.slots = outer
-        x, y, size = slots["work.x"], slots["work.y"], len(slots)
+        y, count = slots["work.y"], len(function.parameters)
+        rest: Frame = [0.0] * (len(slots) - count)
 
-        def call(value: float) -> float:
-            frame: Frame = [0.0] * size
-            frame[x] = value
+        def call(*values: float) -> float:
+            frame: Frame = [*values, *rest]
             for action in actions:
                 action(frame)
             result: float = frame[y]
@@ -143,7 +143,8 @@ def _is_fixed(expr: Expr, fixed: Mapping[str, float]) -> bool:
 
 def _locals(function: Function) -> list[str]:
     targets = [op.target for op in function.body if isinstance(op, Assign)]
-    return list(dict.fromkeys(["work.x", "work.y", *targets]))
+    parameters = [f"work.{name}" for name in function.parameters]
+    return list(dict.fromkeys([*parameters, "work.y", *targets]))
 
 
 def _depth(function: Function, functions: tuple[Function, ...]) -> int:

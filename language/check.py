@@ -15,7 +15,7 @@ from language.model import Automaton, Formula, Mode
 from language.order import equation_order, report_circle, unreached
 from language.problem import Problems, Span, SpecError, nearest
 from language.syntax import Broken, Tree, names
-from language.units import SECOND, Dimension, common, fits, product
+from language.units import SECOND, Dimension, Unit, common, fits, product
 from language.witness import report_refiring
 
 RESERVED_OUTPUTS = ("mode", "faults")
@@ -98,7 +98,12 @@ class _Check:
 
     def _scope(self, groups: Iterable[Iterable[str]], place: str) -> Scope:
         known = {name: self.names[name] for group in groups for name in group}
-        return Scope(known, frozenset(), place)
+        return Scope(known, frozenset(), place, self._angles())
+
+    def _angles(self) -> dict[str, Unit]:
+        """Return the units of the parameters whose value is declared in a unit of angle."""
+        declared = self.automaton.parameters.items()
+        return {name: thing.unit for name, thing in declared if thing.unit.dimension.angle}
 
     def _parameters(self) -> None:
         automaton = self.automaton
@@ -133,10 +138,11 @@ class _Check:
         if run and automaton.model:
             modes = frozenset(f"{automaton.model.name}.{name}" for name in automaton.model.modes)
         for name in equation_order(mode):
-            check = DimensionCheck(Scope({**known}, modes, place), self.problems)
+            scope = Scope({**known}, modes, place, self._angles())
+            check = DimensionCheck(scope, self.problems)
             kind = check.kind(mode.equations[name].tree)
             known[name] = self._agreed(name, kind, mode.equations[name])
-        check = DimensionCheck(Scope(known, modes, place), self.problems)
+        check = DimensionCheck(Scope(known, modes, place, self._angles()), self.problems)
         self._flow(mode, check)
         self._assignments(mode.update, check)
         self._transitions(mode, check)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 from language.problem import Problems, Span, nearest
@@ -22,7 +22,7 @@ from language.syntax import (
     Tree,
     Truth,
 )
-from language.units import NUMBER, Dimension, common, fits, power, product, root
+from language.units import NUMBER, Dimension, Unit, common, fits, power, product, root
 
 Truthful = Literal["truth"]
 Kind = Dimension | Truthful
@@ -31,19 +31,24 @@ Kind = Dimension | Truthful
 ANGLE = Dimension(angle=1)
 SAME = {"abs": 1, "min": 2, "max": 2, "clip": 3}
 """Functions whose arguments and value have one dimension, with their number of arguments."""
-NUMBERS = {"exp": 1, "tanh": 1, "sign": 1}
-ANGLES = {"sin": 1, "cos": 1}
-KNOWN = (*SAME, *NUMBERS, *ANGLES, "sqrt", "in", "der")
-LATER = ("floor", "tan", "atan2", "lookup", "previous", "delay", "rising", "falling", "after")
+NUMBERS = {"exp": 1, "tanh": 1, "floor": 1, "sign": 1}
+ANGLES = {"sin": 1, "cos": 1, "tan": 1}
+ARGUMENTS = {**SAME, **NUMBERS, **ANGLES, "sqrt": 1, "atan2": 2}
+KNOWN = (*ARGUMENTS, "in", "der")
+LATER = ("lookup", "previous", "delay", "rising", "falling", "after")
 
 
 @dataclass(frozen=True)
 class Scope:
-    """What names mean at one place: their dimensions, and the modes that `in(...)` may name."""
+    """What names mean at one place: their dimensions, and the modes that `in(...)` may name.
+
+    `angles` are the units of the parameters that are declared in a unit of angle.
+    """
 
     names: Mapping[str, Kind | None]
     modes: frozenset[str] = frozenset()
     place: str = "here"
+    angles: Mapping[str, Unit] = field(default_factory=dict)
 
 
 class DimensionCheck:
@@ -129,7 +134,19 @@ class DimensionCheck:
             if isinstance(part, Number) and part.unit.offset:
                 label = "a temperature in degC is not added or subtracted"
                 self._report("dimension", part.span, label, "write a difference in K")
+        self._one_unit_of_angle(tree)
         return self._together(tree.left, left, tree.right, right, tree.span, tree.operator)
+
+    def _one_unit_of_angle(self, tree: Arithmetic) -> None:
+        """Two declared numbers in `deg` and `rad` are not added: rule 20, nothing is converted."""
+        known = self.scope.angles
+        first, second = (
+            known.get(part.path) if isinstance(part, Name) else None
+            for part in (tree.left, tree.right)
+        )
+        if first and second and first.factor != second.factor:
+            label = f"`{tree.operator}` joins `{first.text}` and `{second.text}`"
+            self._report("dimension", tree.span, label, "declare both in one unit of angle")
 
     def _together(
         self, a: Tree, left: Dimension, b: Tree, right: Dimension, span: Span, operator: str
@@ -145,13 +162,20 @@ class DimensionCheck:
         return None
 
     def _relation(self, tree: Relation) -> Truthful:
+        equality = tree.operator in ("==", "!=")
+        if equality and self._are_truths(tree):
+            return "truth"
         left, right = self._real(tree.left), self._real(tree.right)
-        if tree.operator in ("==", "!="):
+        if equality:
             label = f"`{tree.operator}` is not for real numbers"
             self._report("type", tree.span, label, "use `<=` or `>=`")
         elif left is not None and right is not None:
             self._together(tree.left, left, tree.right, right, tree.span, tree.operator)
         return "truth"
+
+    def _are_truths(self, tree: Relation) -> bool:
+        quiet = DimensionCheck(self.scope, Problems())
+        return all(quiet.kind(part) == "truth" for part in (tree.left, tree.right))
 
     def _choice(self, tree: Choice) -> Kind | None:
         self.truth(tree.condition, "if")
@@ -169,7 +193,7 @@ class DimensionCheck:
         name, arguments = tree.function, tree.arguments
         if name == "in":
             return self._in(tree)
-        wanted = {**SAME, **NUMBERS, **ANGLES, "sqrt": 1}.get(name)
+        wanted = ARGUMENTS.get(name)
         if wanted is None:
             label = f"`{name}` is not a function that can be used here"
             hint = "it comes with a later version" if name in LATER else nearest(name, KNOWN)
@@ -186,7 +210,7 @@ class DimensionCheck:
 
     def _function(self, tree: Application, kinds: list[Dimension]) -> Dimension | None:
         name, first = tree.function, kinds[0]
-        if name in SAME:
+        if name in SAME or name == "atan2":
             base: Tree = tree.arguments[0]
             sum_so_far: Dimension = first
             for argument, kind in zip(tree.arguments[1:], kinds[1:], strict=True):
@@ -194,7 +218,7 @@ class DimensionCheck:
                 if joined is None:
                     return None
                 base, sum_so_far = (argument if _zero(base) else base), joined
-            return sum_so_far
+            return ANGLE if name == "atan2" else sum_so_far
         if name == "sqrt":
             result = root(first)
             if result is None:

@@ -13,7 +13,6 @@ the whole domain, at the zeros of sin and cos too.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from language.operation import (
@@ -110,9 +109,9 @@ class Body:
         self.ops.append(Assign(f"work.{name}", value))
         return Ref(f"work.{name}")
 
-    def function(self, name: str, about: str) -> Function:
+    def function(self, name: str, about: str, parameters: tuple[str, ...] = ("x",)) -> Function:
         """Return the function; its result is the local `y`."""
-        return Function(name, tuple(self.ops), tuple(self.locals), about)
+        return Function(name, tuple(self.ops), tuple(self.locals), about, parameters)
 
 
 def nearest(x: Expr) -> Expr:
@@ -247,9 +246,3 @@ def hyperbolic_tangent() -> Function:
     signed = Select(Compare("<", X, real(0.0)), Unary("-", magnitude), magnitude)
     body.let("y", Select(Compare("<", size, TINY), X, signed))
     return body.function("tanh", "hyperbolic tangent; every x; error < 1.4 ULP")
-
-
-FUNCTIONS: Mapping[str, Function] = {
-    function.name: function for function in (sine(), cosine(), exponential(), hyperbolic_tangent())
-}
-"""By name; a function that calls another one (tanh calls exp) comes after it."""

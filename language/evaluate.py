@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 
-from language.elementary import FUNCTIONS
+from language.functions import FUNCTIONS
 from language.operation import (
     Assign,
     Binary,
@@ -57,6 +57,11 @@ def sign(x: float) -> float:
     return 1.0 if x > 0.0 else (-1.0 if x < 0.0 else 0.0)
 
 
+def floor(x: float) -> float:
+    """Return the largest whole number not above x; -0.0, infinities and NaN as they are."""
+    return x if x == 0.0 or not math.isfinite(x) else float(math.floor(x))
+
+
 def power_of_two(k: float) -> float:
     """Return 2^k exactly for a whole-valued k from -1022 to 1023, anything else as it is."""
     return math.ldexp(1.0, int(k)) if -1022.0 <= k <= 1023.0 else k
@@ -69,6 +74,7 @@ ELEMENTARY: Mapping[str, Callable[..., Scalar]] = {
     "max": maximum,
     "clip": clip,
     "sign": sign,
+    "floor": floor,
     "pow2": power_of_two,
     "real": float,
 }
@@ -113,7 +119,8 @@ def apply(function: str, arguments: list[Scalar]) -> Scalar:
     """Return the value of an elementary operation or function."""
     if function in ELEMENTARY:
         return ELEMENTARY[function](*arguments)
-    values: dict[str, Scalar] = {"work.x": arguments[0]}
+    names = [f"work.{name}" for name in FUNCTIONS[function].parameters]
+    values: dict[str, Scalar] = dict(zip(names, arguments, strict=True))
     for op in FUNCTIONS[function].body:
         assert isinstance(op, Assign)
         values[op.target] = evaluate(op.value, values)

@@ -123,7 +123,8 @@ def _program_lines(program: Program) -> Iterator[str]:
     for wire in program.outputs:
         yield f"output {wire.name} = {wire.source}"
     for function in program.functions:
-        yield f"function {function.name}"
+        several = len(function.parameters) > 1
+        yield f"function {function.name}" + (f" of {function.parameters}" if several else "")
         yield from block_lines(function.body, 1)
     for name, block in program.blocks.items():
         yield f"block {name}"

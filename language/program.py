@@ -69,12 +69,13 @@ class TransitionInfo:
 
 @dataclass(frozen=True)
 class Function:
-    """An elementary function as operations: parameter `x`, result in `work.y`."""
+    """An elementary function as operations: parameters `work.x` ..., result in `work.y`."""
 
     name: str
     body: Block
     locals: tuple[str, ...]
     about: str
+    parameters: tuple[str, ...] = ("x",)
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Iterator, Mapping
 
-from language.elementary import FUNCTIONS
+from language.functions import FUNCTIONS
 from language.lower import expression, rounded
 from language.model import Automaton
 from language.operation import (

@@ -7,8 +7,8 @@ import random
 
 import pytest
 
-from language.elementary import FUNCTIONS
 from language.evaluate import ELEMENTARY, Scalar, apply
+from language.functions import FUNCTIONS
 from lockstep.compare import Tape, compare
 from modewright.api import program
 from tests.lockstep.programs import Tick, taped
@@ -31,10 +31,14 @@ equations:
   most: max(u, v)
   limited: clip(u, v, w)
   direction: sign(u)
+  whole: floor(u)
+  slope: tan(u * 1 rad)
+  heading: atan2(u, v)
 modes: {only: {}}
-outputs: [s, c, e, t, size, root, least, most, limited, direction]
+outputs: [s, c, e, t, size, root, least, most, limited, direction, whole, slope, heading]
 """
 SIGNALS = {"sin": "s", "cos": "c", "exp": "e", "tanh": "t", "abs": "size", "sqrt": "root"}
+SIGNALS |= {"floor": "whole", "tan": "slope"}
 
 
 def specials() -> list[float]:

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from engine.interpreter import Interpreter
-from language.elementary import FUNCTIONS
+from language.functions import FUNCTIONS
 from language.operation import (
     Assign,
     Binary,

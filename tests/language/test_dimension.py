@@ -131,9 +131,6 @@ def test_all_arguments_fit_each_other_behind_a_bare_0() -> None:
     assert checked("clip(0, 1 m, 2 s)")[1]
 
 
-@pytest.mark.xfail(
-    reason="dimension._relation: language.md section 3 has == and != for bool too", strict=True
-)
 def test_two_truth_values_may_be_compared() -> None:
     assert checked("flag == (x > 0)") == ("truth", [])
 

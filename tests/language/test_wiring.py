@@ -7,7 +7,7 @@ import re
 
 import pytest
 
-from language.elementary import FUNCTIONS
+from language.functions import FUNCTIONS
 from language.load import program_of
 from language.operation import (
     Assign,

@@ -6,8 +6,8 @@ from typing import get_args
 
 from hypothesis import HealthCheck, Phase, given, note, settings
 
-from language.elementary import FUNCTIONS
 from language.evaluate import ELEMENTARY, OPERATIONS
+from language.functions import FUNCTIONS
 from language.operation import Assign, Expr, Op
 from language.printing import expr_text
 from language.program import Program
