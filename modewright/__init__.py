@@ -51,6 +51,7 @@ PLACES = {
     "compare": "modewright.runs",
     "plot": "modewright.runs",
     "read": "modewright.runs",
+    "check": "modewright.checking",
     "render_all": "language.problem",
     "save": "modewright.runs",
 }

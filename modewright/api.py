@@ -15,12 +15,13 @@ from language.document import Scalar
 from language.load import automaton_of, command_line_value, program_of
 from language.map import read_map
 from language.model import Automaton, RecordingMap, Scenario, System
-from language.problem import Problem, Problems, SpecError
+from language.problem import Problems, SpecError
 from language.program import Program
-from language.project import Project, expanded, layered, read_document
+from language.project import Project, layered, read_document
 from language.scenario import read_scenario
 from language.system import read_system
 from lockstep.compare import Tape, Verdict, compare
+from modewright.checking import check as check
 
 Values = Mapping[str, str]
 """Parameter values as text with units, by `parameter` or `instance.parameter`."""
@@ -42,27 +43,6 @@ class Replayed:
     verdict: Verdict | None
     left_out: tuple[str, ...]
     recording: Recording = field(repr=False)
-
-
-def check(reference: str, root: Path | None = None) -> list[Problem]:
-    """Return all problems of a spec, warnings too; an empty list means that it is fine."""
-    project = Project(root or Path())
-    problems = Problems()
-    try:
-        document = read_document(project.path_of(reference))
-        base = expanded(document, project, problems)
-        if base.kind == "automaton":
-            program_of(automaton_of(document, project, problems=problems))
-        elif base.kind == "system":
-            for instance in read_system(document, project).instances.values():
-                program_of(instance.automaton)
-        elif base.kind == "map":
-            read_map(document, project)
-        else:
-            _check_scenario(reference, project)
-    except SpecError as error:
-        return list(dict.fromkeys(error.problems))
-    return list(dict.fromkeys(problems.found))
 
 
 def load(
@@ -184,18 +164,6 @@ def _estimator(
 def _map(reference: str, root: Path | None) -> RecordingMap:
     project = Project(root or Path())
     return read_map(read_document(project.path_of(reference)), project)
-
-
-def _check_scenario(reference: str, project: Project) -> None:
-    document = read_document(project.path_of(reference))
-    node = expanded(document, project).root.get("of")
-    if isinstance(node, Scalar):
-        system = read_system(read_document(project.path_of(node.text, node.span)), project)
-        read_scenario(document, project, system)
-        return
-    problems = Problems()
-    problems.error("missing", document.name_span, "a scenario says what system it is `of`")
-    raise SpecError(problems.found)
 
 
 def _scalars(values: Values | None) -> dict[str, Scalar]:

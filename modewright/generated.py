@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 from codegen.source import c_files
 from language.load import automaton_of, program_of
 from language.project import Project, expanded, read_document
+from modewright.checking import spec_files
 
 LIBRARY = ("ha_math.h", "ha_math.c")
 
@@ -27,11 +27,6 @@ def generated_files(root: Path) -> dict[Path, bytes]:
         for name, text in c_files(program_of(automaton)).items():
             found[folder / name] = text.encode()
     return found
-
-
-def spec_files(root: Path) -> Iterator[Path]:
-    """Yield the specs of a project in the order of their paths."""
-    yield from sorted((root / "spec").rglob("*.yaml"))
 
 
 def stale_files(root: Path) -> list[str]:

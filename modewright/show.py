@@ -13,7 +13,6 @@ from rich.table import Table
 
 from engine.difference import ModeSequence, RunDifference
 from engine.trajectory import Event, Trajectory
-from language.problem import Problem
 from lockstep.compare import Verdict
 from modewright.api import Replayed
 
@@ -105,19 +104,6 @@ def replay_json(replayed: Replayed) -> dict[str, Any]:
         "comparisons": [vars(comparison) for comparison in replayed.result.comparisons],
         "columns_left_out": list(replayed.left_out),
         "lockstep": verdict_json(replayed.verdict) if replayed.verdict else None,
-    }
-
-
-def problem_json(problem: Problem) -> dict[str, Any]:
-    """Return a problem as plain data."""
-    return {
-        "severity": problem.severity,
-        "kind": problem.kind,
-        "file": problem.span.source.name,
-        "line": problem.span.line,
-        "column": problem.span.column,
-        "message": problem.label,
-        "help": problem.help,
     }
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -25,16 +26,18 @@ def check(
     modewright check --all --json
     """
     from language.problem import ordered, render_all
-    from modewright import api, show
-    from modewright.generated import spec_files
+    from modewright import checking
 
-    names = list(specs or []) + ([str(path) for path in spec_files(Path())] if every else [])
+    names = list(specs or []) + (
+        [str(path) for path in checking.spec_files(Path())] if every else []
+    )
     if not names:
         raise typer.BadParameter("name a spec, or use --all", param_hint="SPECS")
-    problems = ordered(problem for name in names for problem in api.check(name))
+    problems = ordered(problem for name in names for problem in checking.check(name))
     errors = [problem for problem in problems if problem.severity == "error"]
     if as_json:
-        show.print_json({"problems": [show.problem_json(problem) for problem in problems]})
+        found = [checking.problem_json(problem) for problem in problems]
+        print(json.dumps({"problems": found}, indent=2, allow_nan=False))
     elif problems:
         print(render_all(problems), file=sys.stderr)
     if not as_json:

@@ -12,7 +12,9 @@ import gzip
 import hashlib
 import json
 import os
+import subprocess
 import sys
+import time
 from collections.abc import Callable
 from fractions import Fraction
 from functools import partial
@@ -78,6 +80,7 @@ def figures(recordings: Path | None) -> dict[str, Callable[[], Figure]]:
     for suffix in ("", "_noisy"):
         found[f"replay_1kHz{suffix}"] = partial(reference_replay, suffix)
     found["refused"] = refused
+    found["check_cold"] = check_cold
     if recordings:
         for drive in DRIVES:
             for estimator in ("estimator", "estimator_simple"):
@@ -104,6 +107,17 @@ def tip_out() -> Figure:
     late = float(np.abs(times - expected).max())
     met = len(times) == 10 and late <= 1e-6 and max(relative.values()) <= 1e-6
     return {"met": met, "events": len(times), "largest_event_error_s": late, "signals": relative}
+
+
+def check_cold() -> Figure:
+    """`modewright check` of every shipped spec, each in a process of its own."""
+    seconds = {}
+    for path in sorted((ROOT / "spec").rglob("*.yaml")):
+        start = time.monotonic()
+        command = [sys.executable, "-m", "modewright", "check", str(path)]
+        subprocess.run(command, cwd=ROOT, check=True, capture_output=True)
+        seconds[str(path.relative_to(ROOT))] = round(time.monotonic() - start, 2)
+    return {"met": max(seconds.values()) < 2.0, "seconds": seconds}
 
 
 def lockstep() -> Figure:
