@@ -26,6 +26,7 @@ from language.project import Project, expanded, read_document
 from language.reader import FILE_WORDS, Reader, check_name
 from language.syntax import Broken
 from language.units import SECOND, Unit, fits, parse_unit
+from language.values import with_value
 
 COMMON_KEYS = ("language", "automaton", "parameters", "inputs", "states", "equations")
 LOGIC_KEYS = ("flow", "terms", "initial", "modes", "templates", "outputs", "elements", "places")
@@ -106,18 +107,8 @@ def _set_values(
                 "values", value.span, label, f"set what it follows from, given at {entry.span}"
             )
         else:
-            changed = _with(_with_unit(entry.node), "value", value)
-            parameters = _with(parameters, name, changed)
+            parameters = _with(parameters, name, with_value(entry.node, value))
     return _with(tree, "parameters", parameters) if values else tree
-
-
-def _with_unit(parameter: Table) -> Table:
-    """A value that replaces another one is in its unit, as if the spec gave that unit."""
-    old = parameter.get("value")
-    if "unit" in parameter.entries or not isinstance(old, Scalar):
-        return parameter
-    _, _, unit = old.text.strip().partition(" ")
-    return _with(parameter, "unit", Scalar(unit or "1", old.span))
 
 
 class _AutomatonReader(Reader):

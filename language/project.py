@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib import resources
 from pathlib import Path
 
 from language.document import Document, Entry, Scalar, Table, parse, read_text
+from language.laying import lay_effect, read_laying
 from language.overlay import lay, without
 from language.problem import Problems, Source, Span, SpecError, nearest
+from language.tree import entries
 
-KINDS = ("automaton", "system", "scenario", "map", "variant")
-LATER_KINDS = ("study", "test", "effect", "calibration")
+KINDS = ("automaton", "system", "scenario", "map", "variant", "effect")
+LATER_KINDS = ("study", "test", "calibration")
 HEAD = re.compile(rf"^({'|'.join(KINDS + LATER_KINDS)}):\s*([^\s#]+)", re.MULTILINE)
 VERSION = "1"
 MAX_LAYERS = 20
@@ -31,17 +34,34 @@ class Project:
 
     @cached_property
     def index(self) -> dict[str, list[Path]]:
-        """Files by the name of what they hold, those of the project first."""
+        """Files by the name of what they hold, those of the project first.
+
+        An effect is called like physics; what else has its name goes before it.
+        """
+        return {**self.effects, **self._named(lambda kind: kind != "effect")}
+
+    @cached_property
+    def effects(self) -> dict[str, list[Path]]:
+        """Files of effects by name, those of the project first."""
+        return self._named(lambda kind: kind == "effect")
+
+    def _named(self, wanted: Callable[[str], bool]) -> dict[str, list[Path]]:
         own: dict[str, list[Path]] = {}
         for path in _yaml_files(self.root / "spec"):
-            for name in _names_in(path):
-                own.setdefault(name, []).append(path)
+            for kind, name in _heads_in(path):
+                if wanted(kind):
+                    own.setdefault(name, []).append(path)
         shipped = Path(str(resources.files("spec")))
         if shipped.resolve() != (self.root / "spec").resolve():
             for path in _yaml_files(shipped):
-                for name in _names_in(path):
-                    own.setdefault(name, [path])
+                for kind, name in _heads_in(path):
+                    if wanted(kind):
+                        own.setdefault(name, [path])
         return own
+
+    def effect(self, name: str, span: Span) -> Document:
+        """Return the document of an effect. Raises SpecError."""
+        return read_document(self._one_of(self.effects, name, span, "effect"))
 
     def path_of(self, reference: str, span: Span | None = None) -> Path:
         """Return the file of a name or path. Raises SpecError for none or several."""
@@ -49,17 +69,24 @@ class Project:
             base = Path(span.source.name).parent if span else Path()
             beside = base / reference
             return beside if beside.exists() else Path(reference)
-        found = self.index.get(reference, [])
+        place = span or Span(Source("command line", (reference,)), 1, 1, len(reference))
+        return self._one_of(self.index, reference, place, "spec")
+
+    def _one_of(
+        self, index: Mapping[str, list[Path]], reference: str, place: Span, what: str
+    ) -> Path:
+        found = index.get(reference, [])
         if len(found) == 1:
             return found[0]
-        place = span or Span(Source("command line", (reference,)), 1, 1, len(reference))
         problems = Problems()
         if found:
             files = ", ".join(shown(path) for path in found)
             problems.error("name", place, f"`{reference}` is defined twice", f"in {files}")
         else:
-            hint = nearest(reference, self.index) or "a name of a spec below spec/, or a path"
-            problems.error("name", place, f"there is no spec named `{reference}`", hint)
+            hint = nearest(reference, index) or f"a name of an {what} below spec/"
+            if what == "spec":
+                hint = nearest(reference, index) or "a name of a spec below spec/, or a path"
+            problems.error("name", place, f"there is no {what} named `{reference}`", hint)
         raise SpecError(problems.found)
 
 
@@ -109,9 +136,10 @@ def expanded(document: Document, project: Project, problems: Problems | None = N
     Warnings are left in `problems`. Raises SpecError.
     """
     problems = problems or Problems()
-    *variants, made = _layers(document, project)
+    *variants, base = _layers(document, project)
+    made = _with_effects(base, base, project, problems)
     for variant in reversed(variants):
-        made = _laid(made, variant, problems)
+        made = _laid(made, variant, project, problems)
     return made
 
 
@@ -126,7 +154,7 @@ def layered(base: Document, over: Document, project: Project, problems: Problems
         label = f"variant `{over.name}` extends `{wanted.text}`, not `{base.name}`"
         problems.error("variant", wanted.span, label)
     problems.stop_if_any()
-    made = _laid(expanded(base, project, problems), over, problems)
+    made = _laid(expanded(base, project, problems), over, project, problems)
     head = Entry(made.kind, base.name_span, Scalar(base.name, base.name_span))
     root = Table({**made.root.entries, made.kind: head}, made.root.span)
     return Document(made.kind, base.name, base.name_span, root, over.source)
@@ -157,14 +185,37 @@ def _layers(document: Document, project: Project) -> list[Document]:
     return found
 
 
-def _laid(base: Document, over: Document, problems: Problems) -> Document:
-    """Return a variant laid over its expanded base, with the variant's name."""
-    root = lay(base.root, without(over.root, "language", "variant", "extends"), problems)
+def _laid(base: Document, over: Document, project: Project, problems: Problems) -> Document:
+    """Return a variant with its effects laid over its expanded base, with the variant's name."""
+    body = without(over.root, "language", "variant", "extends", "effects")
+    root = lay(base.root, body, problems)
     problems.stop_if_any()
     name = Scalar(over.name, over.name_span)
-    entries = {**root.entries, base.kind: Entry(base.kind, over.name_span, name)}
-    tree = Table(entries, over.root.span)
-    return Document(base.kind, over.name, over.name_span, tree, over.source)
+    named = {**root.entries, base.kind: Entry(base.kind, over.name_span, name)}
+    tree = Table(named, over.root.span)
+    made = Document(base.kind, over.name, over.name_span, tree, over.source)
+    return _with_effects(made, over, project, problems)
+
+
+def _with_effects(
+    made: Document, layer: Document, project: Project, problems: Problems
+) -> Document:
+    """Return a document with the effects of one of its layers laid in their order."""
+    node = layer.root.get("effects")
+    if node is None:
+        return made
+    if made.kind != "automaton" or not isinstance(node, Table):
+        label = f"`effects` are laid over an automaton; `{made.name}` is a {made.kind}"
+        if not isinstance(node, Table):
+            label = "`effects` is a mapping"
+        problems.error("form", layer.root.entries["effects"].span, label)
+        problems.stop_if_any()
+    root = without(made.root, "effects")
+    for entry in entries(node):
+        laying = read_laying(entry, project.effect, problems)
+        root = lay_effect(root, laying, problems)
+        problems.stop_if_any()
+    return dataclasses.replace(made, root=root)
 
 
 def _extends(document: Document) -> Scalar:
@@ -193,9 +244,9 @@ def _yaml_files(folder: Path) -> Iterator[Path]:
         yield from sorted(folder.rglob("*.yaml"))
 
 
-def _names_in(path: Path) -> list[str]:
+def _heads_in(path: Path) -> list[tuple[str, str]]:
     try:
         text = path.read_text("utf-8", errors="replace")[:65536]
     except OSError:
         return []
-    return [match.group(2).strip("'\"") for match in HEAD.finditer(text)]
+    return [(match.group(1), match.group(2).strip("'\"")) for match in HEAD.finditer(text)]

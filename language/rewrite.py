@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 
 NUMBER = r"\d(?:[eE][-+]\d|[0-9A-Za-z_.])*"
 UNIT = r"(?:1/)?[A-Za-z]+(?:\^-?\d)?(?:[*/][A-Za-z]+(?:\^-?\d)?)*"
@@ -27,10 +27,22 @@ def substituted(text: str, new: Mapping[str, str]) -> tuple[str, frozenset[str]]
     operand: an expression gets parentheses.
     """
     tokens = list(_tokens(text))
+    return _replaced(tokens, new, lambda position: _is_read(tokens, position))
+
+
+def renamed(text: str, new: Mapping[str, str]) -> str:
+    """Return an expression in which names are replaced, in `der(x)` too."""
+    tokens = list(_tokens(text))
+    return _replaced(tokens, new, lambda position: not _is_function(tokens, position))[0]
+
+
+def _replaced(
+    tokens: list[tuple[str, str]], new: Mapping[str, str], where: Callable[[int], bool]
+) -> tuple[str, frozenset[str]]:
     found: set[str] = set()
     parts = []
     for position, (kind, part) in enumerate(tokens):
-        if kind == "name" and part in new and _is_read(tokens, position):
+        if kind == "name" and part in new and where(position):
             found.add(part)
             part = new[part] if ATOM.fullmatch(new[part]) else f"({new[part]})"
         parts.append(part)
@@ -87,8 +99,12 @@ def _tokens(text: str) -> Iterator[tuple[str, str]]:
         yield str(match.lastgroup), match.group()
 
 
+def _is_function(tokens: list[tuple[str, str]], position: int) -> bool:
+    after = [part for kind, part in tokens[position + 1 :] if kind != "blank"][:1]
+    return after == ["("]
+
+
 def _is_read(tokens: list[tuple[str, str]], position: int) -> bool:
     """Tell whether the name at a position is read: no function, not what `der` or `in` takes."""
-    after = [part for kind, part in tokens[position + 1 :] if kind != "blank"][:1]
     before = [part for kind, part in tokens[:position] if kind != "blank"][-2:]
-    return after != ["("] and before not in (["der", "("], ["in", "("])
+    return not _is_function(tokens, position) and before not in (["der", "("], ["in", "("])

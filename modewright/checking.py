@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from language.document import Scalar
+from language.effect import read_effect
 from language.load import automaton_of, program_of
 from language.map import read_map
 from language.problem import Problem, Problems, SpecError
@@ -29,6 +30,9 @@ def check(reference: str, root: Path | None = None) -> list[Problem]:
                 program_of(instance.automaton)
         elif base.kind == "map":
             read_map(document, project)
+        elif base.kind == "effect":
+            read_effect(document, problems)
+            problems.stop_if_any()
         else:
             _check_scenario(reference, project)
     except SpecError as error:

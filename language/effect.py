@@ -1,0 +1,203 @@
+"""Effect: a named piece of physics with holes, read from its file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from language.document import Document, Entry, Items, Node, Scalar, Table
+from language.parse import parse_balance, parse_expression
+from language.passage import EFFECT, Path, changed
+from language.problem import Problems, Span, nearest
+from language.reader import Reader, check_name
+from language.syntax import Name, Tree, names
+from language.units import Dimension
+
+TEXT_KEYS = ("signature", "confused_with", "separated_by", "references")
+ADDED = ("parameters", "states", "equations", "flow", "terms", "discrete", "elements", "regions")
+EFFECT_KEYS = ("language", "effect", "at", *ADDED, "redirect", "move", *TEXT_KEYS)
+FIT_KEYS = {
+    "balance": ("of", "unit", "has"),
+    "input": ("unit", "has"),
+    "output": ("unit", "has"),
+    "element": ("kind", "unit", "has"),
+}
+ELEMENT_PARTS = ("twist", "rate", "torque", "stiffness", "damping", "gap", "speed", "inertia")
+HOLES = {
+    "balance": ("x", "unit", "force", "inertia", "inertia_unit"),
+    "input": ("u", "unit"),
+    "output": ("y", "unit"),
+    "element": (
+        *("unit", "force", "angle", "far", *ELEMENT_PARTS),
+        *(f"{part}_unit" for part in ELEMENT_PARTS),
+    ),
+}
+"""Holes of each kind of place; those that a place declares in `places` are named in `has`."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """One kind of place where an effect fits."""
+
+    kind: str
+    of: str
+    unit: Dimension | None
+    has: tuple[str, ...]
+    span: Span
+
+
+@dataclass(frozen=True)
+class Effect:
+    """A parametrised overlay: where it fits, what it does, and texts for a report."""
+
+    name: str
+    about: str
+    fits: tuple[Fit, ...]
+    body: Table
+    signature: str
+    confused_with: tuple[str, ...]
+    separated_by: tuple[str, ...]
+    references: tuple[str, ...]
+    span: Span
+
+
+def read_effect(document: Document, problems: Problems) -> Effect:
+    """Read an effect; what is wrong with it on its own is reported. Raises SpecError."""
+    if document.kind != "effect":
+        label = f"`{document.name}` is a {document.kind}, not an effect"
+        problems.error("form", document.name_span, label)
+        problems.stop_if_any()
+    return _EffectReader(problems).read(document)
+
+
+def own_names(body: Table) -> dict[str, Span]:
+    """Return the names that an effect adds and expressions may read."""
+    found: dict[str, Span] = {}
+    for section in ("parameters", "states", "discrete", "equations"):
+        for entry in _entries(body.get(section)):
+            if not entry.key.startswith("$"):
+                found.setdefault(entry.key, entry.span)
+    for entry in _region_equations(body.get("regions")):
+        found.setdefault(entry.key, entry.span)
+    return found
+
+
+def _region_equations(node: Node | None) -> Iterator[Entry]:
+    for owner in _entries(node):
+        if isinstance(owner.node, Table):
+            yield from _entries(owner.node.get("equations"))
+            yield from _region_equations(owner.node.get("modes"))
+
+
+def _entries(node: Node | None) -> Iterator[Entry]:
+    if isinstance(node, Table):
+        yield from node
+
+
+class _EffectReader(Reader):
+    """The sections of an effect, one method each."""
+
+    def read(self, document: Document) -> Effect:
+        tree = self.table(document.root, f"effect {document.name}", EFFECT_KEYS)
+        check_name(document.name, document.name_span, self.problems)
+        fits = self._fits(tree.get("at"), document.name_span)
+        self._sections(tree)
+        self._names(tree, fits)
+        about = tree.get("about")
+        signature = tree.get("signature")
+        return Effect(
+            name=document.name,
+            about=about.text if isinstance(about, Scalar) else "",
+            fits=fits,
+            body=tree,
+            signature=signature.text if isinstance(signature, Scalar) else "",
+            confused_with=self._texts(tree, "confused_with"),
+            separated_by=self._texts(tree, "separated_by"),
+            references=self._texts(tree, "references"),
+            span=document.name_span,
+        )
+
+    def _texts(self, tree: Table, key: str) -> tuple[str, ...]:
+        return tuple(item.text for item in self.items(tree.get(key), key))
+
+    def _fits(self, node: Node | None, span: Span) -> tuple[Fit, ...]:
+        table = self.table(node, "at", FIT_KEYS)
+        if not table.entries:
+            self.problems.error("missing", span, "an effect says `at` what place it fits")
+        return tuple(self._fit(entry) for entry in table if entry.key in FIT_KEYS)
+
+    def _fit(self, entry: Entry) -> Fit:
+        what = f"at.{entry.key}"
+        table = self.table(entry.node, what, FIT_KEYS[entry.key])
+        of = self.choice(table.get("of"), "of", ("rate",), "")
+        of = self.choice(table.get("kind"), "kind", ("elastic", "inertia"), of)
+        if entry.key == "element" and not of:
+            self.problems.error("missing", entry.span, f"`{what}.kind` is missing")
+        unit = self.unit(table.get("unit")).dimension if "unit" in table.entries else None
+        has = tuple(item.text for item in self.items(table.get("has"), "has"))
+        return Fit(entry.key, of, unit, has, entry.span)
+
+    def _sections(self, tree: Table) -> None:
+        """Names are names, and only what is named is changed."""
+        for section in ("parameters", "states", "discrete", "elements", "regions", "flow"):
+            for entry in self.table(tree.get(section), section):
+                check_name(entry.key, entry.span, self.problems)
+        for entry in self.table(tree.get("equations"), "equations"):
+            if not entry.key.startswith("$"):
+                check_name(entry.key, entry.span, self.problems)
+        for entry in self.table(tree.get("terms"), "terms"):
+            for _ in self.named(entry.node, f"terms.{entry.key}"):
+                pass
+        for entry in self.table(tree.get("flow"), "flow"):
+            if entry.key not in {e.key for e in self.table(tree.get("states"), "states")}:
+                label = f"`{entry.key}` is not a state of the effect"
+                hint = "a summand of another balance is one of its `terms`"
+                self.problems.error("effect", entry.span, label, hint)
+        self.table(tree.get("redirect"), "redirect")
+        self.table(tree.get("move"), "move")
+
+    def _names(self, tree: Table, fits: tuple[Fit, ...]) -> None:
+        """Expressions read what the effect brings and holes; nothing else of the model."""
+        own = own_names(tree)
+        known = {f"${hole}" for fit in fits for hole in (*HOLES[fit.kind], *fit.has)}
+
+        def check(path: Path, scalar: Scalar) -> Scalar:
+            if path[:2] == ("redirect", "except"):
+                return scalar
+            allowed = {*known, *own}
+            if path[0] == "equations" and path[1].startswith("$"):
+                allowed.add("base")
+            for name in _names_of(path, scalar, self.problems):
+                self._known(name, allowed)
+            return scalar
+
+        changed(tree, EFFECT, check)
+
+    def _known(self, name: Name, allowed: set[str]) -> None:
+        if name.path in allowed or "." in name.path:
+            return
+        if name.path.startswith("$"):
+            label = f"`{name.path}` is not a hole of the places where this effect fits"
+            hint = nearest(name.path, allowed) or f"or `has: [{name.path[1:]}]` says that it is"
+        else:
+            label = f"`{name.path}` is neither a hole nor a name of this effect"
+            hint = nearest(name.path, allowed)
+        self.problems.error("effect", name.span, label, hint)
+
+
+def _names_of(path: Path, scalar: Scalar, problems: Problems) -> list[Name]:
+    with problems.collecting():
+        trees: tuple[Tree, ...]
+        if path[0] == "flow" or path[-2:-1] == ("flow",):
+            trees = parse_balance(scalar)
+        else:
+            trees = (parse_expression(scalar),)
+        return [name for tree in trees for name in names(tree)]
+    return []
+
+
+def items_of(node: Node | None) -> tuple[Scalar, ...]:
+    """Return the scalars of a list; of a single one, itself."""
+    if isinstance(node, Items):
+        return tuple(item for item in node.nodes if isinstance(item, Scalar))
+    return (node,) if isinstance(node, Scalar) else ()
