@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 from language.document import Document, Entry, Items, Node, Scalar, Table
@@ -12,6 +12,9 @@ from language.problem import Problems, Span, nearest
 from language.reader import Reader, check_name
 from language.syntax import Name, Tree, names
 from language.units import Dimension
+
+FindEffect = Callable[[str, Span], Document]
+"""From an effect's name (asked for at a place) to its document."""
 
 TEXT_KEYS = ("signature", "confused_with", "separated_by", "references")
 ADDED = ("parameters", "states", "equations", "flow", "terms", "discrete", "elements", "regions")
@@ -61,6 +64,28 @@ class Effect:
     span: Span
 
 
+@dataclass(frozen=True)
+class Laying:
+    """An effect with the place where it is asked for: one entry of `effects`."""
+
+    effect: Effect
+    place: str
+    ending: str
+    rename: Mapping[str, Entry]
+    values: Mapping[str, Entry]
+    span: Span
+
+    @property
+    def place_span(self) -> Span:
+        """Where the place is written, behind the `@`."""
+        return self.span.inside(len(self.effect.name) + 1, len(self.place))
+
+    @property
+    def title(self) -> str:
+        """The name of the layer."""
+        return f"effect {self.effect.name}@{self.place}"
+
+
 def read_effect(document: Document, problems: Problems) -> Effect:
     """Read an effect; what is wrong with it on its own is reported. Raises SpecError."""
     if document.kind != "effect":
@@ -68,6 +93,23 @@ def read_effect(document: Document, problems: Problems) -> Effect:
         problems.error("form", document.name_span, label)
         problems.stop_if_any()
     return _EffectReader(problems).read(document)
+
+
+def read_laying(entry: Entry, find: FindEffect, problems: Problems) -> Laying:
+    """Read one entry of `effects`: `name@place: {values: ..., as: ..., rename: ...}`."""
+    reader = Reader(problems)
+    name, sign, place = entry.key.partition("@")
+    if not (name and sign and place):
+        label = f"`{entry.key}` does not say where the effect is laid"
+        problems.error("effect", entry.span, label, "`coulomb_friction@w_em`: effect, place")
+        problems.stop_if_any()
+    table = reader.table(entry.node, f"effects.{entry.key}", ("values", "as", "rename"))
+    ending = reader.text(table.get("as"), "as", entry.span) if "as" in table.entries else place
+    values = _scalars(reader, table.get("values"), f"effects.{entry.key}.values")
+    rename = _scalars(reader, table.get("rename"), f"effects.{entry.key}.rename")
+    effect = read_effect(find(name, entry.span.inside(0, len(name))), problems)
+    problems.stop_if_any()
+    return Laying(effect, place, ending, rename, values, entry.span)
 
 
 def own_names(body: Table) -> dict[str, Span]:
@@ -92,6 +134,14 @@ def _region_equations(node: Node | None) -> Iterator[Entry]:
 def _entries(node: Node | None) -> Iterator[Entry]:
     if isinstance(node, Table):
         yield from node
+
+
+def _scalars(reader: Reader, node: Node | None, what: str) -> dict[str, Entry]:
+    found = {}
+    for entry in reader.table(node, what):
+        if reader.scalar(entry.node, entry.key, entry.span):
+            found[entry.key] = entry
+    return found
 
 
 class _EffectReader(Reader):

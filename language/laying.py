@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator
 
-from language.document import Document, Entry, Items, Node, Scalar, Table
-from language.effect import ADDED, Effect, items_of, own_names, read_effect
+from language.document import Entry, Items, Node, Scalar, Table
+from language.effect import ADDED, Laying, items_of, own_names
 from language.known import entries_of
 from language.moving import put_in, taken_out
 from language.overlay import lay
 from language.passage import EFFECT, Path, changed
 from language.place import Hole, Misfit, Place, place_of
 from language.problem import Problems, Source, Span, nearest
-from language.reader import NAME, Reader, check_name
+from language.reader import NAME, check_name
 from language.redirect import Part, exists, rebuilt, redirected, rewritten
 from language.rewrite import renamed
 from language.tree import at, entries, put, resourced
@@ -24,23 +23,6 @@ HOLE = re.compile(r"\$([A-Za-z]\w*)")
 VARIABLES = ("parameters", "states", "discrete", "equations")
 WRITES = ("equations", "update", "entry", "exit", "reset", "flow", "terms")
 """Sections of a mode or transition whose keys are names of variables."""
-
-
-@dataclass(frozen=True)
-class Laying:
-    """An effect with the place where it is asked for: one entry of `effects`."""
-
-    effect: Effect
-    place: str
-    ending: str
-    rename: Mapping[str, Scalar]
-    values: Mapping[str, Scalar]
-    span: Span
-
-    @property
-    def title(self) -> str:
-        """The name of the layer."""
-        return f"effect {self.effect.name}@{self.place}"
 
 
 def lay_effect(tree: Table, laying: Laying, problems: Problems) -> Table:
@@ -59,7 +41,7 @@ def lay_effect(tree: Table, laying: Laying, problems: Problems) -> Table:
 
 def _refuse(laying: Laying, misfit: Misfit, problems: Problems) -> None:
     label = f"`{laying.effect.name}` cannot be laid here: {misfit.why}"
-    problems.error("effect", laying.span, label, misfit.help)
+    problems.error("effect", laying.place_span, label, misfit.help)
 
 
 class _Layer:
@@ -103,15 +85,16 @@ class _Layer:
 
     def _private_names(self) -> dict[str, str]:
         own = {name: f"{name}_{self.laying.ending}" for name in own_names(self.body)}
-        for name, scalar in self.laying.rename.items():
-            if name in own:
-                own[name] = scalar.text
+        for name, entry in self.laying.rename.items():
+            if name in own and isinstance(entry.node, Scalar):
+                own[name] = entry.node.text
             else:
                 label = f"`{self.laying.effect.name}` has no name `{name}`"
-                self.problems.error("effect", scalar.span, label, nearest(name, own))
+                self.problems.error("effect", entry.span, label, nearest(name, own))
         taken = set(_taken(self.tree))
         for name, final in own.items():
-            span = self.laying.rename[name].span if name in self.laying.rename else None
+            renamed_to = self.laying.rename.get(name)
+            span = renamed_to.node.span if renamed_to else None
             self._check_final(name, final, final in taken, span or self.laying.span)
             taken.add(final)
         for section in ("elements", "regions"):
@@ -269,16 +252,17 @@ class _Layer:
     def _with_values(self, body: Table) -> Table:
         raw = self.body.get("parameters")
         own = raw.entries if isinstance(raw, Table) else {}
-        for name, value in self.laying.values.items():
+        for name, entry in self.laying.values.items():
             table = at(body, ("parameters", self.private.get(name, name)))
             if name not in own or not isinstance(table, Table):
                 label = f"`{self.laying.effect.name}` has no parameter `{name}`"
-                self.problems.error("effect", value.span, label, nearest(name, own))
+                self.problems.error("effect", entry.span, label, nearest(name, own))
             elif "derived" in table.entries:
                 label = f"`{name}` is derived: set what it follows from"
-                self.problems.error("values", value.span, label)
-            else:
-                body = put(body, ("parameters", self.private[name]), with_value(table, value))
+                self.problems.error("values", entry.span, label)
+            elif isinstance(entry.node, Scalar):
+                made = with_value(table, entry.node)
+                body = put(body, ("parameters", self.private[name]), made)
         self.problems.stop_if_any()
         return body
 
@@ -311,33 +295,3 @@ def _holes_in(body: Table) -> list[str]:
     for section in (*ADDED, "redirect", "move"):
         look(body.get(section))
     return list(found)
-
-
-FindEffect = Callable[[str, Span], Document]
-"""From an effect's name (asked for at a place) to its document."""
-
-
-def read_laying(entry: Entry, find: FindEffect, problems: Problems) -> Laying:
-    """Read one entry of `effects`: `name@place: {values: ..., as: ..., rename: ...}`."""
-    reader = Reader(problems)
-    name, sign, place = entry.key.partition("@")
-    if not (name and sign and place):
-        label = f"`{entry.key}` does not say where the effect is laid"
-        problems.error("effect", entry.span, label, "`coulomb_friction@w_em`: effect, place")
-        problems.stop_if_any()
-    table = reader.table(entry.node, f"effects.{entry.key}", ("values", "as", "rename"))
-    ending = reader.text(table.get("as"), "as", entry.span) if "as" in table.entries else place
-    values = _scalars(reader, table.get("values"), f"effects.{entry.key}.values")
-    rename = _scalars(reader, table.get("rename"), f"effects.{entry.key}.rename")
-    effect = read_effect(find(name, entry.span), problems)
-    problems.stop_if_any()
-    return Laying(effect, place, ending, rename, values, entry.span)
-
-
-def _scalars(reader: Reader, node: Node | None, what: str) -> dict[str, Scalar]:
-    found = {}
-    for entry in reader.table(node, what):
-        scalar = reader.scalar(entry.node, entry.key, entry.span)
-        if scalar:
-            found[entry.key] = scalar
-    return found

@@ -12,7 +12,8 @@ from importlib import resources
 from pathlib import Path
 
 from language.document import Document, Entry, Scalar, Table, parse, read_text
-from language.laying import lay_effect, read_laying
+from language.effect import read_laying
+from language.laying import lay_effect
 from language.overlay import lay, without
 from language.problem import Problems, Source, Span, SpecError, nearest
 from language.tree import entries
@@ -83,7 +84,7 @@ class Project:
             files = ", ".join(shown(path) for path in found)
             problems.error("name", place, f"`{reference}` is defined twice", f"in {files}")
         else:
-            hint = nearest(reference, index) or f"a name of an {what} below spec/"
+            hint = nearest(reference, index)
             if what == "spec":
                 hint = nearest(reference, index) or "a name of a spec below spec/, or a path"
             problems.error("name", place, f"there is no {what} named `{reference}`", hint)
@@ -212,9 +213,11 @@ def _with_effects(
         problems.stop_if_any()
     root = without(made.root, "effects")
     for entry in entries(node):
-        laying = read_laying(entry, project.effect, problems)
-        root = lay_effect(root, laying, problems)
-        problems.stop_if_any()
+        found = Problems()
+        with found.collecting():
+            root = lay_effect(root, read_laying(entry, project.effect, found), found)
+        problems.found.extend(found.found)
+    problems.stop_if_any()
     return dataclasses.replace(made, root=root)
 
 
