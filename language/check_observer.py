@@ -24,17 +24,22 @@ def check_observer(
             if name not in known:
                 label = f"`{name}` is not {what}"
                 problems.error("name", observer.span, label, nearest(name, known))
+    equations = _equations(automaton, observer)
     for measure, state in observer.measures.items():
-        if state not in observer.states:
+        if state not in observer.states and state not in equations:
             label = f"`{measure}` measures `{state}`, which is not a state of the observer"
-            problems.error("name", observer.span, label, nearest(state, observer.states))
+            problems.error(
+                "name", observer.span, label, nearest(state, [*observer.states, *equations])
+            )
     for formula in observer.f.values():
         for read in names_of(formula.tree):
             if read.path in observer.states:
                 label = f"`f` reads the observer's own state `{read.path}`: that belongs into `A`"
                 problems.error("observer", read.span, label)
     named = (*observer.states, *observer.measures, *observer.inputs)
+    _check_point(automaton, observer, check)
     sizes = {name: kind for name, kind in kinds.items() if isinstance(kind, Dimension)}
+    sizes = {**equations, **sizes}
     if all(name in sizes for name in named):
         _check_matrices(observer, sizes, check)
         _check_vectors(observer, sizes, check)
@@ -42,6 +47,22 @@ def check_observer(
             if not observer.c and state in sizes and not fits(sizes[measure], sizes[state]):
                 label = f"`{measure}` is in `{sizes[measure]}`, `{state}` is in `{sizes[state]}`"
                 problems.error("dimension", observer.span, label)
+
+
+def _equations(automaton: Automaton, observer: Observer) -> dict[str, Dimension]:
+    """Equations of the observer's mode of the model: a measurement may be of one of these."""
+    model = automaton.model
+    if observer.of is None or model is None:
+        return {}
+    found = model.modes[observer.of].equations
+    return {name: model.dimensions[name] for name in found if name in model.dimensions}
+
+
+def _check_point(automaton: Automaton, observer: Observer, check: DimensionCheck) -> None:
+    known = automaton.model.dimensions if automaton.model else {}
+    for name, formula in observer.at.items():
+        if name in known:
+            check.quantity(formula.tree, known[name], name)
 
 
 def _check_matrices(

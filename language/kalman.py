@@ -7,10 +7,12 @@ G its integral, L from the discrete Riccati equation with Van Loan's noise covar
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 from language.constants import constant_value
+from language.derived import with_model
 from language.evaluate import Scalar
 from language.lower import Names, expression, tunables_of
 from language.matrix import Matrix, exponential, exponential_integral, multiply
@@ -47,15 +49,19 @@ def kalman(
     automaton: Automaton,
     mode: Mode,
     before: Names,
+    now: Names,
     values: Mapping[str, Scalar],
     problems: Problems,
 ) -> Kalman | None:
     """Return the observer of a mode; None where its numbers cannot be computed (reported).
 
-    `before` says what names are during the prediction: states now, inputs of the tick before.
+    `before` says what names are during the prediction: states now, inputs of the tick before;
+    `now` what they are during the correction.
     """
-    observer = mode.observer
-    assert observer and automaton.period is not None
+    assert mode.observer and automaton.period is not None
+    observer = with_model(automaton, mode.name, mode.observer, values, problems)
+    if observer is None:
+        return None
     period = float(automaton.period)
     with problems.collecting():
         a = _matrix(automaton, values, observer.a, observer.states, observer.states, "A")
@@ -71,7 +77,19 @@ def kalman(
             return None
         gamma = multiply(held, b) if observer.inputs else ()
         numbers = {"Phi": phi, "Gamma": gamma, "G": held, "L": gain, "C": c}
-        return _built(automaton, mode, observer, before, numbers, (a, b, c, q, r))
+        own = {name: Ref(f"solved.{name}") for name in observer.constants}
+        known = ({**before, **own}, {**now, **own})
+        built = _built(automaton, mode, observer, known, numbers, (a, b, c, q, r))
+        more = tuple(
+            Constant(
+                f"solved.{name}",
+                "solved",
+                constant_value(formula, automaton, values, "what remains"),
+                depends_on=tunables_of(automaton, [formula]),
+            )
+            for name, formula in observer.constants.items()
+        )
+        return dataclasses.replace(built, constants=(*built.constants, *more))
     return None
 
 
@@ -96,7 +114,7 @@ def _built(
     automaton: Automaton,
     mode: Mode,
     observer: Observer,
-    before: Names,
+    known: tuple[Names, Names],
     numbers: Mapping[str, Matrix],
     given: tuple[Matrix, Matrix, Matrix, Matrix, Matrix],
 ) -> Kalman:
@@ -117,8 +135,8 @@ def _built(
         period=float(automaton.period or 0),
         solved={constant.name: constant.name for constant in constants},
     )
-    predict = _predict(observer, names, numbers, before, prefix)
-    correct = _correct(observer, names, numbers)
+    predict = _predict(observer, names, numbers, known[0], prefix)
+    correct = _correct(observer, names, numbers, known[1])
     return Kalman(predict, correct, constants, info)
 
 
@@ -196,12 +214,15 @@ def _predict(
     return tuple(ops)
 
 
-def _correct(observer: Observer, names: _Names, numbers: Mapping[str, Matrix]) -> Block:
+def _correct(observer: Observer, names: _Names, numbers: Mapping[str, Matrix], now: Names) -> Block:
     state: dict[str, Expr] = {name: Ref(f"state.{name}") for name in observer.states}
     error: dict[str, Expr] = {name: Ref(f"innovation.{name}") for name in observer.measures}
     ops: list[Op] = []
     for name in observer.measures:
-        seen = total(names.row("C", numbers["C"], name, state))
+        parts = names.row("C", numbers["C"], name, state)
+        if name in observer.g:
+            parts.append(expression(observer.g[name].tree, now))
+        seen = total(parts)
         fresh = Ref(f"is_new.{name}")
         value = Select(fresh, subtract(Ref(f"input.{name}"), seen), real(0.0))
         ops.append(Assign(f"innovation.{name}", value))

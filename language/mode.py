@@ -76,7 +76,7 @@ class ModeReader(Reader):
             equations=equations,
             flow=flow,
             update=self._formulas(table.get("update"), f"{key}.update"),
-            observer=read_observer(self, observer_node, f"{key}.observer")
+            observer=read_observer(self, observer_node, f"{key}.observer", self.model)
             if observer_node
             else None,
             run=read_run(self, run_node, f"{key}.runs", self.model) if run_node else None,

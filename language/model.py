@@ -109,7 +109,11 @@ class Transition:
 
 @dataclass(frozen=True)
 class Observer:
-    """A steady Kalman filter: dx/dt = A x + B u + f, y = C x, by row and column name."""
+    """A Kalman filter: dx/dt = A x + B u + f, y = C x + g, by row and column name.
+
+    `of` is the mode of the model that A, B, f, C and g are taken from, at the point `at`; f and g
+    read `constants` by their names.
+    """
 
     states: tuple[str, ...]
     inputs: tuple[str, ...]
@@ -122,6 +126,11 @@ class Observer:
     measurement_noise: Mapping[str, Formula]
     key: str
     span: Span
+    of: str | None = None
+    at: Mapping[str, Formula] = field(default_factory=dict)
+    g: Mapping[str, Formula] = field(default_factory=dict)
+    constants: Mapping[str, Formula] = field(default_factory=dict)
+    runs: bool = False
 
 
 @dataclass(frozen=True)

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Literal, cast
 
-from language.document import Entry, Node
+from language.document import Entry, Node, Table
 from language.model import Automaton, Formula, Observer, Run
-from language.problem import nearest
+from language.problem import Span, nearest
 
 if TYPE_CHECKING:
     from language.reader import Reader
 
-OBSERVER_KEYS = ("kalman", "inputs", "A", "B", "C", "f", "measures")
+WRITTEN_KEYS = ("inputs", "A", "B", "C", "f")
+OBSERVER_KEYS = ("kalman", "of", "at", *WRITTEN_KEYS, "measures")
 NOISE_KEYS = ("process_noise", "measurement_noise")
 RUN_KEYS = ("of", "method", "substeps", "events")
 METHODS = ("rk4", "exponential")
@@ -21,8 +22,8 @@ MAX_EVENTS = 100
 Matrix = dict[str, dict[str, Formula]]
 
 
-def read_observer(reader: Reader, node: Node, key: str) -> Observer:
-    """Read an observer with written matrices and a steady gain."""
+def read_observer(reader: Reader, node: Node, key: str, model: Automaton | None) -> Observer:
+    """Read an observer of a mode of the model, or one with written matrices."""
     table = reader.table(node, key, (*OBSERVER_KEYS, *NOISE_KEYS))
     kalman = reader.table(table.get("kalman"), f"{key}.kalman", ("states", "gain"))
     if "kalman" not in table.entries:
@@ -32,9 +33,12 @@ def read_observer(reader: Reader, node: Node, key: str) -> Observer:
     measures = {}
     for entry in reader.named(table.get("measures"), f"{key}.measures"):
         measures[entry.key] = reader.text(entry.node, f"measures.{entry.key}", entry.span)
-    for name in ("C", "measures", *NOISE_KEYS):
-        if name not in table.entries and not (name == "C" and measures):
+    for name in ("measures", *NOISE_KEYS):
+        if name not in table.entries:
             reader.problems.error("missing", node.span, f"`{name}` is missing in the observer")
+    of_node = table.get("of")
+    of = _mode_of_model(reader, of_node, "an observer", node.span, model) if of_node else None
+    _one_source(reader, table)
     rows, columns = set(states), set(states)
     inputs = tuple(item.text for item in reader.items(table.get("inputs"), "inputs"))
     return Observer(
@@ -50,22 +54,25 @@ def read_observer(reader: Reader, node: Node, key: str) -> Observer:
             reader, table.get("measurement_noise"), f"{key}.measurement_noise", set(measures)
         ),
         key=key,
-        span=node.span,
+        span=of_node.span if of_node else node.span,
+        of=of,
+        at=_point(reader, table.get("at"), f"{key}.at", model),
     )
+
+
+def _one_source(reader: Reader, table: Table) -> None:
+    """The matrices are taken from the model or written, not both."""
+    written = [name for name in WRITTEN_KEYS if name in table.entries]
+    for name in written if "of" in table.entries else []:
+        label = f"`{name}` is taken from the model: `of` stands beside it"
+        help = f"leave out `{name}`, or lay `of: {{remove: true}}` over it"
+        reader.problems.error("observer", table.entries[name].span, label, help)
 
 
 def read_run(reader: Reader, node: Node, key: str, model: Automaton | None) -> Run:
     """Read a run of one mode of the model."""
     table = reader.table(node, key, RUN_KEYS)
-    of = reader.text(table.get("of"), "of", node.span)
-    name, _, mode = of.rpartition(".")
-    place = (table.get("of") or node).span
-    if model is None:
-        reader.problems.error("run", place, "a run needs `model:` at the top of the automaton")
-    elif name != model.name or mode not in model.modes:
-        known = [f"{model.name}.{known}" for known in model.modes]
-        label = f"`{of}` is not a mode of the model"
-        reader.problems.error("name", place, label, nearest(of, known))
+    mode = _mode_of_model(reader, table.get("of"), "a run", node.span, model) or ""
     method = reader.choice(table.get("method"), "method", METHODS, "rk4")
     return Run(
         mode=mode,
@@ -77,6 +84,24 @@ def read_run(reader: Reader, node: Node, key: str, model: Automaton | None) -> R
     )
 
 
+def _mode_of_model(
+    reader: Reader, node: Node | None, what: str, span: Span, model: Automaton | None
+) -> str | None:
+    """Return the mode that `<model>.<mode>` names, None where that is a problem (reported)."""
+    of = reader.text(node, "of", span)
+    place = node.span if node else span
+    name, _, mode = of.rpartition(".")
+    if model is None:
+        reader.problems.error("run", place, f"{what} needs `model:` at the top of the automaton")
+    elif name != model.name or mode not in model.modes:
+        known = [f"{model.name}.{known}" for known in model.modes]
+        label = f"`{of}` is not a mode of the model"
+        reader.problems.error("name", place, label, nearest(of, known))
+    else:
+        return mode
+    return None
+
+
 def _matrix(
     reader: Reader, node: Node | None, key: str, rows: set[str], columns: set[str]
 ) -> Matrix:
@@ -84,6 +109,20 @@ def _matrix(
     for entry in reader.table(node, key):
         if _known(reader, entry, key, rows):
             found[entry.key] = _vector(reader, entry.node, f"{key}.{entry.key}", columns)
+    return found
+
+
+def _point(
+    reader: Reader, node: Node | None, key: str, model: Automaton | None
+) -> dict[str, Formula]:
+    names = {*model.states, *model.inputs} if model else set()
+    found = {}
+    for entry in reader.table(node, key):
+        if entry.key not in names:
+            label = f"`at` gives values of states and inputs of the model, `{entry.key}` is none"
+            reader.problems.error("name", entry.span, label, nearest(entry.key, names))
+        elif formula := reader.expression(entry.node, f"{key}.{entry.key}", entry.span):
+            found[entry.key] = formula
     return found
 
 

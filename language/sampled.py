@@ -165,7 +165,7 @@ class _Sampled:
     def _advance(self, mode: Mode) -> dict[str, Block]:
         """What carries the states from the tick before to this one."""
         if mode.observer:
-            made = kalman(self.automaton, mode, self.before, self.values, self.problems)
+            made = kalman(self.automaton, mode, self.before, self.now, self.values, self.problems)
             if made is None:
                 return {}
             self.observers[mode.name] = made

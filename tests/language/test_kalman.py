@@ -30,19 +30,24 @@ INPUTS = ("T_em", "T_br")
 RATES = {"100Hz": "10 ms", "1kHz": "1 ms", "10kHz": "0.1 ms"}
 VARIANT = """language: 1
 variant: other_rate
-extends: estimator
+extends: {base}
 period: {period}
 modes: {{gap: {{runs: {{substeps: 20}}}}}}
 """
 
 
-@pytest.fixture(scope="module")
-def at_rate(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Program]:
-    """Return the Program of the shipped estimator at each rate of the paper's matrices."""
+@pytest.fixture(scope="module", params=["estimator", "estimator_written"])
+def at_rate(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> dict[str, Program]:
+    """Return the Program of a shipped estimator at each rate of the paper's matrices.
+
+    One takes its matrices from the model, the other has them written out.
+    """
     made = {}
     for rate, period in RATES.items():
         folder = tmp_path_factory.mktemp(rate)
-        project = project_of(folder, other=VARIANT.format(period=period))
+        project = project_of(folder, other=VARIANT.format(base=request.param, period=period))
         document = read_document(project.path_of("other_rate"))
         made[rate] = program_of(automaton_of(document, project))
     return made
@@ -153,6 +158,15 @@ def reference(made: Program) -> tuple[KalmanFilter, Matrix]:
     return found, gain
 
 
+def tangent_load(p: dict[str, float]) -> float:
+    """Return the road load at standstill [N*m] of its tangent at 40 km/h (b_0 of the paper)."""
+    r, w = p["constant.r_w"], 40 / 3.6 / p["constant.r_w"]
+    weight = p["constant.m"] * p["constant.g"] * r
+    return -p["constant.a_aer"] * r**3 * w**2 + weight * (
+        p["constant.C_0"] - p["constant.C_2"] * w**2
+    )
+
+
 def test_a_cycle_of_prediction_and_correction_is_that_of_filterpy(
     at_rate: dict[str, Program],
 ) -> None:
@@ -173,7 +187,7 @@ def test_a_cycle_of_prediction_and_correction_is_that_of_filterpy(
     ours.run("step")
     pull = p["constant.k_hs"] * p["constant.alpha"]
     inertia = p["calibration.J_em"]
-    f = [0.0, pull / (inertia * p["constant.R"]), -(pull + p["constant.b_0"]) / p["constant.J_v"]]
+    f = [0.0, pull / (inertia * p["constant.R"]), -(pull + tangent_load(p)) / p["constant.J_v"]]
     theirs.x = np.array([[start[name]] for name in STATES])
     theirs.predict(u=np.array([[before["T_em"]], [before["T_br"]], *[[value] for value in f]]))
     ahead = theirs.x.copy()

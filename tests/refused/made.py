@@ -48,9 +48,46 @@ def deep(folder: Path) -> Pair:
     return refused, neighbour
 
 
+SLEDGE = """language: 1
+automaton: sledge
+inputs: {u: {unit: m/s^2, default: 0 m/s^2}}
+states: {v: {unit: m/s, initial: 0 m/s}}
+modes: {glides: {flow: {v: der(v) = u - 1 1/s * abs(v - 2 m/s)}}}
+outputs: [v]
+"""
+WATCHER = """language: 1
+automaton: watcher
+period: 10 ms
+numbers: float64
+model: sledge.yaml
+inputs: {y_v: {unit: m/s}}
+states: {v: {initial: y_v}}
+modes:
+  only:
+    observer:
+      of: sledge.glides
+      kalman: {states: [v]}
+      at: {v: 2 m/s}
+      measures: {y_v: v}
+      process_noise: {v: 1 m^2/s^3}
+      measurement_noise: {y_v: 0.1 m^2/s^2}
+outputs: [v]
+"""
+
+
+def corner(folder: Path) -> Pair:
+    """An observer at a point where its model has a corner, and one beside it."""
+    refused, neighbour = folder / "corner.yaml", folder / "beside.yaml"
+    (folder / "sledge.yaml").write_text(SLEDGE)
+    refused.write_text(WATCHER)
+    neighbour.write_text(WATCHER.replace("2 m/s", "3 m/s"))
+    return refused, neighbour
+
+
 MADE: dict[str, Callable[[Path], Pair]] = {
     "huge": huge,
     "absent": absent,
     "folder": folder_as_file,
     "deep": deep,
+    "corner": corner,
 }

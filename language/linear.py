@@ -1,0 +1,141 @@
+"""Linear: the balances of a mode as rates, and their matrices at a point, as expressions."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass
+from functools import reduce
+
+from language.balance import coefficient_of
+from language.derivative import SMOOTH, At, derivative, refused, taken
+from language.evaluate import Scalar, evaluate
+from language.lower import constant_names, expression
+from language.model import Automaton, Mode
+from language.order import equation_order
+from language.problem import SpecError
+from language.simplify import is_zero, minus, negative, number, over, plus, replaced, times
+from language.syntax import Application, Arithmetic, Name, Negative, Power, Tree, names
+
+Rows = dict[str, dict[str, Tree]]
+"""A matrix by the names of its rows and columns, zeros left out."""
+
+
+@dataclass(frozen=True)
+class Point:
+    """Where a flow is made linear: some names with their values, as expressions.
+
+    `values` are those of the constants of `automaton`, whose parameters the values may read.
+    """
+
+    automaton: Automaton
+    values: Mapping[str, Scalar]
+    places: Mapping[str, Tree]
+
+    @property
+    def value(self) -> At:
+        """The value of an expression at the point. Raises SpecError where a name has none."""
+        known = constant_names(self.automaton)
+
+        def at(tree: Tree) -> Scalar:
+            here = replaced(tree, self.places)
+            for read in names(here):
+                if read.path not in known:
+                    label = f"`{read.path}` decides which branch is taken"
+                    raise refused(read.span, label, _give(read.path))
+            return evaluate(expression(here, known), self.values)
+
+        return at
+
+
+def inlined(mode: Mode, given: Mapping[str, Tree]) -> dict[str, Tree]:
+    """Return the equations of a mode in states, inputs and parameters; some names are given."""
+    known = dict(given)
+    for name in equation_order(mode):
+        known[name] = replaced(mode.equations[name].tree, known)
+    return known
+
+
+def rates(mode: Mode, known: Mapping[str, Tree]) -> dict[str, Tree]:
+    """Return der(x) of every state of a mode, with what is known put in."""
+    found = {}
+    for name, balance in mode.flow.items():
+        factor = coefficient_of(balance.left, name)
+        if isinstance(factor, SpecError):
+            raise factor
+        right = replaced(balance.right, known)
+        found[name] = right if factor is None else over(right, replaced(factor, known))
+    return found
+
+
+def matrix(trees: Mapping[str, Tree], columns: Iterable[str], point: Point) -> Rows:
+    """Return the derivatives of the trees (rows) by the columns at the point. Raises SpecError."""
+    found: Rows = {}
+    columns = tuple(columns)
+    for row, tree in trees.items():
+        entries = {}
+        for column in columns:
+            entry = replaced(derivative(tree, column, point.value), point.places)
+            if not is_zero(entry):
+                entries[column] = entry
+        if entries:
+            found[row] = entries
+    return found
+
+
+def remains(tree: Tree, columns: Collection[str], point: Point) -> Tree:
+    """Return what the tangent of a tree has besides slope * column: its value where these are 0.
+
+    Sums are taken apart, so that only the terms that are not linear read the point.
+    """
+
+    def inside(part: Tree) -> Tree:
+        return remains(part, columns, point)
+
+    if not _reads(tree, columns):
+        return tree
+    match tree:
+        case Name(_, span):
+            return number(0, span)
+        case Negative(operand, _):
+            return negative(inside(operand))
+        case Arithmetic("+", left, right, _):
+            return plus(inside(left), inside(right))
+        case Arithmetic("-", left, right, _):
+            return minus(inside(left), inside(right))
+        case Arithmetic("*", left, right, _) if not _reads(left, columns):
+            return times(left, inside(right))
+        case Arithmetic("*", left, right, _) if not _reads(right, columns):
+            return times(inside(left), right)
+        case Arithmetic("/", left, right, _) if not _reads(right, columns):
+            return over(inside(left), right)
+        case Arithmetic() | Power():
+            return _curved(tree, columns, point)
+        case Application(function, _, _) if function in SMOOTH:
+            return _curved(tree, columns, point)
+        case _:
+            return inside(taken(tree, point.value))
+
+
+def _reads(tree: Tree, columns: Collection[str]) -> bool:
+    return any(read.path in columns for read in names(tree))
+
+
+def _curved(tree: Tree, columns: Collection[str], point: Point) -> Tree:
+    """The value at the point less slope * column there."""
+    result = replaced(tree, point.places)
+    for column in dict.fromkeys(read.path for read in names(tree) if read.path in columns):
+        if column not in point.places:
+            raise refused(tree.span, f"`{column}` does not enter linearly here", _give(column))
+        slope = replaced(derivative(tree, column, point.value), point.places)
+        result = minus(result, times(slope, point.places[column]))
+    return result
+
+
+def _give(name: str) -> str:
+    return f"give its point: `at: {{{name}: ...}}`"
+
+
+def tangent(slopes: Mapping[str, Tree], rest: Tree) -> Tree:
+    """Return the sum of slope * column, plus the rest."""
+    parts = [times(slope, Name(column, rest.span)) for column, slope in slopes.items()]
+    return reduce(plus, [*parts, rest])
