@@ -15,9 +15,11 @@ if TYPE_CHECKING:
     from language.problem import Problem, SpecError, render_all
     from lockstep.compare import Verdict
     from modewright.api import Loaded, Replayed, check, generate, load, lockstep, replay, simulate
+    from modewright.diagram import Diagram, graph
     from modewright.runs import compare, plot, read, save
 
 __all__ = [
+    "Diagram",
     "Event",
     "Loaded",
     "Picture",
@@ -30,6 +32,7 @@ __all__ = [
     "check",
     "compare",
     "generate",
+    "graph",
     "load",
     "lockstep",
     "plot",
@@ -41,6 +44,7 @@ __all__ = [
 ]
 
 PLACES = {
+    "Diagram": "modewright.diagram",
     "Event": "engine.trajectory",
     "Picture": "engine.plot",
     "Problem": "language.problem",
@@ -52,6 +56,7 @@ PLACES = {
     "plot": "modewright.runs",
     "read": "modewright.runs",
     "check": "modewright.checking",
+    "graph": "modewright.diagram",
     "render_all": "language.problem",
     "save": "modewright.runs",
 }

@@ -13,6 +13,7 @@ from modewright.commands.compare import compare
 from modewright.commands.demo import demo
 from modewright.commands.explain import explain
 from modewright.commands.generate import generate
+from modewright.commands.graph import graph
 from modewright.commands.lockstep import lockstep
 from modewright.commands.plot import plot
 from modewright.commands.replay import replay
@@ -21,7 +22,7 @@ from modewright.console import configure
 from modewright.exits import EXIT_CODES, exit_code
 from modewright.files import require_writable
 
-COMMANDS = (check, simulate, lockstep, replay, plot, compare, generate, explain, demo)
+COMMANDS = (check, simulate, lockstep, replay, plot, compare, graph, generate, explain, demo)
 
 app = typer.Typer(
     no_args_is_help=True,

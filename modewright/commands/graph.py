@@ -1,0 +1,41 @@
+"""Command graph: the modes and transitions of an automaton as a diagram."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from modewright.console import announce
+from modewright.files import OutputError, require_writable, write_files
+
+FORMATS = (".svg", ".mmd", ".md")
+
+
+def graph(
+    automaton: Annotated[str, typer.Argument(help="an automaton: name or file")],
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", help="write .svg, .mmd or .md; else Mermaid is printed"),
+    ] = None,
+) -> None:
+    """Draw modes, guards, waits, priorities and resets.
+
+    \b
+    modewright graph estimator
+    modewright graph estimator --out estimator.svg
+    """
+    from modewright.diagram import graph as diagram
+
+    form = out.suffix.lower() if out else ""
+    if out and form not in FORMATS:
+        raise OutputError(f"{out}: a diagram ends with {', '.join(FORMATS)}")
+    require_writable(out)
+    drawn = diagram(automaton)
+    text = drawn.svg() if form == ".svg" else drawn.mermaid()
+    if out is None:
+        print(text, end="")
+        return
+    write_files({out: (f"```mermaid\n{text}```\n" if form == ".md" else text).encode()})
+    announce([out])

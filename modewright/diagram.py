@@ -1,0 +1,246 @@
+"""Diagram: the modes of an automaton as boxes and arrows, as the spec writes them.
+
+It is read from the laid-out text, so that guards stand in it as their author wrote them.
+"""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from language.document import Document, Node, Scalar, Table
+
+LABEL_WIDTH = 36
+"""Longest line of a label [characters]."""
+MOST_LINES = 6
+"""Most lines of equations shown in a mode."""
+Key = tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Arrow:
+    """A transition between two modes (paths from the root) with the lines of its label."""
+
+    source: Key
+    target: Key
+    lines: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class ModeBox:
+    """A mode: its path, what holds in it, and its inner regions (none in a plain mode)."""
+
+    path: Key
+    lines: tuple[str, ...]
+    regions: tuple[RegionBox, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """The name without the path."""
+        return self.path[-1]
+
+
+@dataclass(frozen=True)
+class RegionBox:
+    """Modes of which one is active, and the initial one; a name only if there are several."""
+
+    name: str
+    initial: str
+    modes: tuple[ModeBox, ...]
+
+
+@dataclass(frozen=True)
+class Diagram:
+    """All regions of an automaton and its transitions; a notebook shows it as a picture."""
+
+    name: str
+    about: str
+    regions: tuple[RegionBox, ...]
+    arrows: tuple[Arrow, ...]
+
+    def mermaid(self) -> str:
+        """Return the diagram as Mermaid text, for Markdown that Git hosts show."""
+        from modewright.mermaid import mermaid
+
+        return mermaid(self)
+
+    def svg(self) -> str:
+        """Return the diagram as an SVG document."""
+        from modewright.diagram_svg import svg
+
+        return svg(self)
+
+    def _repr_svg_(self) -> str:
+        return self.svg()
+
+
+def diagram_of(document: Document) -> Diagram:
+    """Return the diagram of an automaton's document, with variants laid over it already.
+
+    The automaton must have been checked: targets are there.
+    """
+    regions = _regions(document.root, ())
+    known = set(_paths(regions))
+    arrows = [
+        arrow for path, table in _modes(document.root, ()) for arrow in _arrows(path, table, known)
+    ]
+    about = document.root.get("about")
+    return Diagram(document.name, _text(about), tuple(regions), tuple(arrows))
+
+
+def lifted(arrow: Arrow) -> Arrow:
+    """Return an arrow between modes of one region: those that hold its ends, which it names."""
+    depth = 0
+    for a, b in zip(arrow.source[:-1], arrow.target[:-1], strict=False):
+        if a != b:
+            break
+        depth += 1
+    source, target = arrow.source[: depth + 1], arrow.target[: depth + 1]
+    lines = list(arrow.lines)
+    if target != arrow.target:
+        lines.insert(0, f"to {'.'.join(arrow.target[depth + 1 :])}")
+    if source != arrow.source:
+        lines.insert(0, f"from {'.'.join(arrow.source[depth + 1 :])}")
+    return Arrow(source, target, tuple(lines))
+
+
+def _regions(owner: Table, path: Key) -> list[RegionBox]:
+    """Return the regions of the automaton or of a mode: its `modes`, then its `regions`."""
+    found = []
+    modes, regions = owner.get("modes"), owner.get("regions")
+    if isinstance(modes, Table):
+        found.append(_region("chart" if regions else "", owner, modes, path))
+    if isinstance(regions, Table):
+        for entry in regions:
+            inner = entry.node.get("modes") if isinstance(entry.node, Table) else None
+            if isinstance(entry.node, Table) and isinstance(inner, Table):
+                found.append(_region(entry.key, entry.node, inner, (*path, entry.key)))
+    return found
+
+
+def _region(name: str, owner: Table, modes: Table, path: Key) -> RegionBox:
+    boxes = [
+        ModeBox(
+            (*path, entry.key),
+            tuple(_inside(entry.node)),
+            tuple(_regions(entry.node, (*path, entry.key))),
+        )
+        for entry in modes
+        if isinstance(entry.node, Table)
+    ]
+    return RegionBox(
+        name, _text(owner.get("initial")) or next((b.name for b in boxes), ""), tuple(boxes)
+    )
+
+
+def _modes(owner: Table, path: Key) -> Iterator[tuple[Key, Table]]:
+    """Yield every mode with its path, outer ones first."""
+    regions = owner.get("regions")
+    owners = [(path, owner)]
+    if isinstance(regions, Table):
+        owners += [((*path, e.key), e.node) for e in regions if isinstance(e.node, Table)]
+    for place, each in owners:
+        modes = each.get("modes")
+        for entry in modes if isinstance(modes, Table) else ():
+            if isinstance(entry.node, Table):
+                yield (*place, entry.key), entry.node
+                yield from _modes(entry.node, (*place, entry.key))
+
+
+def _paths(regions: list[RegionBox] | tuple[RegionBox, ...]) -> Iterator[Key]:
+    for region in regions:
+        for mode in region.modes:
+            yield mode.path
+            yield from _paths(mode.regions)
+
+
+def _arrows(path: Key, mode: Table, known: set[Key]) -> Iterator[Arrow]:
+    transitions = mode.get("transitions")
+    for entry in transitions if isinstance(transitions, Table) else ():
+        if isinstance(entry.node, Table):
+            name = _text(entry.node.get("to")) or entry.key
+            target = _target(tuple(name.split(".")), path, known)
+            if target:
+                yield Arrow(path, target, tuple(_label(entry.node)))
+
+
+def _target(name: Key, path: Key, known: set[Key]) -> Key | None:
+    """Return the mode that a name means: among the siblings first, then those of the parents."""
+    for depth in range(len(path) - 1, -1, -1):
+        if (*path[:depth], *name) in known:
+            return (*path[:depth], *name)
+    return None
+
+
+def _label(transition: Table) -> Iterator[str]:
+    """Yield the lines of a label: priority, event, guard, wait, resets and what else is said."""
+    when, event = _text(transition.get("when")), _text(transition.get("event"))
+    priority = _text(transition.get("priority"))
+    start = f"({priority}) " if priority else ""
+    condition = " and ".join(part for part in (f"on {event}" if event else "", when) if part)
+    yield from _wrapped(start + condition)
+    if wait := _text(transition.get("wait")):
+        yield f"for {wait}"
+    reset = transition.get("reset")
+    for entry in reset if isinstance(reset, Table) else ():
+        yield from _wrapped(f"/ {entry.key} = {_text(entry.node)}")
+    for key in ("raise", "history", "memory", "rewind"):
+        if transition.get(key) is not None:
+            yield from _wrapped(f"/ {key}: {_text(transition.get(key))}")
+
+
+def _inside(node: Node) -> list[str]:
+    """Return what holds in a mode: its equations, flow, updates and observer, shortened."""
+    if not isinstance(node, Table):
+        return []
+    lines = []
+    for key in ("equations", "update", "entry", "exit"):
+        part = node.get(key)
+        word = {"entry": "entry / ", "exit": "exit / "}.get(key, "")
+        for entry in part if isinstance(part, Table) else ():
+            lines += _wrapped(f"{word}{entry.key} = {_text(entry.node)}")
+    flow = node.get("flow")
+    for entry in flow if isinstance(flow, Table) else ():
+        lines += _wrapped(_text(entry.node))
+    for key in ("observer", "runs"):
+        part = node.get(key)
+        if isinstance(part, Table):
+            of = _text(part.get("of"))
+            lines.append(f"{key} of {of}" if of else key)
+    return lines if len(lines) <= MOST_LINES else [*lines[: MOST_LINES - 1], "..."]
+
+
+def _wrapped(text: str) -> list[str]:
+    """Return a text in lines, parted before `and` and `or` where that is enough."""
+    lines: list[str] = []
+    for piece in re.split(r" (?=(?:and|or) )", text):
+        if lines and len(lines[-1]) + 1 + len(piece) <= LABEL_WIDTH:
+            lines[-1] += " " + piece
+        else:
+            indent = "    " if lines else ""
+            lines += textwrap.wrap(
+                piece, LABEL_WIDTH, initial_indent=indent, subsequent_indent="    "
+            )
+    return lines
+
+
+def _text(node: Node | None) -> str:
+    if isinstance(node, Scalar):
+        return " ".join(node.text.split())
+    if isinstance(node, Table):
+        return ", ".join(f"{entry.key} {_text(entry.node)}" for entry in node)
+    return ""
+
+
+def graph(reference: str, root: Path | None = None) -> Diagram:
+    """Return the diagram of an automaton. Raises SpecError with all its problems."""
+    from language.load import automaton_of
+    from language.project import Project, expanded, read_document
+
+    project = Project(root or Path())
+    document = read_document(project.path_of(reference))
+    automaton_of(document, project)
+    return diagram_of(expanded(document, project))

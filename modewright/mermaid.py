@@ -1,0 +1,68 @@
+"""Mermaid: a diagram as `stateDiagram-v2` text, read in review and drawn by Git hosts."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from modewright.diagram import Arrow, Diagram, Key, ModeBox, RegionBox, lifted
+
+RESERVED = frozenset({"state", "note", "end", "direction", "class", "click", "hide", "scale", "as"})
+
+
+def mermaid(diagram: Diagram) -> str:
+    """Return the diagram as Mermaid text; a transition stands where both its modes are inside."""
+    lines = ["stateDiagram-v2", "    direction LR"]
+    if len(diagram.regions) == 1:
+        lines += _region_lines(diagram.regions[0], diagram.arrows, 1)
+    else:
+        lines.append(f'    state "{diagram.name}" as {identifier((diagram.name,))}_ {{')
+        lines += _parallel(diagram.regions, diagram.arrows, 2)
+        lines.append("    }")
+    return "\n".join(lines) + "\n"
+
+
+def identifier(path: Key) -> str:
+    """Return the identifier of a mode: its path, not a word of Mermaid."""
+    name = "__".join(path)
+    return name + "_" if name in RESERVED else name
+
+
+def _parallel(
+    regions: tuple[RegionBox, ...], arrows: tuple[Arrow, ...], depth: int
+) -> Iterator[str]:
+    for k, region in enumerate(regions):
+        if k:
+            yield "    " * depth + "--"
+        yield from _region_lines(region, arrows, depth)
+
+
+def _region_lines(region: RegionBox, arrows: tuple[Arrow, ...], depth: int) -> Iterator[str]:
+    indent = "    " * depth
+    for mode in region.modes:
+        if mode.name == region.initial:
+            yield f"{indent}[*] --> {identifier(mode.path)}"
+    for mode in region.modes:
+        yield from _mode_lines(mode, arrows, depth)
+    place = region.modes[0].path[:-1] if region.modes else ()
+    for arrow in map(lifted, arrows):
+        if arrow.source[:-1] == place:
+            label = f" : {_escaped('<br/>'.join(arrow.lines))}" if arrow.lines else ""
+            yield f"{indent}{identifier(arrow.source)} --> {identifier(arrow.target)}{label}"
+
+
+def _mode_lines(mode: ModeBox, arrows: tuple[Arrow, ...], depth: int) -> Iterator[str]:
+    indent = "    " * depth
+    text = "<br/>".join((mode.name, *mode.lines)).replace('"', "'")
+    head = f'{indent}state "{_escaped(text)}" as {identifier(mode.path)}'
+    if not mode.regions:
+        yield head
+        return
+    yield head + " {"
+    yield from _parallel(mode.regions, arrows, depth + 1)
+    yield indent + "}"
+
+
+def _escaped(text: str) -> str:
+    """Return a text without the characters that end a label in some version of Mermaid."""
+    return re.sub("[#;:]", lambda match: f"#{ord(match[0])};", text)

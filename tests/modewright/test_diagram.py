@@ -1,0 +1,155 @@
+"""Diagrams: what stands in them, and that nothing lies on anything else."""
+
+from __future__ import annotations
+
+import re
+import xml.etree.ElementTree as ElementTree
+from itertools import combinations
+from pathlib import Path
+
+import pytest
+from hypothesis import given, strategies as st
+
+import modewright as mw
+from language.problem import Source, SpecError
+from language.project import document_of
+from modewright.cli import app
+from modewright.diagram import Diagram, diagram_of
+from modewright.exits import exit_code
+from modewright.layers import Edge, layout
+
+ROOT = Path(__file__).parent.parent.parent
+NESTED = """\
+language: 1
+automaton: nested
+regions:
+  chart:
+    initial: run
+    modes:
+      run:
+        initial: slow
+        transitions: {fault: {when: not ok, wait: 30 ms, priority: 1}}
+        modes:
+          slow: {transitions: {fast: {when: v > 3 m/s}, fault: {when: v > 9 m/s, priority: 2}}}
+          fast: {transitions: {slow: {when: v < 2 m/s}, fast: {when: after(2 s)}}}
+      fault: {entry: {T: 0 N*m}, transitions: {run: {event: clear, when: ok}}}
+  thermal:
+    initial: cool
+    modes:
+      cool: {transitions: {warm: {when: temp > 60 degC}}}
+      warm: {transitions: {cool: {when: temp < 55 degC}}}
+"""
+
+
+def nested() -> Diagram:
+    return diagram_of(document_of(Source("nested.yaml"), NESTED))
+
+
+def test_mermaid_of_the_driveline_is_what_a_reviewer_would_write(update: bool) -> None:
+    golden = Path(__file__).parent / "golden" / "driveline.mmd"
+    text = mw.graph("driveline", ROOT).mermaid()
+    if update:
+        golden.write_text(text)
+    assert text == golden.read_text()
+
+
+def test_the_svg_holds_every_mode_guard_wait_priority_and_reset() -> None:
+    text = shown(mw.graph("estimator", ROOT).svg())
+    for part in ("drive", "gap", "coast", "T_hs <= 0 N*m", "for t_wait", "(1) in(", "(2) in("):
+        assert part in text
+    assert "/ theta_b = alpha" in shown(mw.graph("driveline", ROOT).svg())
+
+
+def shown(svg: str) -> str:
+    root = ElementTree.fromstring(svg)
+    return "\n".join(element.text or "" for element in root.iter() if element.tag.endswith("text"))
+
+
+def test_nested_modes_stand_in_their_outer_mode_and_regions_beside_each_other() -> None:
+    lines = [line.strip() for line in nested().mermaid().splitlines()]
+    assert lines.count("--") == 1
+    inside = lines[lines.index('state "run" as chart__run {') : lines.index("}")]
+    assert "[*] --> chart__run__slow" in inside
+    assert "chart__run__slow --> chart__run__fast : v > 3 m/s" in inside
+    assert "chart__run__fast --> chart__run__fast : after(2 s)" in inside
+    assert "chart__run --> chart__fault : (1) not ok<br/>for 30 ms" in lines
+    assert "chart__fault --> chart__run : on clear and ok" in lines
+
+
+def test_a_transition_that_leaves_an_outer_mode_starts_there_and_names_its_source() -> None:
+    wanted = "chart__run --> chart__fault : from slow<br/>(2) v > 9 m/s"
+    assert wanted in nested().mermaid()
+    assert "from slow" in shown(nested().svg())
+
+
+def test_the_same_spec_gives_the_same_bytes() -> None:
+    assert nested().svg() == nested().svg()
+
+
+def test_no_label_holds_a_character_that_ends_it_in_mermaid() -> None:
+    text = NESTED.replace("when: ok}", 'when: ok, memory: continue, about: "a;b"}')
+    for line in diagram_of(document_of(Source("x"), text)).mermaid().splitlines()[2:]:
+        label = re.sub(r"#\d+;", "", line.partition(" : ")[2])
+        assert ";" not in label and ":" not in label
+
+
+def test_a_spec_with_problems_is_refused_with_its_places() -> None:
+    with pytest.raises(SpecError):
+        mw.graph("no_such_automaton", ROOT)
+
+
+@pytest.mark.parametrize("ending", ["svg", "mmd", "md"])
+def test_the_command_writes_by_the_ending(
+    ending: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(ROOT)
+    out = tmp_path / f"graph.{ending}"
+    assert (
+        exit_code(lambda: app(["graph", "driveline", "-o", str(out)], standalone_mode=False)) == 0
+    )
+    starts = {"svg": "<svg ", "mmd": "stateDiagram-v2\n", "md": "```mermaid\nstateDiagram-v2\n"}
+    assert out.read_text().startswith(starts[ending])
+
+
+sizes = st.tuples(st.floats(20, 200), st.floats(15, 90))
+
+
+@st.composite
+def graphs(draw: st.DrawFn) -> tuple[list[tuple[float, float]], list[Edge]]:
+    boxes = draw(st.lists(sizes, min_size=1, max_size=20))
+    ends = st.integers(0, len(boxes) - 1)
+    drawn = draw(st.lists(st.tuples(ends, ends, sizes), max_size=40))
+    return boxes, [Edge(a, b, label) for a, b, label in drawn if a != b]
+
+
+@given(graphs())
+def test_no_box_and_no_label_lies_on_another(
+    graph: tuple[list[tuple[float, float]], list[Edge]],
+) -> None:
+    boxes, edges = graph
+    placed = layout(boxes, edges)
+    rectangles = [(x, y, w, h) for (x, y), (w, h) in zip(placed.boxes, boxes, strict=True)]
+    rectangles += [
+        (*route.label, *edge.label) for route, edge in zip(placed.routes, edges, strict=True)
+    ]
+    for (x, y, w, h), (u, v, p, q) in combinations(rectangles, 2):
+        assert x + w <= u + 1e-6 or u + p <= x + 1e-6 or y + h <= v + 1e-6 or v + q <= y + 1e-6
+    for x, y, w, h in rectangles:
+        assert x >= -1e-6 and y >= -1e-6
+        assert x + w <= placed.size[0] + 1e-6 and y + h <= placed.size[1] + 1e-6
+
+
+@given(graphs())
+def test_every_arrow_starts_at_its_source_and_ends_at_its_target(
+    graph: tuple[list[tuple[float, float]], list[Edge]],
+) -> None:
+    boxes, edges = graph
+    placed = layout(boxes, edges)
+    for edge, route in zip(edges, placed.routes, strict=True):
+        for node, (px, py) in (
+            (edge.source, route.pieces[0][0]),
+            (edge.target, route.pieces[-1][-1]),
+        ):
+            (x, y), (w, h) = placed.boxes[node], boxes[node]
+            assert min(abs(px - x), abs(px - x - w)) < 1e-6
+            assert y - 1e-6 <= py <= y + h + 1e-6
