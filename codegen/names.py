@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from language.model import CHART
 from language.program import Program, Variable, short
 
+MODES = ("memory.mode", "memory.run_mode")
 UNSIGNED = ("timer.", "memory.fired", "memory.faults")
 
 
@@ -46,6 +48,9 @@ class CNames:
             return mode_constant(self.program, number)
         if name == "memory.run_mode":
             return run_mode_constant(self.program, number)
+        for region in self.program.regions:
+            if name == region.mode:
+                return mode_constant(self.program, number, region.name)
         return f"{number}U" if name.startswith(UNSIGNED) else str(number)
 
 
@@ -64,14 +69,15 @@ def c_type(variable: Variable) -> str:
         return "uint16_t"
     if variable.name == "memory.faults":
         return "uint32_t"
-    if variable.name == "memory.fired":
+    if variable.name.startswith("memory.fired"):
         return "uint16_t"
-    return "int16_t" if variable.name.endswith("mode") else "int32_t"
+    return "int16_t" if variable.name.startswith(MODES) else "int32_t"
 
 
-def mode_constant(program: Program, number: int) -> str:
+def mode_constant(program: Program, number: int, region: str = CHART) -> str:
     """Return the name of a mode in C."""
-    return f"{program.name}_MODE_{program.mode_name(number)}"
+    where = "MODE" if region == CHART else region
+    return f"{program.name}_{where}_{program.mode_name(number, region)}"
 
 
 def run_mode_constant(program: Program, number: int) -> str:

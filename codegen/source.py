@@ -99,6 +99,13 @@ def _context(program: Program) -> dict[str, Any]:
         "digest": digest(program),
         "period": f"{program.period} s",
         "modes": [(mode_constant(program, mode.number), mode.number) for mode in program.modes],
+        "regions": [
+            (
+                info.name,
+                [(mode_constant(program, m.number, info.name), m.number) for m in info.modes],
+            )
+            for info in program.regions
+        ],
         "run_modes": [(run_mode_constant(program, m.number), m.number) for m in program.run_modes],
         "faults": list(enumerate(program.faults)),
         "transitions": program.transitions,

@@ -31,13 +31,11 @@ class ContinuousRun:
         self.stepper = stepper
         self.time = Fraction(0)
         self._log = log
-        self._due: dict[int, Fraction] = {}
+        self._due: dict[str, Fraction] = {}
         self._in_step: list[TransitionInfo] = []
         self.is_settled = False
-        self._leaving = {
-            mode.number: [t for t in program.transitions if t.source == mode.number]
-            for mode in program.modes
-        }
+        self._modes = program.mode_variables()
+        self._timed = [info for info in program.transitions if info.timer]
         states = tuple(v.name for v in program.variables if v.name.startswith("state."))
         self._states = states
         self._read_states = stepper.reader(states)
@@ -60,30 +58,42 @@ class ContinuousRun:
 
     def settle(self) -> None:
         """Jump before flow: micro-steps until no transition is enabled, then equations."""
-        bound = len(self.program.modes)
-        fired = []
+        bound = sum(len(self.program.modes_of(region)) for region in self._modes)
+        fired: list[TransitionInfo] = []
         for micro_step in range(bound + 1):
             self._mark_due()
             self.stepper.run("jump")
-            number = self.stepper.get("memory.fired")
-            if number == 0:
+            taken = self._taken()
+            if not taken:
                 break
-            info = self.program.transitions[number - 1]
-            fired.append(info)
+            fired += taken
             if micro_step == bound:
                 raise Stopped(f"{self._here()}: {_fired(fired)} fire for ever at one instant")
-            self._due.clear()
-            self._log_event(info, micro_step)
+            for info in taken:
+                self._forget(info)
+                self._log_event(info, micro_step)
         self._in_step += fired
         self.stepper.run("watch")
         self._start_timers()
         self.stepper.run("equations")
         self.is_settled = True
 
+    def _taken(self) -> list[TransitionInfo]:
+        """Return the transitions of the last micro-step, at most one of each region."""
+        numbers = [self.stepper.get(name) for name in self.program.fired_variables()]
+        return [self.program.transitions[number - 1] for number in numbers if number]
+
+    def _forget(self, fired: TransitionInfo) -> None:
+        """The timers of a mode end when it is left (rule 4)."""
+        for info in self._timed:
+            if (info.region, info.source) == (fired.region, fired.source):
+                self._due.pop(info.key, None)
+
     def _log_event(self, info: TransitionInfo, micro_step: int) -> None:
-        names = self.program.mode_name
-        source, target = names(info.source), names(info.target)
-        self._log(Event(float(self.time), micro_step, self.name, info.name, source, target))
+        source = self.program.mode_name(info.source, info.region)
+        target = self.program.mode_name(info.target, info.region)
+        place = (self.name, info.name, source, target, info.region)
+        self._log(Event(float(self.time), micro_step, *place))
 
     def _major_step(self, end: Fraction, horizon: Fraction) -> None:
         self._in_step, located = [], 0
@@ -119,23 +129,25 @@ class ContinuousRun:
         self.time = stop if at_end else self.time + Fraction(elapsed)
         return crossed
 
+    def _is_active(self, info: TransitionInfo) -> bool:
+        return bool(self.stepper.get(self._modes[info.region]) == info.source)
+
     def _mark_due(self) -> None:
-        mode = self.stepper.get("memory.mode")
-        for k, info in enumerate(self._leaving[mode]):
-            if info.timer:
-                due = k in self._due and self._due[k] <= self.time
-                self.stepper.set(f"memory.due_{k}", due)
+        for info in self._timed:
+            if self._is_active(info):
+                due = self._due.get(info.key)
+                is_due = due is not None and due <= self.time
+                self.stepper.set(f"memory.due_{info.slot}", is_due)
 
     def _start_timers(self) -> None:
         """A wait is a time event at t0 + d, cancelled if the guard turns false (rule 4)."""
-        mode = self.stepper.get("memory.mode")
-        for k, info in enumerate(self._leaving[mode]):
-            if not info.timer:
+        for info in self._timed:
+            if not self._is_active(info):
                 continue
-            if not self.stepper.get(f"memory.armed_{k}"):
-                self._due.pop(k, None)
-            elif k not in self._due:
-                self._due[k] = self.time + info.wait
+            if not self.stepper.get(f"memory.armed_{info.slot}"):
+                self._due.pop(info.key, None)
+            elif info.key not in self._due:
+                self._due[info.key] = self.time + info.wait
 
     def _require_finite(self) -> None:
         for name, value in zip(self._states, self._read_states(), strict=True):

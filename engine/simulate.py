@@ -16,7 +16,7 @@ from engine.continuous import ContinuousRun, Stopped
 from engine.interpreter import Interpreter, Stepper
 from engine.trajectory import Event, Trajectory, column_array, fault_names
 from language.load import program_of
-from language.model import Automaton, Formula, Scenario, Stimulus, System
+from language.model import CHART, Automaton, Formula, Scenario, Stimulus, System
 from language.problem import Problems, Source, Span, SpecError
 from language.program import Program
 from language.syntax import Number
@@ -216,12 +216,14 @@ class _Simulation:
         stepper, program = self.steppers[name], self.programs[name]
         self._feed(name)
         stepper.run("step")
-        fired = stepper.get("memory.fired")
-        if fired:
-            info = program.transitions[fired - 1]
-            names = program.mode_name
-            modes = names(info.source), names(info.target)
-            self.events.append(Event(float(time), 0, name, info.name, *modes))
+        for variable in program.fired_variables():
+            fired = stepper.get(variable)
+            if fired:
+                info = program.transitions[fired - 1]
+                modes = [program.mode_name(n, info.region) for n in (info.source, info.target)]
+                self.events.append(
+                    Event(float(time), 0, name, info.name, modes[0], modes[1], info.region)
+                )
         self.ticks[name] += 1
         if self.ticked:
             self.ticked(name, program, stepper)
@@ -247,8 +249,11 @@ class _Simulation:
             signals=signals,
             units={key: wire.unit for key, (_, wire) in self.columns.items()},
             modes={
-                f"{name}.mode": {mode.number: mode.name for mode in program.modes}
+                f"{name}.{'mode' if region == CHART else region}": {
+                    mode.number: mode.name for mode in program.modes_of(region)
+                }
                 for name, program in self.programs.items()
+                for region in program.mode_variables()
             },
             events=tuple(self.events),
             stopped=stopped,

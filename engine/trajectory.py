@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from language.missing import ToolMissing
+from language.model import CHART
 from language.program import Program
 
 if TYPE_CHECKING:
@@ -32,6 +33,7 @@ class Event:
     transition: str
     source: str
     target: str
+    region: str = CHART
 
 
 @dataclass(frozen=True)

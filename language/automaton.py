@@ -15,7 +15,6 @@ from language.model import (
     Formula,
     Input,
     Kind,
-    Mode,
     Parameter,
     Range,
     State,
@@ -24,12 +23,14 @@ from language.overlay import lay, without
 from language.problem import Problems, nearest
 from language.project import Project, expanded, read_document
 from language.reader import FILE_WORDS, Reader, check_name
+from language.region import with_regions
 from language.syntax import Broken
 from language.units import SECOND, Unit, fits, parse_unit
 from language.values import with_value
 
 COMMON_KEYS = ("language", "automaton", "parameters", "inputs", "states", "equations")
-LOGIC_KEYS = ("flow", "terms", "initial", "modes", "templates", "outputs", "elements", "places")
+LOGIC_KEYS = ("flow", "terms", "initial", "modes", "regions", "templates", "outputs")
+LAID_KEYS = ("elements", "places")
 CLOCK_KEYS = ("period", "step", "numbers", "model")
 FITTING_KEYS = ("neutral", "starts", "per", "form")
 FORMS = ("constant", "constant_or_random_walk")
@@ -115,7 +116,7 @@ class _AutomatonReader(Reader):
     """The sections of an automaton, one method each."""
 
     def read(self, document: Document, tree: Table, model: Automaton | None) -> Automaton:
-        keys = (*COMMON_KEYS, *LOGIC_KEYS, *CLOCK_KEYS)
+        keys = (*COMMON_KEYS, *LOGIC_KEYS, *LAID_KEYS, *CLOCK_KEYS)
         tree = self.table(tree, f"automaton {document.name}", keys)
         self.at = document.name_span
         check_name(document.name, document.name_span, self.problems)
@@ -127,8 +128,7 @@ class _AutomatonReader(Reader):
         self.sampled = period is not None
         self._check_numbers(tree)
         own = {e.key: self._parameter(e) for e in self.named(tree.get("parameters"), "parameters")}
-        modes = ModeReader(self.problems, model).modes(tree, self.at)
-        initial = self._initial(tree, modes)
+        chart, *beside = ModeReader(self.problems, model).regions(tree, self.at)
         laid_on = ElementReader(self.problems)
         outputs = laid_on.outputs(tree.get("outputs"))
         automaton = Automaton(
@@ -139,13 +139,14 @@ class _AutomatonReader(Reader):
             parameters={**(model.parameters if model else {}), **own},
             inputs={e.key: self._input(e) for e in self.named(tree.get("inputs"), "inputs")},
             states=self._states(tree),
-            modes=modes,
-            initial=initial,
+            modes=with_regions(chart.modes, tuple(beside)),
+            initial=chart.initial,
             outputs=outputs.spans,
             span=document.name_span,
             sources=outputs.sources,
             elements=laid_on.elements(tree.get("elements")),
             places=laid_on.places(tree.get("places")),
+            regions=tuple(beside),
         )
         self._check_sections(tree)
         return automaton
@@ -256,13 +257,3 @@ class _AutomatonReader(Reader):
             start = initial or Formula(Broken(entry.span), f"{key}.initial")
             found[entry.key] = State(entry.key, unit, start, limits, key, entry.span)
         return found
-
-    def _initial(self, tree: Table, modes: dict[str, Mode]) -> str:
-        node = tree.get("initial")
-        if node is None and len(modes) == 1:
-            return next(iter(modes))
-        name = self.text(node, "initial", self.at)
-        if name and name not in modes and node is not None:
-            label = f"there is no mode `{name}`"
-            self.problems.error("name", node.span, label, nearest(name, modes))
-        return name

@@ -8,9 +8,9 @@ guard is now), `jump` (one micro-step: `memory.fired` is the transition, 0 if no
 from __future__ import annotations
 
 from language.constants import derive_block, parameter_constants
-from language.field import Field, at_state, by_mode, enter, field_blocks, field_variables, jump
+from language.field import Field, at_state, by_mode, field_blocks, field_variables, switch
 from language.lower import constant_names, equations
-from language.model import Automaton, Mode
+from language.model import Automaton, Mode, Transition
 from language.motion import FLOW_HALVINGS, motion_blocks, motion_variables
 from language.operation import (
     Assign,
@@ -22,15 +22,20 @@ from language.operation import (
     Run,
     whole,
 )
+from language.parallel import Selection, parallel_blocks, parallel_step
 from language.problem import Problems
 from language.program import Program, TransitionInfo, Variable
+from language.region import fired_variable, in_modes, slots
 from language.rk4 import rk4
-from language.transition import transition_infos
+from language.transition import infos_of, transition_infos
 from language.wiring import (
     assembled,
+    enter_initial,
     finished,
     initial_ops,
     input_variables,
+    mode_and_fired,
+    none_fired,
     state_variables,
 )
 
@@ -45,10 +50,16 @@ def continuous_program(automaton: Automaton, problems: Problems) -> Program:
     transitions = transition_infos(automaton, problems)
     inputs: dict[str, Expr] = {name: Ref(f"input.{name}") for name in automaton.inputs}
     states: dict[str, Expr] = {name: Ref(f"state.{name}") for name in automaton.states}
-    known = {**constant_names(automaton), **inputs, **states}
+    known = {
+        **constant_names(automaton),
+        **inputs,
+        **states,
+        **in_modes(automaton, "memory.mode"),
+    }
     field = Field(automaton, known, inputs, "memory.mode", f"{automaton.name} ")
     method = rk4(field)
-    armed = {k: f"memory.armed_{k}" for k in range(field.widest)}
+    armed = {slot: f"memory.armed_{slot}" for slot in field.slots}
+    selection = _selection(automaton, transitions)
     blocks = {
         **field_blocks(field),
         **method.blocks,
@@ -57,7 +68,9 @@ def continuous_program(automaton: Automaton, problems: Problems) -> Program:
     for mode in automaton.modes.values():
         ops = equations(mode, dict(known), "equation.", field.prefix)
         blocks[f"equations_{mode.name}"] = tuple(ops)
-        blocks[f"jump_{mode.name}"] = _jump(field, mode, transitions)
+        blocks[f"jump_{mode.name}"] = _jump(field, mode, transitions, selection)
+    if automaton.regions:
+        blocks.update(parallel_blocks(field, selection))
     blocks.update(_entries(automaton, field, known))
     problems.stop_if_any()
     constants = (*parameters.values(), *method.constants)
@@ -70,10 +83,9 @@ def _variables(automaton: Automaton, field: Field) -> list[Variable]:
     return [
         *input_variables(automaton, "input"),
         *state_variables(automaton),
-        Variable("memory.mode", "whole", about="active mode"),
-        Variable("memory.fired", "whole", about="transition of this micro-step, 0: none"),
-        *(Variable(f"memory.armed_{k}", "truth") for k in range(field.widest)),
-        *(Variable(f"memory.due_{k}", "truth") for k in range(field.widest)),
+        *mode_and_fired(automaton, "micro-step"),
+        *(Variable(f"memory.armed_{slot}", "truth") for slot in field.slots),
+        *(Variable(f"memory.due_{slot}", "truth") for slot in field.slots),
         *_reset_variables(automaton),
         *field_variables(field),
         Variable("work.merge", "real", "s", about="what crosses within it is one instant"),
@@ -83,43 +95,58 @@ def _variables(automaton: Automaton, field: Field) -> list[Variable]:
 def _reset_variables(automaton: Automaton) -> list[Variable]:
     found = {
         name: Variable(f"work.reset_{name}", "real", str(automaton.states[name].unit.dimension))
-        for mode in automaton.modes.values()
+        for mode in automaton.all_modes
         for transition in mode.transitions
         for name in transition.reset
     }
     return list(found.values())
 
 
-def _jump(field: Field, mode: Mode, infos: tuple[TransitionInfo, ...]) -> Block:
-    own = [info for info in infos if info.source == mode.number]
+def _selection(automaton: Automaton, infos: tuple[TransitionInfo, ...]) -> Selection:
+    by_key = {info.key: info for info in infos}
+
+    def info_of(transition: Transition) -> TransitionInfo:
+        return by_key[f"{automaton.name} {transition.key}"]
+
+    def enabled(transition: Transition, slot: str) -> Expr:
+        guard = Ref(f"work.guard_{slot}")
+        due = Ref(f"memory.due_{slot}")
+        return Binary("and", guard, due) if info_of(transition).timer else guard
+
+    return Selection(fired_variable, lambda transition: info_of(transition).number, enabled)
+
+
+def _jump(
+    field: Field, mode: Mode, infos: tuple[TransitionInfo, ...], selection: Selection
+) -> Block:
+    guards = Run(f"guards_{mode.name}")
+    if mode.beside:
+        return (guards, *parallel_step(field, mode, selection))
     enabled: dict[int, Expr] = {}
-    fire: dict[int, Block] = {}
-    for k, transition in enumerate(mode.transitions):
-        guard = Ref(f"work.guard_{k}")
-        due = Ref(f"memory.due_{k}")
-        enabled[k] = Binary("and", guard, due) if own[k].timer else guard
-        number = Assign("memory.fired", whole(own[k].number), own[k].key)
-        fire[k] = (enter(field, transition), number)
-    return (Run(f"guards_{mode.name}"), *jump(field, mode, enabled, fire))
+    fired: dict[int, Block] = {}
+    for k, (transition, info) in enumerate(
+        zip(mode.transitions, infos_of(mode, infos), strict=True)
+    ):
+        enabled[k] = selection.enabled(transition, info.slot)
+        fired[k] = (Assign("memory.fired", whole(info.number), info.key),)
+    return (guards, *switch(field, mode, enabled, fired))
 
 
 def _entries(automaton: Automaton, field: Field, known: dict[str, Expr]) -> dict[str, Block]:
-    initial = automaton.modes[automaton.initial]
     watch = tuple((mode.number, _watch(mode)) for mode in automaton.modes.values())
     return {
         "derive": derive_block(automaton),
         "init": (
             *initial_ops(automaton, known, field.prefix),
-            Assign("memory.mode", whole(initial.number)),
+            *enter_initial(automaton, "memory.mode"),
         ),
         "equations": (by_mode(field, "equations"),),
         "watch": (*at_state(field), Choose("memory.mode", watch)),
-        "jump": (Assign("memory.fired", whole(0)), *at_state(field), by_mode(field, "jump")),
+        "jump": (*none_fired(automaton), *at_state(field), by_mode(field, "jump")),
         "flow": (by_mode(field, "move"),),
     }
 
 
 def _watch(mode: Mode) -> Block:
-    guards = range(len(mode.transitions))
-    armed = [Assign(f"memory.armed_{k}", Ref(f"work.guard_{k}")) for k in guards]
+    armed = [Assign(f"memory.armed_{slot}", Ref(f"work.guard_{slot}")) for slot in slots(mode)]
     return (Run(f"guards_{mode.name}"), *armed)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from language.lower import Names, equations, expression, rate, reads_of
-from language.model import Automaton, Mode, Transition
+from language.lower import Names, choice, equations, expression, rate, reads_of
+from language.model import Automaton, Balance, Mode, Transition
 from language.operation import (
     Assign,
     Binary,
@@ -22,6 +22,17 @@ from language.operation import (
     whole,
 )
 from language.program import Variable
+from language.region import (
+    all_slots,
+    balances,
+    by_priority,
+    in_modes,
+    mode_variable,
+    region_of_balance,
+    slot,
+    slots,
+    transitions,
+)
 
 
 @dataclass(frozen=True)
@@ -43,20 +54,21 @@ class Field:
         return tuple(self.automaton.states)
 
     @property
-    def widest(self) -> int:
-        """The largest number of transitions that leave one mode."""
-        return max(len(mode.transitions) for mode in self.automaton.modes.values())
+    def slots(self) -> tuple[str, ...]:
+        """The endings of the guard variables."""
+        return tuple(all_slots(self.automaton))
 
-
-def by_priority(mode: Mode) -> list[tuple[int, Transition]]:
-    """Return the transitions of a mode with their index, the smallest priority first."""
-    pairs = list(enumerate(mode.transitions))
-    return sorted(pairs, key=lambda pair: (pair[1].priority or 0, pair[0]))
+    def mode_of(self, region: str) -> str:
+        """Return the variable that holds the mode of a region."""
+        return mode_variable(self.mode, region)
 
 
 def field_blocks(field: Field) -> dict[str, Block]:
-    """Return `rates_<mode>`, `guards_<mode>` and `jump_<mode>` of every mode."""
+    """Return `rates_<mode>` and `guards_<mode>` of every mode."""
     blocks: dict[str, Block] = {}
+    for region in field.automaton.regions:
+        for mode in region.modes.values():
+            blocks[f"guards_{mode.label}"] = tuple(_own_guards(field, mode, region.widest))
     for name, mode in field.automaton.modes.items():
         blocks[f"rates_{name}"] = _rates(field, mode)
         blocks[f"guards_{name}"] = _guards(field, mode)
@@ -71,14 +83,11 @@ def field_variables(field: Field) -> list[Variable]:
         unit = str(thing.unit.dimension)
         found.append(Variable(f"work.at_{state}", "real", unit))
         found.append(Variable(f"work.rate_{state}", "real", f"({unit})/s"))
-    equations_read = {name for mode in field.automaton.modes.values() for name in mode.equations}
-    for name in dict.fromkeys(
-        name for mode in field.automaton.modes.values() for name in mode.equations
-    ):
-        if name in equations_read:
-            kind = dimensions.get(name)
-            found.append(Variable(f"work.at_{name}", "real" if kind else "truth", str(kind or "1")))
-    found += [Variable(f"work.guard_{k}", "truth") for k in range(field.widest)]
+    modes = field.automaton.all_modes
+    for name in dict.fromkeys(name for mode in modes for name in mode.equations):
+        kind = dimensions.get(name)
+        found.append(Variable(f"work.at_{name}", "real" if kind else "truth", str(kind or "1")))
+    found += [Variable(f"work.guard_{slot}", "truth") for slot in field.slots]
     return found
 
 
@@ -87,6 +96,15 @@ def known_at(field: Field) -> dict[str, Expr]:
     known: dict[str, Expr] = dict(field.constants)
     known.update(field.inputs)
     known.update({name: Ref(f"work.at_{name}") for name in field.states})
+    known.update(in_modes(field.automaton, field.mode))
+    return known
+
+
+def all_known_at(field: Field) -> dict[str, Expr]:
+    """Return what the names of the automaton are at the point, all equations among them."""
+    known = known_at(field)
+    modes = field.automaton.all_modes
+    known.update({name: Ref(f"work.at_{name}") for mode in modes for name in mode.equations})
     return known
 
 
@@ -101,67 +119,108 @@ def by_mode(field: Field, verb: str) -> Choose:
     return Choose(field.mode, tuple((m.number, (Run(f"{verb}_{m.name}"),)) for m in modes))
 
 
-def any_guard(mode: Mode, armed: Mapping[int, str] | None = None) -> Expr:
+def any_guard(mode: Mode, armed: Mapping[str, str] | None = None) -> Expr:
     """Return whether a guard of the mode is true (differs from what it was when armed)."""
     result: Expr = Value(False)
-    for k in range(len(mode.transitions)):
-        guard: Expr = Ref(f"work.guard_{k}")
+    for k, watched in enumerate(slots(mode)):
+        guard: Expr = Ref(f"work.guard_{watched}")
         if armed is not None:
-            guard = Compare("!=", guard, Ref(armed[k]))
+            guard = Compare("!=", guard, Ref(armed[watched]))
         result = guard if k == 0 else Binary("or", result, guard)
     return result
 
 
-def jump(field: Field, mode: Mode, enabled: Mapping[int, Expr], fire: Mapping[int, Block]) -> Block:
+def jump(mode: Mode, enabled: Mapping[int, Expr], fire: Mapping[int, Block]) -> Block:
     """Return the choice of one transition: the enabled one with the smallest priority."""
     ops: Block = ()
-    for k, transition in reversed(by_priority(mode)):
-        taken = [*resets(field, transition), *fire[k]]
-        ops = (Branch(enabled[k], tuple(taken), ops),)
+    for k, _ in reversed(by_priority(mode)):
+        ops = (Branch(enabled[k], fire[k], ops),)
     return ops
 
 
-def resets(field: Field, transition: Transition) -> list[Op]:
-    """Return a transition's resets: all read the values before, then all commit together."""
-    known = known_at(field)
-    mode = field.automaton.modes[transition.source]
-    known.update({name: Ref(f"work.at_{name}") for name in mode.equations})
+def resets(field: Field, transition: Transition) -> tuple[list[Op], list[Op]]:
+    """Return a transition's resets: what reads the values before, then what commits."""
+    known = all_known_at(field)
     first: list[Op] = []
     second: list[Op] = []
     for name, formula in transition.reset.items():
         value = expression(formula.tree, known)
         first.append(Assign(f"work.reset_{name}", value, field.prefix + formula.key))
         second.append(Assign(f"state.{name}", Ref(f"work.reset_{name}")))
+    return first, second
+
+
+def switch(
+    field: Field, mode: Mode, enabled: Mapping[int, Expr], fired: Mapping[int, Block]
+) -> Block:
+    """Return one micro-step of an automaton that has no region beside the chart."""
+    fire = {
+        k: (*reset_at_once(field, transition), enter(field, transition), *fired.get(k, ()))
+        for k, transition in enumerate(mode.transitions)
+    }
+    return jump(mode, enabled, fire)
+
+
+def reset_at_once(field: Field, transition: Transition) -> list[Op]:
+    """Return the resets of a transition that nothing else fires beside."""
+    first, second = resets(field, transition)
     if len(first) == 1:
-        value = first[0].value  # type: ignore[union-attr]
-        return [Assign(f"state.{next(iter(transition.reset))}", value, first[0].key)]  # type: ignore[union-attr]
+        (name,) = transition.reset
+        (only,) = first
+        assert isinstance(only, Assign)
+        return [Assign(f"state.{name}", only.value, only.key)]
     return first + second
 
 
 def enter(field: Field, transition: Transition) -> Assign:
-    """Return the operation that makes a transition's target the mode of the field."""
-    number = field.automaton.modes[transition.target].number
-    return Assign(field.mode, whole(number))
+    """Return the operation that makes a transition's target the mode of its region."""
+    number = field.automaton.target(transition).number
+    return Assign(field.mode_of(transition.region), whole(number))
 
 
 def _rates(field: Field, mode: Mode) -> Block:
     known = known_at(field)
-    wanted = reads_of(balance.right for balance in mode.flow.values())
-    wanted += reads_of(balance.left for balance in mode.flow.values())
+    wanted = reads_of(tree for balance in balances(mode) for tree in (balance.right, balance.left))
     ops = equations(mode, known, "work.at_", field.prefix, wanted)
+
+    def rate_is(balance: Balance) -> Assign:
+        target = f"work.rate_{balance.state}"
+        return Assign(target, rate(balance, known), field.prefix + balance.key)
+
     for name in field.states:
-        balance = mode.flow[name]
-        ops.append(Assign(f"work.rate_{name}", rate(balance, known), field.prefix + balance.key))
+        region = region_of_balance(mode, name)
+        if region is None:
+            ops.append(rate_is(mode.flow[name]))
+        else:
+            modes = region.modes.values()
+            cases = {other.name: (rate_is(other.flow[name]),) for other in modes}
+            ops.append(choice(region, known, cases))
     return tuple(ops)
 
 
 def _guards(field: Field, mode: Mode) -> Block:
+    """The guards of a mode of the chart, then those of the modes beside it, on its equations."""
     known = known_at(field)
-    trees = [transition.when.tree for transition in mode.transitions]
-    for transition in mode.transitions:
+    trees = [transition.when.tree for transition in transitions(mode)]
+    for transition in transitions(mode):
         trees += [formula.tree for formula in transition.reset.values()]
     ops = equations(mode, known, "work.at_", field.prefix, reads_of(trees))
+    ops += _own_guards(field, mode, len(mode.transitions))
+    for region in mode.beside:
+        modes = region.modes.values()
+        cases: dict[str, Block] = {m.name: (Run(f"guards_{m.label}"),) for m in modes}
+        ops.append(choice(region, known, cases))
+    return tuple(ops)
+
+
+def _own_guards(field: Field, mode: Mode, count: int) -> list[Op]:
+    """Return what sets the guards of a mode, and those up to `count` to false."""
+    known = all_known_at(field)
+    ops: list[Op] = []
     for k, transition in enumerate(mode.transitions):
         guard = expression(transition.when.tree, known)
-        ops.append(Assign(f"work.guard_{k}", guard, field.prefix + transition.when.key))
-    return tuple(ops)
+        target = f"work.guard_{slot(mode.region, k)}"
+        ops.append(Assign(target, guard, field.prefix + transition.when.key))
+    for k in range(len(mode.transitions), count):
+        ops.append(Assign(f"work.guard_{slot(mode.region, k)}", Value(False)))
+    return ops

@@ -6,11 +6,13 @@ from collections.abc import Iterable, Mapping
 from fractions import Fraction
 
 from language.balance import coefficient_of
-from language.model import Automaton, Balance, Formula, Mode
+from language.model import Automaton, Balance, Formula, Mode, Region
 from language.operation import (
     Assign,
     Binary,
+    Block,
     Call,
+    Choose,
     Compare,
     Expr,
     Op,
@@ -25,6 +27,7 @@ from language.operation import (
 from language.order import equation_order
 from language.problem import SpecError
 from language.program import Constant
+from language.region import region_of_equation, sources
 from language.syntax import (
     Application,
     Arithmetic,
@@ -114,24 +117,47 @@ def equations(
     ops: list[Op] = []
     for name in order:
         if name in needed:
-            formula = mode.equations[name]
-            ops.append(
-                Assign(f"{group}{name}", expression(formula.tree, known), prefix + formula.key)
-            )
+            ops.append(_equation(mode, name, known, group, prefix))
             known[name] = Ref(f"{group}{name}")
     return ops
+
+
+def _equation(mode: Mode, name: str, known: Names, group: str, prefix: str) -> Op:
+    """Return what sets an equation: one formula, or that of the active mode of a region beside."""
+
+    def set_to(formula: Formula) -> Assign:
+        value = expression(formula.tree, known)
+        return Assign(f"{group}{name}", value, prefix + formula.key)
+
+    region = region_of_equation(mode, name)
+    if region is None:
+        return set_to(mode.equations[name])
+    return choice(
+        region,
+        known,
+        {other.name: (set_to(other.equations[name]),) for other in region.modes.values()},
+    )
+
+
+def choice(region: Region, known: Names, blocks: Mapping[str, Block]) -> Choose:
+    """Return the choice of a block by the mode that a region is in."""
+    selector = known[f"mode {region.name}"]
+    assert isinstance(selector, Ref)
+    cases = tuple((region.modes[name].number, block) for name, block in blocks.items())
+    return Choose(selector.name, cases)
 
 
 def closure(mode: Mode, wanted: Iterable[str]) -> set[str]:
     """Return the equations of a mode that the wanted names need."""
     needed: set[str] = set()
-    stack = [name for name in wanted if name in mode.equations]
+    known = sources(mode)
+    stack = [name for name in wanted if name in known]
     while stack:
         name = stack.pop()
         if name not in needed:
             needed.add(name)
-            reads = names(mode.equations[name].tree)
-            stack.extend(read.path for read in reads if read.path in mode.equations)
+            reads = (read for formula in known[name] for read in names(formula.tree))
+            stack.extend(read.path for read in reads if read.path in known)
     return needed
 
 

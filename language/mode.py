@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 from language.document import Entry, Node, Table
-from language.model import Automaton, Balance, Formula, Mode, Transition
+from language.model import CHART, Automaton, Balance, Formula, Mode, Region, Transition
 from language.observer import read_observer, read_run
 from language.overlay import lay, without
 from language.parse import parse_balance
@@ -14,6 +14,9 @@ from language.reader import Reader
 from language.syntax import Arithmetic, Broken, Tree
 
 MODE_KEYS = ("number", "equations", "flow", "terms", "update", "observer", "runs", "transitions")
+REGION_KEYS = ("initial", "modes")
+ALWAYS = "always"
+"""The mode of an automaton that has none of its own."""
 TRANSITION_KEYS = ("to", "when", "wait", "priority", "reset")
 
 
@@ -25,23 +28,54 @@ class ModeReader(Reader):
         super().__init__(problems)
         self.model = model
 
-    def modes(self, tree: Table, at: Span) -> dict[str, Mode]:
-        """Return the modes of an automaton by name."""
-        templates = self.table(tree.get("templates"), "templates")
-        modes: dict[str, Mode] = {}
-        for entry in self.named(tree.get("modes"), "modes"):
-            table = self._like(self.table(entry.node, f"modes.{entry.key}"), templates)
-            modes[entry.key] = self._mode(entry, table, tree, len(modes))
+    def regions(self, tree: Table, at: Span) -> tuple[Region, ...]:
+        """Return the chart and the regions beside it; one mode `always` where none is written."""
+        entries = self.named(tree.get("regions"), "regions")
+        chart = next((entry for entry in entries if entry.key == CHART), None)
+        beside = tuple(self._region(entry, tree) for entry in entries if entry is not chart)
+        if chart is not None:
+            for key in ("modes", "initial"):
+                if key in tree.entries:
+                    label = f"`{key}` stands at the root and in region `{CHART}`"
+                    self.problems.error("duplicate", tree.entries[key].span, label)
+            return (self._region(chart, tree), *beside)
+        modes = self._modes(tree.get("modes"), CHART, tree)
         if not modes:
-            self.problems.error("missing", at, "an automaton has at least one mode in `modes`")
+            entry = Entry(ALWAYS, at, Table({}, at))
+            modes = {ALWAYS: self._mode(entry, Table({}, at), tree, 0, CHART)}
+        return (Region(CHART, modes, self._initial(tree, modes, at), at), *beside)
+
+    def _region(self, entry: Entry, root: Table) -> Region:
+        table = self.table(entry.node, f"regions.{entry.key}", REGION_KEYS)
+        modes = self._modes(table.get("modes"), entry.key, root)
+        if not modes:
+            self.problems.error("missing", entry.span, "a region has at least one mode in `modes`")
             self.problems.stop_if_any()
+        return Region(entry.key, modes, self._initial(table, modes, entry.span), entry.span)
+
+    def _modes(self, node: Node | None, region: str, root: Table) -> dict[str, Mode]:
+        templates = self.table(root.get("templates"), "templates")
+        modes: dict[str, Mode] = {}
         numbers: dict[int, str] = {}
-        for mode in modes.values():
+        for entry in self.named(node, "modes"):
+            table = self._like(self.table(entry.node, f"modes.{entry.key}"), templates)
+            mode = self._mode(entry, table, root, len(modes), region)
+            modes[entry.key] = mode
             if mode.number in numbers:
                 label = f"number {mode.number} is that of mode `{numbers[mode.number]}`"
                 self.problems.error("duplicate", mode.span, label)
             numbers.setdefault(mode.number, mode.name)
         return modes
+
+    def _initial(self, table: Table, modes: dict[str, Mode], at: Span) -> str:
+        node = table.get("initial")
+        if node is None and len(modes) == 1:
+            return next(iter(modes))
+        name = self.text(node, "initial", at)
+        if name and name not in modes and node is not None:
+            label = f"there is no mode `{name}`"
+            self.problems.error("name", node.span, label, nearest(name, modes))
+        return name
 
     def _like(self, mode: Table, templates: Table) -> Table:
         node = mode.get("like")
@@ -55,19 +89,20 @@ class ModeReader(Reader):
             return without(mode, "like")
         return lay(template, without(mode, "like"), self.problems, template=True)
 
-    def _mode(self, entry: Entry, body: Table, root: Table, position: int) -> Mode:
-        key = f"modes.{entry.key}"
+    def _mode(self, entry: Entry, body: Table, root: Table, position: int, region: str) -> Mode:
+        key = f"modes.{entry.key}" if region == CHART else f"regions.{region}.modes.{entry.key}"
         table = self.table(body, key, MODE_KEYS)
-        equations = self._formulas(root.get("equations"), "equations")
+        shared = root if region == CHART else Table({}, root.span)
+        equations = self._formulas(shared.get("equations"), "equations")
         for name, formula in self._formulas(table.get("equations"), f"{key}.equations").items():
             if name in equations:
                 label = f"`{name}` has an equation for every mode already"
                 hint = f"it is given at {equations[name].span}"
                 self.problems.error("duplicate", formula.span, label, hint)
             equations[name] = formula
-        flow = self._flow(root.get("flow"), "flow")
+        flow = self._flow(shared.get("flow"), "flow")
         flow.update(self._flow(table.get("flow"), f"{key}.flow"))
-        self._add_terms(flow, root.get("terms"), "terms")
+        self._add_terms(flow, shared.get("terms"), "terms")
         self._add_terms(flow, table.get("terms"), f"{key}.terms")
         observer_node, run_node = table.get("observer"), table.get("runs")
         return Mode(
@@ -80,9 +115,10 @@ class ModeReader(Reader):
             if observer_node
             else None,
             run=read_run(self, run_node, f"{key}.runs", self.model) if run_node else None,
-            transitions=tuple(self._transitions(table.get("transitions"), entry.key)),
+            transitions=tuple(self._transitions(table.get("transitions"), entry.key, key, region)),
             key=key,
             span=entry.span,
+            region=region,
         )
 
     def _formulas(self, node: Node | None, key: str) -> dict[str, Formula]:
@@ -120,10 +156,12 @@ class ModeReader(Reader):
                 right = Arithmetic("+", right, formula.tree, formula.span)
             flow[entry.key] = dataclasses.replace(balance, right=right)
 
-    def _transitions(self, node: Node | None, source: str) -> list[Transition]:
+    def _transitions(
+        self, node: Node | None, source: str, mode: str, region: str
+    ) -> list[Transition]:
         found = []
         for entry in self.named(node, "transitions"):
-            key = f"modes.{source}.transitions.{entry.key}"
+            key = f"{mode}.transitions.{entry.key}"
             table = self.table(entry.node, key, TRANSITION_KEYS)
             to = table.get("to")
             target = self.text(to, "to", entry.span) if to else entry.key
@@ -136,6 +174,8 @@ class ModeReader(Reader):
             if when:
                 at = to.span if to else entry.span
                 found.append(
-                    Transition(entry.key, source, target, when, wait, priority, reset, key, at)
+                    Transition(
+                        entry.key, source, target, when, wait, priority, reset, key, at, region
+                    )
                 )
         return found

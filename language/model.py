@@ -13,6 +13,8 @@ from language.units import Dimension, Unit
 
 Range = tuple[Fraction, Fraction]
 Kind = Literal["fixed", "tunable", "derived"]
+CHART = "chart"
+"""The region of the modes at the root."""
 
 
 @dataclass(frozen=True)
@@ -105,6 +107,7 @@ class Transition:
     reset: Mapping[str, Formula]
     key: str
     span: Span
+    region: str = CHART
 
 
 @dataclass(frozen=True)
@@ -147,7 +150,10 @@ class Run:
 
 @dataclass(frozen=True)
 class Mode:
-    """A discrete state: what holds and what happens in it."""
+    """A discrete state: what holds and what happens in it.
+
+    `beside` are the regions that run parallel to a mode of the chart; others have none.
+    """
 
     name: str
     number: int
@@ -159,6 +165,28 @@ class Mode:
     transitions: tuple[Transition, ...]
     key: str
     span: Span
+    region: str = CHART
+    beside: tuple[Region, ...] = ()
+
+    @property
+    def label(self) -> str:
+        """The name of the mode, with that of its region if that is not the chart."""
+        return self.name if self.region == CHART else f"{self.region}_{self.name}"
+
+
+@dataclass(frozen=True)
+class Region:
+    """A parallel region: one of its modes is active at any time (rule 14)."""
+
+    name: str
+    modes: Mapping[str, Mode]
+    initial: str
+    span: Span
+
+    @property
+    def widest(self) -> int:
+        """The largest number of transitions that leave one mode."""
+        return max(len(mode.transitions) for mode in self.modes.values())
 
 
 @dataclass(frozen=True)
@@ -175,7 +203,10 @@ class Element:
 
 @dataclass(frozen=True)
 class Automaton:
-    """A hybrid automaton: sampled if it has a period, continuous otherwise."""
+    """A hybrid automaton: sampled if it has a period, continuous otherwise.
+
+    `modes` and `initial` are those of the chart; `regions` run parallel to it.
+    """
 
     name: str
     period: Fraction | None
@@ -192,6 +223,7 @@ class Automaton:
     sources: Mapping[str, str] = field(default_factory=dict)
     elements: Mapping[str, Element] = field(default_factory=dict)
     places: Mapping[str, Mapping[str, Formula]] = field(default_factory=dict)
+    regions: tuple[Region, ...] = ()
 
     def source_of(self, output: str) -> str:
         """Return the state or equation that an output reads: its own name unless it says more."""
@@ -201,6 +233,33 @@ class Automaton:
     def is_sampled(self) -> bool:
         """Tell whether the automaton ticks."""
         return self.period is not None
+
+    @property
+    def chart(self) -> Region:
+        """The modes at the root, as a region."""
+        return Region(CHART, self.modes, self.initial, self.span)
+
+    @property
+    def all_regions(self) -> tuple[Region, ...]:
+        """The chart, then the regions beside it."""
+        return (self.chart, *self.regions)
+
+    @property
+    def all_modes(self) -> tuple[Mode, ...]:
+        """The modes of all regions, those of the chart first."""
+        return tuple(mode for region in self.all_regions for mode in region.modes.values())
+
+    def region(self, name: str) -> Region:
+        """Return the region of a name."""
+        return next(region for region in self.all_regions if region.name == name)
+
+    def source(self, transition: Transition) -> Mode:
+        """Return the mode that a transition leaves."""
+        return self.region(transition.region).modes[transition.source]
+
+    def target(self, transition: Transition) -> Mode:
+        """Return the mode that a transition enters."""
+        return self.region(transition.region).modes[transition.target]
 
 
 @dataclass(frozen=True)

@@ -34,6 +34,7 @@ from language.operation import (
     whole,
 )
 from language.program import Constant, Variable
+from language.region import slots
 
 MERGE = 2.0**-40
 """Events nearer than this part of the time (4096 ULPs) are one instant (rule 10): rounding of the
@@ -43,7 +44,7 @@ RUN_HALVINGS = 24
 FLOW_HALVINGS = 44
 """Halvings of a continuous automaton's step: 1 ms / 2^44 is below one ULP of a time of 1 s."""
 
-Armed = Mapping[int, str]
+Armed = Mapping[str, str]
 
 
 @dataclass(frozen=True)
@@ -86,7 +87,7 @@ def motion_variables(field: Field, method: Method) -> list[Variable]:
         Variable("work.high", "real", "s"),
         Variable("work.halving", "whole"),
         Variable("work.term", "whole"),
-        *(Variable(f"work.first_{k}", "truth") for k in range(field.widest)),
+        *(Variable(f"work.first_{k}", "truth") for k in field.slots),
     ]
     for name, state in field.automaton.states.items():
         unit = str(state.unit.dimension)
@@ -140,14 +141,14 @@ def _look(mode: Mode, s: Expr) -> Block:
 
 def _merged(field: Field, mode: Mode, merge: Expr) -> Block:
     """Where another guard changes within `merge` after the first, take both as one instant."""
-    count = len(mode.transitions)
-    if count < 2:
+    watched = slots(mode)
+    if len(watched) < 2:
         return ()
-    first = [Assign(f"work.first_{k}", Ref(f"work.guard_{k}")) for k in range(count)]
+    first = [Assign(f"work.first_{k}", Ref(f"work.guard_{k}")) for k in watched]
     another: Expr = Value(False)
-    for k in range(count):
+    for position, k in enumerate(watched):
         turned = Binary("and", Ref(f"work.guard_{k}"), Unary("not", Ref(f"work.first_{k}")))
-        another = turned if k == 0 else Binary("or", another, turned)
+        another = turned if position == 0 else Binary("or", another, turned)
     keep = [Assign(f"work.end_{name}", Ref(f"work.at_{name}")) for name in field.states]
     high = Ref("work.high")
     accepted: Block = (Assign("work.high", Ref("work.s")), *keep)
@@ -160,12 +161,13 @@ def _merged(field: Field, mode: Mode, merge: Expr) -> Block:
 
 
 def _move(field: Field, mode: Mode, crossed: Expr) -> Block:
+    watched = slots(mode)
     ops: list[Op] = [Run(f"step_{mode.name}"), Assign("work.elapsed", Ref("work.h"))]
-    if mode.transitions:
+    if watched:
         ops += [Assign(f"work.at_{name}", Ref(f"work.end_{name}")) for name in field.states]
         ops.append(Run(f"guards_{mode.name}"))
-    ops.append(Assign("work.crossed", crossed if mode.transitions else Value(False)))
-    if mode.transitions:
+    ops.append(Assign("work.crossed", crossed if watched else Value(False)))
+    if watched:
         found: Block = (Run(f"series_{mode.name}"), Run(f"locate_{mode.name}"))
         ops.append(Branch(Ref("work.crossed"), found))
     ops += [Assign(f"state.{name}", Ref(f"work.end_{name}")) for name in field.states]

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from language.graph import chain, circle, reachable, topological, turned
 from language.model import Mode
 from language.problem import Problems, Span, SpecError
+from language.region import sources
 from language.syntax import Tree, names
 
 
@@ -15,14 +16,15 @@ def equation_order(mode: Mode) -> list[str]:
 
     Ties are broken by the order in the file. Raises SpecError naming an algebraic loop.
     """
-    edges = _reading({name: formula.tree for name, formula in mode.equations.items()})
+    trees = {name: [f.tree for f in formulas] for name, formulas in sources(mode).items()}
+    edges = _reading(trees)
     found = topological(edges)
     if found is not None:
         return found
     loop = circle(edges)
     problems = Problems()
     label = f"an algebraic loop in mode `{mode.name}`: {chain(loop)}"
-    spans = {name: formula.span for name, formula in mode.equations.items()}
+    spans = {name: alternatives[0].span for name, alternatives in trees.items()}
     hint = "each reads the one before it at the same instant; one of them has to be a state"
     problems.error("loop", spans[loop[0]], label, hint + _places(loop, spans))
     raise SpecError(problems.found)
@@ -32,7 +34,7 @@ def report_circle(
     trees: Mapping[str, Tree], spans: Mapping[str, Span], what: str, problems: Problems
 ) -> None:
     """Report names whose values follow from each other in a circle."""
-    loop = circle(_reading(trees))
+    loop = circle(_reading({name: [tree] for name, tree in trees.items()}))
     if loop:
         label = f"`{what}` values in a circle: {chain(loop)}"
         hint = "one of them is given by a value of its own" + _places(loop, spans)
@@ -52,6 +54,10 @@ def _places(loop: Sequence[str], spans: Mapping[str, Span]) -> str:
     return "".join(f"; `{name}` is at {spans[name]}" for name in loop[1:])
 
 
-def _reading(trees: Mapping[str, Tree]) -> dict[str, list[str]]:
+def _reading(trees: Mapping[str, Sequence[Tree]]) -> dict[str, list[str]]:
     """From each name to those that read it."""
-    return turned({name: [read.path for read in names(tree)] for name, tree in trees.items()})
+    reads = {
+        name: [read.path for tree in alternatives for read in names(tree)]
+        for name, alternatives in trees.items()
+    }
+    return turned(reads)

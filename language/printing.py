@@ -104,6 +104,9 @@ def _program_lines(program: Program) -> Iterator[str]:
     yield f"period {program.period}" if program.period else f"major step {program.major_step}"
     for mode in program.modes:
         yield f"mode {mode.number} {mode.name}"
+    for region in program.regions:
+        for mode in region.modes:
+            yield f"region {region.name} mode {mode.number} {mode.name}"
     for mode in program.run_modes:
         yield f"run mode {mode.number} {mode.name}"
     for t in program.transitions:

@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Literal
 
+from language.model import CHART
 from language.operation import Block
 
 ValueType = Literal["real", "truth", "whole"]
@@ -54,8 +55,29 @@ class ModeInfo:
 
 
 @dataclass(frozen=True)
+class RegionInfo:
+    """A region beside the chart, its modes, and the variables of its mode and transition."""
+
+    name: str
+    modes: tuple[ModeInfo, ...]
+
+    @property
+    def mode(self) -> str:
+        """The variable that holds the region's mode."""
+        return f"memory.mode_{self.name}"
+
+    @property
+    def fired(self) -> str:
+        """The variable that holds the transition of a micro-step, 0 if none."""
+        return f"memory.fired_{self.name}"
+
+
+@dataclass(frozen=True)
 class TransitionInfo:
-    """A transition: number (from 1), modes, wait in seconds (exact) and in ticks."""
+    """A transition: number (from 1), modes, wait in seconds (exact) and in ticks.
+
+    `slot` is the ending of the variables of its guard, see language/region.py.
+    """
 
     number: int
     name: str
@@ -65,6 +87,13 @@ class TransitionInfo:
     ticks: int
     timer: str | None
     key: str
+    region: str = CHART
+    slot: str = "0"
+
+    @property
+    def fired(self) -> str:
+        """The variable that holds the number of the region's transition in a micro-step."""
+        return "memory.fired" if self.region == CHART else f"memory.fired_{self.region}"
 
 
 @dataclass(frozen=True)
@@ -128,15 +157,30 @@ class Program:
     run_modes: tuple[ModeInfo, ...] = ()
     observers: tuple[ObserverInfo, ...] = ()
     defaults: Mapping[str, float | bool] = field(default_factory=dict)
+    regions: tuple[RegionInfo, ...] = ()
 
     @property
     def inputs(self) -> tuple[Variable, ...]:
         """The variables that come from outside."""
         return tuple(v for v in self.variables if v.name.startswith("input."))
 
-    def mode_name(self, number: int) -> str:
-        """Return the name of the mode with a number."""
-        return next(mode.name for mode in self.modes if mode.number == number)
+    def modes_of(self, region: str) -> tuple[ModeInfo, ...]:
+        """Return the modes of a region."""
+        if region == CHART:
+            return self.modes
+        return next(info.modes for info in self.regions if info.name == region)
+
+    def mode_name(self, number: int, region: str = CHART) -> str:
+        """Return the name of the mode of a region with a number."""
+        return next(mode.name for mode in self.modes_of(region) if mode.number == number)
+
+    def mode_variables(self) -> dict[str, str]:
+        """Return the variable that holds the mode of each region, the chart first."""
+        return {CHART: "memory.mode", **{region.name: region.mode for region in self.regions}}
+
+    def fired_variables(self) -> tuple[str, ...]:
+        """Return the variables that hold the transition of each region, the chart first."""
+        return ("memory.fired", *(region.fired for region in self.regions))
 
 
 def short(name: str) -> str:

@@ -14,10 +14,9 @@ from language.exponential import exponential
 from language.field import (
     Field,
     by_mode,
-    enter,
     field_blocks,
     field_variables,
-    jump,
+    switch,
 )
 from language.lower import constant_names, rounded, tunables_of
 from language.model import Automaton, Formula, Mode, Run as ModelRun
@@ -154,5 +153,4 @@ def _switch(field: Field, mode: Mode, problems: Problems) -> Block:
             label = "a run inside a tick follows transitions without a wait only"
             problems.error("run", transition.wait.span, label)
     enabled: dict[int, Expr] = {k: Ref(f"work.guard_{k}") for k in range(len(mode.transitions))}
-    fire: dict[int, Block] = {k: (enter(field, t),) for k, t in enumerate(mode.transitions)}
-    return jump(field, mode, enabled, fire)
+    return switch(field, mode, enabled, {})

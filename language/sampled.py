@@ -13,9 +13,10 @@ from language.constants import derive_block, parameter_constants, values_of
 from language.evaluate import Scalar
 from language.kalman import Kalman, kalman, observer_variables
 from language.lower import constant_names, equations, expression
-from language.model import Automaton, Mode
+from language.model import CHART, Automaton, Mode, Region
 from language.operation import (
     Assign,
+    Binary,
     Block,
     Branch,
     Choose,
@@ -36,13 +37,17 @@ from language.program import (
     Program,
     Variable,
 )
+from language.region import fired_variable, in_modes, mode_variable
 from language.run import EVENT_LIMIT, run_block, run_motion
-from language.transition import enter_run, sampled_jump, transition_infos
+from language.transition import enter_run, sampled_commit, sampled_jump, transition_infos
 from language.wiring import (
     assembled,
+    enter_initial,
     finished,
     initial_ops,
     input_variables,
+    mode_and_fired,
+    none_fired,
     state_variables,
 )
 
@@ -78,7 +83,9 @@ class _Sampled:
         known = dict(constant_names(automaton))
         known.update({name: Ref(f"{group}.{name}") for name in automaton.inputs})
         known.update({name: Ref(f"state.{name}") for name in automaton.states})
+        known.update(in_modes(automaton, "memory.mode"))
         if automaton.model:
+            known.update(in_modes(automaton.model, "memory.run_mode", f"{automaton.model.name}."))
             for mode in automaton.model.modes.values():
                 is_in = Compare("==", Ref("memory.run_mode"), whole(mode.number))
                 known[f"in {automaton.model.name}.{mode.name}"] = is_in
@@ -97,8 +104,11 @@ class _Sampled:
             self.constants += motion.constants
         for mode in modes:
             blocks.update(self._advance(mode))
-        for mode in modes:
+        for mode in automaton.all_modes:
             blocks.update(self._phases(mode))
+        for region in automaton.all_regions if automaton.regions else ():
+            commit = sampled_commit(automaton, region, self.transitions)
+            blocks[f"commit_{region.name}"] = (commit,)
         blocks.update(self._entries())
         self.problems.stop_if_any()
         program = assembled(automaton, blocks, self.constants, variables, self.transitions)
@@ -112,11 +122,15 @@ class _Sampled:
 
     def _phases(self, mode: Mode) -> dict[str, Block]:
         """Equations, jump and update of one mode."""
-        ops = equations(mode, dict(self.now), "equation.", self.prefix)
+        found: dict[str, Block] = {}
+        if mode.region == CHART:
+            ops = equations(mode, dict(self.now), "equation.", self.prefix)
+            found[f"equations_{mode.name}"] = tuple(ops)
         jump = sampled_jump(self.automaton, mode, self.transitions, self.now)
-        found = {f"equations_{mode.name}": tuple(ops), f"jump_{mode.name}": jump}
+        found[f"jump_{mode.label}"] = jump
         if mode.update:
-            found[f"update_{mode.name}"] = self._update(mode)
+            found[f"update_{mode.label}"] = self._update(mode)
+            found[f"store_{mode.label}"] = self._store(mode)
         return found
 
     def _entries(self) -> dict[str, Block]:
@@ -144,11 +158,10 @@ class _Sampled:
                 about = f"ticks that the guard has been true, at most {info.ticks + 1}"
                 found.append(Variable(info.timer, "whole", about=about))
         found += observer_variables(automaton)
-        found.append(Variable("memory.mode", "whole", about="active mode"))
+        found += mode_and_fired(automaton, "tick")
         found.append(Variable("memory.started", "truth", about="the first tick is done"))
-        found.append(Variable("memory.fired", "whole", about="transition of this tick, 0: none"))
         found.append(Variable("memory.faults", "whole", about="latched fault bits"))
-        for mode in automaton.modes.values():
+        for mode in automaton.all_modes:
             resets = {name for transition in mode.transitions for name in transition.reset}
             for name in sorted(resets):
                 unit = str(automaton.states[name].unit.dimension)
@@ -178,20 +191,25 @@ class _Sampled:
         return {}
 
     def _update(self, mode: Mode) -> Block:
-        """Assignments that read the values of before this tick's updates, then commit."""
+        """The assignments of an update read the values of before this tick's updates."""
         known = dict(self.now)
-        known.update({name: Ref(f"equation.{name}") for name in mode.equations})
+        modes = self.automaton.all_modes
+        known.update({name: Ref(f"equation.{name}") for m in modes for name in m.equations})
         ops: list[Op] = []
         for name, formula in mode.update.items():
             key = self.prefix + formula.key
             ops.append(Assign(f"work.next_{name}", expression(formula.tree, known), key))
-        return (*ops, *(Assign(f"state.{name}", Ref(f"work.next_{name}")) for name in mode.update))
+        return (*ops, *(() if self.automaton.regions else self._store(mode)))
+
+    def _store(self, mode: Mode) -> Block:
+        """What an update computed, committed together."""
+        return tuple(Assign(f"state.{name}", Ref(f"work.next_{name}")) for name in mode.update)
 
     def _start(self) -> Block:
         """The first tick: start values, the initial mode, no advance, only the correction."""
         initial = self.automaton.modes[self.automaton.initial]
         ops = initial_ops(self.automaton, self.now, self.prefix)
-        ops.append(Assign("memory.mode", whole(initial.number)))
+        ops += enter_initial(self.automaton, "memory.mode")
         ops.append(Assign("memory.started", Value(True)))
         ops += enter_run(self.automaton, initial)
         if initial.name in self.observers:
@@ -200,10 +218,9 @@ class _Sampled:
 
     def _init(self) -> Block:
         """Before the first tick: nothing has started; solved numbers must fit the calibration."""
-        initial = self.automaton.modes[self.automaton.initial]
         ops: list[Op] = [
             Assign("memory.started", Value(False)),
-            Assign("memory.mode", whole(initial.number)),
+            *enter_initial(self.automaton, "memory.mode"),
             Assign("memory.faults", whole(0)),
         ]
         stamped = {name for constant in self.constants for name in constant.depends_on}
@@ -222,19 +239,32 @@ class _Sampled:
         modes = list(self.automaton.modes.values())
         advance = [(mode.number, self._carried(mode)) for mode in modes]
         cases = tuple((number, block) for number, block in advance if block)
-        ops: list[Op] = [Assign("memory.fired", whole(0))]
+        ops: list[Op] = none_fired(self.automaton)
         measured = {name: None for o in self.observers.values() for name in o.info.measures}
         ops += [Assign(f"innovation.{name}", real(0.0)) for name in measured]
         then: Block = (Choose("memory.mode", cases),) if cases else ()
         ops.append(Branch(Ref("memory.started"), then, (Run("start"),)))
         ops.append(self._each("equations"))
-        ops.append(self._each("jump"))
-        fired = Compare("!=", Ref("memory.fired"), whole(0))
-        ops.append(Branch(fired, (self._each("equations"),)))
-        if any(mode.update for mode in modes):
-            ops.append(self._each("update"))
+        regions = self.automaton.all_regions
+        ops += [self._in(region, "jump") for region in regions]
+        if self.automaton.regions:
+            ops += [Run(f"commit_{region.name}") for region in regions]
+        ops.append(Branch(self._fired(), (self._each("equations"),)))
+        updated = [r for r in regions if any(mode.update for mode in r.modes.values())]
+        ops += [self._in(region, "update") for region in updated]
+        if self.automaton.regions:
+            ops += [self._in(region, "store") for region in updated]
         ops.append(Run("remember"))
         return tuple(ops)
+
+    def _fired(self) -> Expr:
+        """Whether a transition fired in any region."""
+        found: Expr | None = None
+        for region in self.automaton.all_regions:
+            here = Compare("!=", Ref(fired_variable(region.name)), whole(0))
+            found = here if found is None else Binary("or", found, here)
+        assert found is not None
+        return found
 
     def _carried(self, mode: Mode) -> Block:
         if mode.name in self.observers:
@@ -242,7 +272,11 @@ class _Sampled:
         return (Run(f"run_{mode.name}"),) if mode.run else ()
 
     def _each(self, verb: str) -> Choose:
-        modes = self.automaton.modes.values()
-        wanted = [mode for mode in modes if verb != "update" or mode.update]
-        cases = tuple((mode.number, (Run(f"{verb}_{mode.name}"),)) for mode in wanted)
-        return Choose("memory.mode", cases)
+        return self._in(self.automaton.chart, verb)
+
+    def _in(self, region: Region, verb: str) -> Choose:
+        """Return the choice of a block by the mode of a region."""
+        modes = region.modes.values()
+        wanted = [mode for mode in modes if verb not in ("update", "store") or mode.update]
+        cases = tuple((mode.number, (Run(f"{verb}_{mode.label}"),)) for mode in wanted)
+        return Choose(mode_variable("memory.mode", region.name), cases)

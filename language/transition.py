@@ -7,13 +7,13 @@ from collections.abc import Mapping
 from fractions import Fraction
 
 from language.constants import exact_value
-from language.field import by_priority
 from language.lower import expression
-from language.model import Automaton, Mode
+from language.model import Automaton, Mode, Region, Transition
 from language.operation import (
     Assign,
     Block,
     Branch,
+    Choose,
     Compare,
     Count,
     Expr,
@@ -23,6 +23,7 @@ from language.operation import (
 )
 from language.problem import Problems
 from language.program import TransitionInfo
+from language.region import by_priority, fired_variable, mode_variable, slot
 
 MAX_TICKS = 65534
 """Longest wait: the counters are uint16 and count one further (semantics, rule 4)."""
@@ -31,8 +32,8 @@ MAX_TICKS = 65534
 def transition_infos(automaton: Automaton, problems: Problems) -> tuple[TransitionInfo, ...]:
     """Return the transitions, numbered from 1 in the order of the file, waits exact."""
     found: list[TransitionInfo] = []
-    for mode in automaton.modes.values():
-        for transition in mode.transitions:
+    for mode in automaton.all_modes:
+        for k, transition in enumerate(mode.transitions):
             wait = Fraction(0)
             if transition.wait:
                 with problems.collecting():
@@ -49,14 +50,21 @@ def transition_infos(automaton: Automaton, problems: Problems) -> tuple[Transiti
                     number=len(found) + 1,
                     name=transition.name,
                     source=mode.number,
-                    target=automaton.modes[transition.target].number,
+                    target=automaton.target(transition).number,
                     wait=wait,
                     ticks=ticks,
-                    timer=f"timer.{mode.name}_{transition.name}" if timed else None,
+                    timer=f"timer.{mode.label}_{transition.name}" if timed else None,
                     key=f"{automaton.name} {transition.key}",
+                    region=mode.region,
+                    slot=slot(mode.region, k),
                 )
             )
     return tuple(found)
+
+
+def infos_of(mode: Mode, infos: tuple[TransitionInfo, ...]) -> list[TransitionInfo]:
+    """Return the transitions that leave a mode, in the order of the file."""
+    return [i for i in infos if (i.region, i.source) == (mode.region, mode.number)]
 
 
 def sampled_jump(
@@ -67,10 +75,12 @@ def sampled_jump(
 ) -> Block:
     """Return the jump of a tick: wait counters, then one transition (rules 3 and 4).
 
-    The guard's first true tick counts 1 here, so a wait of N ticks is over above N.
+    The guard's first true tick counts 1 here, so a wait of N ticks is over above N. Where regions
+    run in parallel, what commits is left to `sampled_commit`: all read one snapshot (rule 14).
     """
-    known = {**now, **{name: Ref(f"equation.{name}") for name in mode.equations}}
-    own = [info for info in infos if info.source == mode.number]
+    modes = automaton.all_modes
+    known = {**now, **{name: Ref(f"equation.{name}") for m in modes for name in m.equations}}
+    own = infos_of(mode, infos)
     counters: list[Op] = []
     chain: Block = ()
     for k, transition in reversed(by_priority(mode)):
@@ -80,8 +90,26 @@ def sampled_jump(
             key = f"{automaton.name} {transition.when.key}"
             counters.insert(0, Count(info.timer, enabled, info.ticks + 1, key))
             enabled = Compare(">", Ref(info.timer), whole(info.ticks))
-        chain = (Branch(enabled, _fire(automaton, mode, k, own, known), chain),)
+        fire = _read(automaton, transition, known)
+        if not automaton.regions:
+            fire += _commit(automaton, transition, own)
+        fire.append(Assign(fired_variable(mode.region), whole(info.number), info.key))
+        if not automaton.regions:
+            fire += enter_run(automaton, automaton.target(transition))
+        chain = (Branch(enabled, tuple(fire), chain),)
     return (*counters, *chain)
+
+
+def sampled_commit(automaton: Automaton, region: Region, infos: tuple[TransitionInfo, ...]) -> Op:
+    """Return what makes the transition of a region true once all regions have chosen."""
+    cases = []
+    for mode in region.modes.values():
+        own = infos_of(mode, infos)
+        for transition, info in zip(mode.transitions, own, strict=True):
+            ops = _commit(automaton, transition, own)
+            ops += enter_run(automaton, automaton.target(transition))
+            cases.append((info.number, tuple(ops)))
+    return Choose(fired_variable(region.name), tuple(cases))
 
 
 def enter_run(automaton: Automaton, target: Mode) -> list[Op]:
@@ -92,18 +120,21 @@ def enter_run(automaton: Automaton, target: Mode) -> list[Op]:
     return [Assign("memory.run_mode", whole(number), f"{automaton.name} {target.run.key}")]
 
 
-def _fire(
-    automaton: Automaton, mode: Mode, k: int, own: list[TransitionInfo], known: Mapping[str, Expr]
-) -> Block:
-    """Resets read the values before and commit together; the counters of the source end."""
-    transition = mode.transitions[k]
-    target = automaton.modes[transition.target]
+def _read(automaton: Automaton, transition: Transition, known: Mapping[str, Expr]) -> list[Op]:
+    """Return what resets read: the values before."""
     ops: list[Op] = []
     for name, formula in transition.reset.items():
         key = f"{automaton.name} {formula.key}"
         ops.append(Assign(f"work.reset_{name}", expression(formula.tree, known), key))
-    ops += [Assign(f"state.{name}", Ref(f"work.reset_{name}")) for name in transition.reset]
+    return ops
+
+
+def _commit(automaton: Automaton, transition: Transition, own: list[TransitionInfo]) -> list[Op]:
+    """Resets commit together; the counters of the source end; the target is entered."""
+    ops: list[Op] = [
+        Assign(f"state.{name}", Ref(f"work.reset_{name}")) for name in transition.reset
+    ]
     ops += [Assign(info.timer, whole(0)) for info in own if info.timer]
-    ops.append(Assign("memory.mode", whole(target.number)))
-    ops.append(Assign("memory.fired", whole(own[k].number), own[k].key))
-    return (*ops, *enter_run(automaton, target))
+    mode = mode_variable("memory.mode", transition.region)
+    ops.append(Assign(mode, whole(automaton.target(transition).number)))
+    return ops

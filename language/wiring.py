@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 
 from language.functions import FUNCTIONS
 from language.lower import expression, rounded
-from language.model import Automaton
+from language.model import CHART, Automaton, Region
 from language.operation import (
     Assign,
     Binary,
@@ -26,17 +26,20 @@ from language.operation import (
     Select,
     Store,
     Unary,
+    whole,
 )
 from language.program import (
     Constant,
     Function,
     ModeInfo,
     Program,
+    RegionInfo,
     TransitionInfo,
     ValueType,
     Variable,
     Wire,
 )
+from language.region import fired_variable, mode_variable
 from language.syntax import names
 
 
@@ -59,7 +62,7 @@ def state_variables(automaton: Automaton) -> list[Variable]:
         Variable(f"state.{name}", "real", str(thing.unit.dimension))
         for name, thing in automaton.states.items()
     ]
-    equations = dict.fromkeys(n for mode in automaton.modes.values() for n in mode.equations)
+    equations = dict.fromkeys(name for mode in automaton.all_modes for name in mode.equations)
     for name in equations:
         dimension = automaton.dimensions.get(name)
         kind: ValueType = "real" if dimension else "truth"
@@ -73,7 +76,10 @@ def output_wires(automaton: Automaton) -> tuple[Wire, ...]:
     for output in automaton.outputs:
         name = automaton.source_of(output)
         if name == "mode":
-            found.append(Wire(output, "memory.mode", "whole", "1"))
+            for region in automaton.all_regions:
+                variable = mode_variable("memory.mode", region.name)
+                wire = output if region.name == CHART else region.name
+                found.append(Wire(wire, variable, "whole", "1"))
             continue
         if name in automaton.states:
             unit = str(automaton.states[name].unit.dimension)
@@ -83,6 +89,31 @@ def output_wires(automaton: Automaton) -> tuple[Wire, ...]:
         kind: ValueType = "real" if dimension else "truth"
         found.append(Wire(output, f"equation.{name}", kind, str(dimension or "1")))
     return tuple(found)
+
+
+def mode_and_fired(automaton: Automaton, instant: str) -> list[Variable]:
+    """Return the variables of the modes of all regions and of what fires in them."""
+    found = []
+    for region in automaton.all_regions:
+        where = "" if region.name == CHART else f" of region {region.name}"
+        mode = mode_variable("memory.mode", region.name)
+        found.append(Variable(mode, "whole", about=f"active mode{where}"))
+        about = f"transition{where} of this {instant}, 0: none"
+        found.append(Variable(fired_variable(region.name), "whole", about=about))
+    return found
+
+
+def none_fired(automaton: Automaton) -> list[Op]:
+    """Return what forgets the transitions of before."""
+    return [Assign(fired_variable(region.name), whole(0)) for region in automaton.all_regions]
+
+
+def enter_initial(automaton: Automaton, base: str) -> list[Op]:
+    """Return what makes the initial modes active; `base` is the variable of the chart."""
+    return [
+        Assign(mode_variable(base, region.name), whole(region.modes[region.initial].number))
+        for region in automaton.all_regions
+    ]
 
 
 def initial_ops(automaton: Automaton, known: Mapping[str, Expr], prefix: str) -> list[Op]:
@@ -129,13 +160,19 @@ def assembled(
         constants=tuple(constants),
         variables=tuple(variables),
         outputs=output_wires(automaton),
-        modes=tuple(ModeInfo(mode.name, mode.number) for mode in automaton.modes.values()),
+        modes=mode_infos(automaton.chart),
+        regions=tuple(RegionInfo(r.name, mode_infos(r)) for r in automaton.regions),
         transitions=transitions,
         faults=(),
         functions=(),
         blocks=blocks,
         defaults=defaults_of(automaton),
     )
+
+
+def mode_infos(region: Region) -> tuple[ModeInfo, ...]:
+    """Return the modes of a region with their numbers."""
+    return tuple(ModeInfo(mode.name, mode.number) for mode in region.modes.values())
 
 
 def finished(program: Program, entries: tuple[str, ...], keep: tuple[str, ...] = ()) -> Program:

@@ -1,0 +1,84 @@
+"""Parallel: a micro-step of regions side by side - all choose on one snapshot, then all commit.
+
+Semantics, rules 3 and 14. An automaton whose chart is its only region does without (`switch` in
+language/field.py): it resets and enters at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from language.field import Field, enter, known_at, resets
+from language.lower import choice
+from language.model import Automaton, Mode, Region, Transition
+from language.operation import Assign, Block, Branch, Choose, Expr, Op, Run, whole
+from language.region import by_priority, slot
+
+
+@dataclass(frozen=True)
+class Selection:
+    """How a micro-step names what it takes: the variable of a region, and each transition's number.
+
+    `enabled` is whether a transition may fire, given the ending of its guard's variables.
+    """
+
+    taken: Callable[[str], str]
+    number: Callable[[Transition], int]
+    enabled: Callable[[Transition, str], Expr]
+
+
+def parallel_blocks(field: Field, selection: Selection) -> dict[str, Block]:
+    """Return `jump_<region>_<mode>` of the regions beside the chart, `commit_<region>` of all."""
+    blocks: dict[str, Block] = {}
+    for region in field.automaton.regions:
+        for mode in region.modes.values():
+            blocks[f"jump_{mode.label}"] = _choose(field, mode, selection)
+    for region in field.automaton.all_regions:
+        blocks[f"commit_{region.name}"] = (_commit(field, region, selection),)
+    return blocks
+
+
+def parallel_step(field: Field, mode: Mode, selection: Selection) -> Block:
+    """Return one micro-step of all regions while a mode of the chart is active."""
+    regions = field.automaton.all_regions
+    ops: list[Op] = [Assign(selection.taken(region.name), whole(0)) for region in regions]
+    ops += _choose(field, mode, selection)
+    for region in mode.beside:
+        others = region.modes.values()
+        cases: dict[str, Block] = {other.name: (Run(f"jump_{other.label}"),) for other in others}
+        ops.append(choice(region, known_at(field), cases))
+    return (*ops, *(Run(f"commit_{region.name}") for region in regions))
+
+
+def reset_writers(automaton: Automaton) -> dict[str, dict[str, Transition]]:
+    """Return, per state, a transition of each region that resets it."""
+    found: dict[str, dict[str, Transition]] = {}
+    for mode in automaton.all_modes:
+        for transition in mode.transitions:
+            for name in transition.reset:
+                found.setdefault(name, {}).setdefault(mode.region, transition)
+    return found
+
+
+def _choose(field: Field, mode: Mode, selection: Selection) -> Block:
+    """The enabled transition with the smallest priority; its resets read the values before."""
+    ops: Block = ()
+    for k, transition in reversed(by_priority(mode)):
+        taken = Assign(
+            selection.taken(mode.region),
+            whole(selection.number(transition)),
+            field.prefix + transition.key,
+        )
+        enabled = selection.enabled(transition, slot(mode.region, k))
+        ops = (Branch(enabled, (taken, *resets(field, transition)[0]), ops),)
+    return ops
+
+
+def _commit(field: Field, region: Region, selection: Selection) -> Choose:
+    cases = []
+    for mode in region.modes.values():
+        for transition in mode.transitions:
+            block = (*resets(field, transition)[1], enter(field, transition))
+            cases.append((selection.number(transition), block))
+    return Choose(selection.taken(region.name), tuple(cases))

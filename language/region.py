@@ -1,0 +1,128 @@
+"""Region: what parallel regions give to a mode of the chart - names, guards, sources (rule 14).
+
+All regions read one snapshot. An equation may stand in the modes of any one region; while a mode
+of the chart is active, those of the regions beside it are chosen by the region's own mode.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Mapping
+
+from language.model import CHART, Automaton, Balance, Formula, Mode, Region, Transition
+from language.operation import Compare, Expr, Ref, whole
+
+
+def equation_names(mode: Mode) -> list[str]:
+    """Return the names of the equations that hold while a mode is active."""
+    return list(sources(mode))
+
+
+def sources(mode: Mode) -> dict[str, tuple[Formula, ...]]:
+    """Return each equation's formulas: one, or those of the modes of a region beside."""
+    found: dict[str, tuple[Formula, ...]] = {}
+    found.update({name: (formula,) for name, formula in mode.equations.items()})
+    for region in mode.beside:
+        for name in region_equations(region):
+            modes = region.modes.values()
+            found[name] = tuple(m.equations[name] for m in modes if name in m.equations)
+    return found
+
+
+def region_equations(region: Region) -> list[str]:
+    """Return the names that the modes of a region define."""
+    return list(dict.fromkeys(name for mode in region.modes.values() for name in mode.equations))
+
+
+def region_of_equation(mode: Mode, name: str) -> Region | None:
+    """Return the region beside a mode that defines an equation, None for the mode's own."""
+    if name in mode.equations:
+        return None
+    return next(region for region in mode.beside if name in region_equations(region))
+
+
+def region_of_balance(mode: Mode, state: str) -> Region | None:
+    """Return the region beside a mode that balances a state, None for the mode's own."""
+    if state in mode.flow:
+        return None
+    modes_of = {region.name: region.modes.values() for region in mode.beside}
+    return next(r for r in mode.beside if any(state in m.flow for m in modes_of[r.name]))
+
+
+def balances(mode: Mode) -> Iterator[Balance]:
+    """Yield every balance that may hold while a mode of the chart is active."""
+    yield from mode.flow.values()
+    for region in mode.beside:
+        for other in region.modes.values():
+            yield from other.flow.values()
+
+
+def transitions(mode: Mode) -> Iterator[Transition]:
+    """Yield every transition that may be watched while a mode of the chart is active."""
+    yield from mode.transitions
+    for region in mode.beside:
+        for other in region.modes.values():
+            yield from other.transitions
+
+
+def by_priority(mode: Mode) -> list[tuple[int, Transition]]:
+    """Return the transitions of a mode with their index, the smallest priority first."""
+    pairs = list(enumerate(mode.transitions))
+    return sorted(pairs, key=lambda pair: (pair[1].priority or 0, pair[0]))
+
+
+def slot(region: str, index: int) -> str:
+    """Return the ending of the variables of a mode's guard: `guard_0`, `guard_gap_0`."""
+    return str(index) if region == CHART else f"{region}_{index}"
+
+
+def slots(mode: Mode) -> list[str]:
+    """Return the endings of all guards that are watched while a mode of the chart is active."""
+    own = [slot(CHART, index) for index in range(len(mode.transitions))]
+    return own + [slot(r.name, index) for r in mode.beside for index in range(r.widest)]
+
+
+def all_slots(automaton: Automaton) -> list[str]:
+    """Return the endings of the guard variables of an automaton."""
+    return [slot(r.name, index) for r in automaton.all_regions for index in range(r.widest)]
+
+
+def mode_variable(base: str, region: str) -> str:
+    """Return the variable that holds a region's mode; `base` is that of the chart."""
+    return base if region == CHART else f"{base}_{region}"
+
+
+def fired_variable(region: str) -> str:
+    """Return the variable that holds the transition of a region in a micro-step, 0 for none."""
+    return "memory.fired" if region == CHART else f"memory.fired_{region}"
+
+
+def in_modes(automaton: Automaton, base: str, prefix: str = "") -> dict[str, Expr]:
+    """Return what `in(region.mode)` is, and under `mode region` the variable that says it."""
+    found: dict[str, Expr] = {}
+    for region in automaton.all_regions:
+        variable = Ref(mode_variable(base, region.name))
+        found[f"mode {prefix}{region.name}"] = variable
+        for mode in region.modes.values():
+            is_in = Compare("==", variable, whole(mode.number))
+            found[f"in {prefix}{region.name}.{mode.name}"] = is_in
+    return found
+
+
+def one_configuration(automaton: Automaton, transition: Transition) -> Mode:
+    """Return the source of a transition as a mode that has the equations of all other regions.
+
+    Of another region its initial mode counts; for a search of witnesses, which prove nothing.
+    """
+    source = automaton.source(transition)
+    found: dict[str, Formula] = {}
+    for region in automaton.all_regions:
+        own = region.name == transition.region
+        mode = source if own else region.modes[region.initial]
+        found.update(mode.equations)
+    return dataclasses.replace(source, equations=found, beside=())
+
+
+def with_regions(modes: Mapping[str, Mode], regions: tuple[Region, ...]) -> dict[str, Mode]:
+    """Return the modes of the chart with the regions that run beside them."""
+    return {name: dataclasses.replace(mode, beside=regions) for name, mode in modes.items()}
