@@ -8,12 +8,14 @@ from collections.abc import Iterable, Mapping
 from language.balance import coefficient_of
 from language.check_element import check_laid_on
 from language.check_observer import check_observer
+from language.check_region import check_regions
 from language.dimension import DimensionCheck, Kind, Scope
 from language.guards import report_overlaps
 from language.lower import parameter_kinds
 from language.model import Automaton, Formula, Mode
 from language.order import equation_order, report_circle, unreached
 from language.problem import Problems, Span, SpecError, nearest
+from language.region import sources
 from language.syntax import Broken, Tree, names
 from language.units import SECOND, Dimension, Unit, common, fits, product
 from language.witness import report_refiring
@@ -30,9 +32,11 @@ def check_automaton(automaton: Automaton, problems: Problems) -> Automaton:
         automaton = dataclasses.replace(automaton, model=_declared(automaton.model, problems))
     checked = _declared(automaton, problems)
     problems.stop_if_any()
-    for name in unreached(checked.modes, checked.initial):
-        problems.warning("unreached", checked.modes[name].span, f"mode `{name}` is never entered")
-    for mode in checked.modes.values():
+    for region in checked.all_regions:
+        for name in unreached(region.modes, region.initial):
+            label = f"mode `{name}` is never entered"
+            problems.warning("unreached", region.modes[name].span, label)
+    for mode in checked.all_modes:
         report_overlaps(checked, mode, problems)
     if not checked.is_sampled:
         report_refiring(checked, problems)
@@ -61,9 +65,14 @@ class _Check:
         self._declare()
         self._parameters()
         self._initials()
+        check_regions(automaton, self.problems)
         for mode in automaton.modes.values():
             with self.problems.collecting():
                 self._mode(mode)
+        for region in automaton.regions:
+            for mode in region.modes.values():
+                with self.problems.collecting():
+                    self._beside(mode)
         self._outputs()
         check_laid_on(automaton, self.names, self.problems)
         self._sampled_ranges()
@@ -76,11 +85,13 @@ class _Check:
             for name, thing in group.items():
                 truth = getattr(thing, "truth", False)
                 self._new(name, "truth" if truth else thing.unit.dimension, thing.span)
-        for name in _equation_names(automaton.modes.values()):
-            for mode in automaton.modes.values():
+        for name in _equation_names(automaton.all_modes):
+            for mode in automaton.all_modes:
                 if name in mode.equations:
                     self._clash(name, mode.equations[name].span)
                     break
+        for region in automaton.regions:
+            self._clash(region.name, region.span)
 
     def _new(self, name: str, kind: Kind, span: Span) -> None:
         self._clash(name, span)
@@ -134,20 +145,38 @@ class _Check:
         known = dict(self._scope(groups, "").names)
         place = "here"
         run = mode.run
-        modes: frozenset[str] = frozenset()
+        modes = _mode_paths(automaton)
         if run and automaton.model:
-            modes = frozenset(f"{automaton.model.name}.{name}" for name in automaton.model.modes)
+            modes |= {f"{automaton.model.name}.{name}" for name in automaton.model.modes}
+            modes |= {f"{automaton.model.name}.{path}" for path in _mode_paths(automaton.model)}
+        formulas = sources(mode)
         for name in equation_order(mode):
             scope = Scope({**known}, modes, place, self._angles())
             check = DimensionCheck(scope, self.problems)
-            kind = check.kind(mode.equations[name].tree)
-            known[name] = self._agreed(name, kind, mode.equations[name])
+            for formula in formulas[name]:
+                known[name] = self._agreed(name, check.kind(formula.tree), formula)
         check = DimensionCheck(Scope(known, modes, place, self._angles()), self.problems)
         self._flow(mode, check)
         self._assignments(mode.update, check)
         self._transitions(mode, check)
         if mode.observer:
             check_observer(automaton, mode.observer, self.names, check)
+        self._writers(mode)
+
+    def _beside(self, mode: Mode) -> None:
+        """A mode of another region reads what every mode of the chart has."""
+        automaton = self.automaton
+        groups = [automaton.parameters, automaton.inputs, automaton.states]
+        known = dict(self._scope(groups, "").names)
+        modes = [sources(other) for other in automaton.modes.values()]
+        everywhere = [name for name in modes[0] if all(name in other for other in modes)]
+        known.update({name: self.names.get(name) for name in everywhere})
+        place = f"beside every mode of the chart, in region `{mode.region}`"
+        scope = Scope(known, _mode_paths(automaton), place, self._angles())
+        check = DimensionCheck(scope, self.problems)
+        self._balances(mode, check)
+        self._assignments(mode.update, check)
+        self._transitions(mode, check)
         self._writers(mode)
 
     def _agreed(self, name: str, kind: Kind | None, formula: Formula) -> Kind | None:
@@ -176,10 +205,20 @@ class _Check:
         automaton = self.automaton
         if automaton.is_sampled:
             return
+        beside = {
+            balance.state
+            for region in mode.beside
+            for m in region.modes.values()
+            for balance in m.flow.values()
+        }
         for name, state in automaton.states.items():
-            if name not in mode.flow:
+            if name not in mode.flow and name not in beside:
                 label = f"state `{name}` has no balance in mode `{mode.name}`"
                 self.problems.error("missing", state.span, label, f"`der({name}) = 0` keeps it")
+        self._balances(mode, check)
+
+    def _balances(self, mode: Mode, check: DimensionCheck) -> None:
+        automaton = self.automaton
         for name, balance in mode.flow.items():
             if name not in automaton.states:
                 hint = nearest(name, automaton.states)
@@ -213,9 +252,12 @@ class _Check:
         parameters = self._scope([automaton.parameters], "in `wait`: it is a fixed time")
         constant = DimensionCheck(parameters, self.problems)
         for transition in mode.transitions:
-            if transition.target not in automaton.modes:
+            region = automaton.region(transition.region)
+            if transition.target not in region.modes:
                 label = f"there is no mode `{transition.target}`"
-                hint = nearest(transition.target, automaton.modes)
+                if automaton.regions:
+                    label += f" in region `{region.name}`"
+                hint = nearest(transition.target, region.modes)
                 self.problems.error("name", transition.span, label, hint)
             check.truth(transition.when.tree, "when")
             if transition.wait:
@@ -260,7 +302,7 @@ class _Check:
 
     def _outputs(self) -> None:
         automaton = self.automaton
-        equations = _equation_names(automaton.modes.values())
+        equations = _equation_names(automaton.all_modes)
         for output, span in automaton.outputs.items():
             name = automaton.source_of(output)
             if name == "mode" or name in automaton.states:
@@ -271,7 +313,7 @@ class _Check:
                 self.problems.error("name", span, label, hint)
                 continue
             for mode in automaton.modes.values():
-                if name not in mode.equations:
+                if name not in sources(mode):
                     label = f"output `{name}` has no value in mode `{mode.name}`"
                     self.problems.error("missing", span, label)
 
@@ -287,6 +329,13 @@ class _Check:
 
 def _of_model(automaton: Automaton) -> Mapping[str, object]:
     return automaton.model.parameters if automaton.model else {}
+
+
+def _mode_paths(automaton: Automaton) -> frozenset[str]:
+    """Return the modes that `in` may name: of parallel regions, by region and mode."""
+    if not automaton.regions:
+        return frozenset()
+    return frozenset(f"{m.region}.{m.name}" for m in automaton.all_modes)
 
 
 def _equation_names(modes: Iterable[Mode]) -> list[str]:

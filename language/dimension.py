@@ -236,7 +236,7 @@ class DimensionCheck:
         name = tree.arguments[0]
         if not isinstance(name, Name) or name.path not in self.scope.modes:
             shown = name.path if isinstance(name, Name) else "..."
-            label = f"`in({shown})` does not name a mode of the run of this mode"
+            label = f"`in({shown})` does not name a mode of the run of this mode or of a region"
             hint = nearest(shown, self.scope.modes)
             self._report("name", tree.span, label, hint)
         return "truth"

@@ -30,7 +30,7 @@ class ModeReader(Reader):
 
     def regions(self, tree: Table, at: Span) -> tuple[Region, ...]:
         """Return the chart and the regions beside it; one mode `always` where none is written."""
-        entries = self.named(tree.get("regions"), "regions")
+        entries = list(self.named(tree.get("regions"), "regions"))
         chart = next((entry for entry in entries if entry.key == CHART), None)
         beside = tuple(self._region(entry, tree) for entry in entries if entry is not chart)
         if chart is not None:

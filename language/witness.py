@@ -16,6 +16,7 @@ from language.lower import constant_names, equations, expression
 from language.model import Automaton, Mode, Range, Transition
 from language.operation import Assign, Expr, Ref
 from language.problem import Problems
+from language.region import one_configuration
 from language.syntax import Name, Relation, Tree, names, walk
 from language.wiring import expr_names
 
@@ -56,7 +57,7 @@ class WitnessSearch:
 
     def both(self, first: Transition, second: Transition) -> Point | None:
         """Return values at which two guards of one mode hold together, if some are found."""
-        mode = self.automaton.modes[first.source]
+        mode = one_configuration(self.automaton, first)
         for point in self._points([first.when.tree, second.when.tree], mode):
             if self._hold(first, second, point):
                 return _shortened(point, lambda shorter: self._hold(first, second, shorter))
@@ -68,7 +69,12 @@ class WitnessSearch:
 
     def refires(self, out: Transition, back: Transition) -> Point | None:
         """Return values at which `out` and `back` fire in turn for ever, if some are found."""
+<<<<<<< HEAD
         there = self.automaton.modes[out.target]
+=======
+        here = one_configuration(self.automaton, out)
+        there = one_configuration(self.automaton, back)
+>>>>>>> d6695fa (Parallel regions: checks, rules, the gap beside the chart)
         for start in self._points([out.when.tree, back.when.tree], there):
             if self._refires_at(out, back, start):
                 return _shortened(start, lambda shorter: self._refires_at(out, back, shorter))
@@ -104,7 +110,7 @@ class WitnessSearch:
             name = stack.pop()
             if name not in found:
                 found.add(name)
-                for mode in self.automaton.modes.values():
+                for mode in self.automaton.all_modes:
                     if name in mode.equations:
                         stack += [read.path for read in names(mode.equations[name].tree)]
         return found
@@ -199,9 +205,9 @@ def report_refiring(automaton: Automaton, problems: Problems) -> None:
     """Report transitions that fire for ever at one instant, with a witness (rules 9 and 12)."""
     search = WitnessSearch(automaton)
     seen: set[frozenset[str]] = set()
-    for mode in automaton.modes.values():
+    for mode in automaton.all_modes:
         for out in mode.transitions:
-            for back in automaton.modes[out.target].transitions:
+            for back in automaton.target(out).transitions:
                 pair = frozenset({out.key, back.key})
                 if back.target != mode.name or out.wait or back.wait or pair in seen:
                     continue

@@ -87,8 +87,11 @@ def test_an_expression_is_true_or_false(text: str) -> None:
         ("clip(x, x)", "1 `clip` takes 3 argument(s), not 2"),
         ("foo(x)", "1 `foo` is not a function that can be used here"),
         ("x + y", "5 `y` is not known in a test"),
-        ("in(plant.off)", "1 `in(plant.off)` does not name a mode of the run of this mode"),
-        ("in(x > 0)", "1 `in(...)` does not name a mode of the run of this mode"),
+        (
+            "in(plant.off)",
+            "1 `in(plant.off)` does not name a mode of the run of this mode or of a region",
+        ),
+        ("in(x > 0)", "1 `in(...)` does not name a mode of the run of this mode or of a region"),
     ],
 )
 def test_what_does_not_fit_is_told_once(text: str, label: str) -> None:

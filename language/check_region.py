@@ -1,0 +1,68 @@
+"""Check of parallel regions: whole in each region, disjoint between them (rule 14)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from language.model import Automaton, Mode, Region
+from language.problem import Problems, Span
+from language.region import region_equations
+
+
+def check_regions(automaton: Automaton, problems: Problems) -> None:
+    """Report what only the chart may have, what a mode lacks, and what two regions write."""
+    labels: dict[str, Span] = {}
+    for mode in automaton.all_modes:
+        if mode.label in labels:
+            hint = f"it is given first at {labels[mode.label]}"
+            problems.error("duplicate", mode.span, f"two modes are called `{mode.label}`", hint)
+        labels.setdefault(mode.label, mode.span)
+    for region in automaton.regions:
+        for mode in region.modes.values():
+            _check_mode(region, mode, problems)
+    _check_writers(automaton, problems)
+
+
+def _check_mode(region: Region, mode: Mode, problems: Problems) -> None:
+    for what, thing in (("observer", mode.observer), ("runs", mode.run)):
+        if thing is not None:
+            label = f"`{what}` belongs to a mode of the chart, not to one of region `{region.name}`"
+            problems.error("form", thing.span, label)
+    for name in region_equations(region):
+        if name not in mode.equations:
+            label = f"`{name}` has no equation in mode `{mode.name}` of region `{region.name}`"
+            hint = "an equation stands at the root or in every mode of one region"
+            problems.error("missing", mode.span, label, hint)
+    flows = dict.fromkeys(name for other in region.modes.values() for name in other.flow)
+    for name in flows:
+        if name not in mode.flow:
+            label = f"`{name}` has no balance in mode `{mode.name}` of region `{region.name}`"
+            problems.error("missing", mode.span, label, f"`der({name}) = 0` keeps it")
+
+
+def _check_writers(automaton: Automaton, problems: Problems) -> None:
+    """One region defines, balances, resets or updates a name."""
+    for what in ("equation", "balance", "reset or update"):
+        writers: dict[str, str] = {}
+        for region in automaton.all_regions:
+            for name, span in _written(region, what):
+                first = writers.setdefault(name, region.name)
+                if first != region.name:
+                    label = (
+                        f"`{name}` has a {what} in region `{first}` and in region `{region.name}`"
+                    )
+                    hint = "parallel regions write disjoint variables"
+                    problems.error("writer", span, label, hint)
+
+
+def _written(region: Region, what: str) -> Iterator[tuple[str, Span]]:
+    for mode in region.modes.values():
+        if what == "equation":
+            yield from ((name, formula.span) for name, formula in mode.equations.items())
+        elif what == "balance":
+            yield from ((name, balance.left.span) for name, balance in mode.flow.items())
+        else:
+            for name, formula in mode.update.items():
+                yield name, formula.span
+            for transition in mode.transitions:
+                yield from ((name, formula.span) for name, formula in transition.reset.items())
