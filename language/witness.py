@@ -64,24 +64,20 @@ class WitnessSearch:
         return None
 
     def _hold(self, first: Transition, second: Transition, point: Point) -> bool:
-        mode = self.automaton.modes[first.source]
+        mode = one_configuration(self.automaton, first)
         return self._holds(first, mode, point) and self._holds(second, mode, point)
 
     def refires(self, out: Transition, back: Transition) -> Point | None:
         """Return values at which `out` and `back` fire in turn for ever, if some are found."""
-<<<<<<< HEAD
-        there = self.automaton.modes[out.target]
-=======
-        here = one_configuration(self.automaton, out)
         there = one_configuration(self.automaton, back)
->>>>>>> d6695fa (Parallel regions: checks, rules, the gap beside the chart)
         for start in self._points([out.when.tree, back.when.tree], there):
             if self._refires_at(out, back, start):
                 return _shortened(start, lambda shorter: self._refires_at(out, back, shorter))
         return None
 
     def _refires_at(self, out: Transition, back: Transition, start: Point) -> bool:
-        here, there = self.automaton.modes[out.source], self.automaton.modes[out.target]
+        here = one_configuration(self.automaton, out)
+        there = one_configuration(self.automaton, back)
         if not self._holds(out, here, start):
             return False
         arrived = self._reset(out, here, start)
