@@ -61,12 +61,15 @@ def compiler() -> list[str]:
 
 
 def observed(program: Program) -> tuple[Observed, ...]:
-    """Return what is compared after a tick: all that the instance carries."""
+    """Return what is compared after a tick: all that the instance carries.
+
+    What is in a ring is compared when it comes out of it.
+    """
     kinds = {"real": "real", "truth": "whole", "whole": "whole"}
     return tuple(
         Observed(variable.name, kinds[variable.type])
         for variable in program.variables
-        if variable.name.partition(".")[0] not in ("work", "input", "is_new")
+        if variable.name.partition(".")[0] not in ("work", "input", "is_new") and not variable.size
     )
 
 

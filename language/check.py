@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 
 from language.balance import coefficient_of
 from language.check_element import check_laid_on
+from language.check_memory import check_memory
 from language.check_observer import check_observer
 from language.check_region import check_regions
 from language.dimension import DimensionCheck, Kind, Scope
@@ -16,7 +17,7 @@ from language.model import Automaton, Formula, Mode
 from language.order import equation_order, report_circle, unreached
 from language.problem import Problems, Span, SpecError, nearest
 from language.region import sources
-from language.syntax import Broken, Tree, names
+from language.syntax import KEPT, MEMORY, Broken, Tree, names
 from language.units import SECOND, Dimension, Unit, common, fits, product
 from language.witness import report_refiring
 
@@ -31,6 +32,8 @@ def check_automaton(automaton: Automaton, problems: Problems) -> Automaton:
     if automaton.model:
         automaton = dataclasses.replace(automaton, model=_declared(automaton.model, problems))
     checked = _declared(automaton, problems)
+    problems.stop_if_any()
+    check_memory(checked, problems)
     problems.stop_if_any()
     for region in checked.all_regions:
         for name in unreached(region.modes, region.initial):
@@ -111,6 +114,10 @@ class _Check:
         known = {name: self.names[name] for group in groups for name in group}
         return Scope(known, frozenset(), place, self._angles())
 
+    def _kept(self) -> frozenset[str]:
+        """Return the functions with memory that are for every expression of a mode."""
+        return frozenset(KEPT if self.automaton.is_sampled else ())
+
     def _angles(self) -> dict[str, Unit]:
         """Return the units of the parameters whose value is declared in a unit of angle."""
         declared = self.automaton.parameters.items()
@@ -151,16 +158,18 @@ class _Check:
             modes |= {f"{automaton.model.name}.{path}" for path in _mode_paths(automaton.model)}
         formulas = sources(mode)
         for name in equation_order(mode):
-            scope = Scope({**known}, modes, place, self._angles())
+            scope = Scope({**known}, modes, place, self._angles(), self._kept())
             check = DimensionCheck(scope, self.problems)
             for formula in formulas[name]:
                 known[name] = self._agreed(name, check.kind(formula.tree), formula)
-        check = DimensionCheck(Scope(known, modes, place, self._angles()), self.problems)
+        scope = Scope(known, modes, place, self._angles(), self._kept())
+        check = DimensionCheck(scope, self.problems)
         self._flow(mode, check)
         self._assignments(mode.update, check)
         self._transitions(mode, check)
         if mode.observer:
-            check_observer(automaton, mode.observer, self.names, check)
+            plain = DimensionCheck(dataclasses.replace(scope, memory=frozenset()), self.problems)
+            check_observer(automaton, mode.observer, self.names, plain)
         self._writers(mode)
 
     def _beside(self, mode: Mode) -> None:
@@ -172,7 +181,7 @@ class _Check:
         everywhere = [name for name in modes[0] if all(name in other for other in modes)]
         known.update({name: self.names.get(name) for name in everywhere})
         place = f"beside every mode of the chart, in region `{mode.region}`"
-        scope = Scope(known, _mode_paths(automaton), place, self._angles())
+        scope = Scope(known, _mode_paths(automaton), place, self._angles(), self._kept())
         check = DimensionCheck(scope, self.problems)
         self._balances(mode, check)
         self._assignments(mode.update, check)
@@ -251,6 +260,9 @@ class _Check:
         automaton = self.automaton
         parameters = self._scope([automaton.parameters], "in `wait`: it is a fixed time")
         constant = DimensionCheck(parameters, self.problems)
+        remembered = frozenset(MEMORY if automaton.is_sampled else ())
+        guards = dataclasses.replace(check.scope, memory=remembered)
+        guard = DimensionCheck(guards, self.problems)
         for transition in mode.transitions:
             region = automaton.region(transition.region)
             if transition.target not in region.modes:
@@ -259,7 +271,7 @@ class _Check:
                     label += f" in region `{region.name}`"
                 hint = nearest(transition.target, region.modes)
                 self.problems.error("name", transition.span, label, hint)
-            check.truth(transition.when.tree, "when")
+            guard.truth(transition.when.tree, "when")
             if transition.wait:
                 constant.quantity(transition.wait.tree, SECOND, "wait")
                 self._fixed_wait(transition.wait)

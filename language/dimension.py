@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
 from language.problem import Problems, Span, nearest
 from language.syntax import (
+    EDGES,
+    KEPT,
+    MEMORY,
     Application,
     Arithmetic,
     Broken,
@@ -22,7 +26,7 @@ from language.syntax import (
     Tree,
     Truth,
 )
-from language.units import NUMBER, Dimension, Unit, common, fits, power, product, root
+from language.units import NUMBER, SECOND, Dimension, Unit, common, fits, power, product, root
 
 Truthful = Literal["truth"]
 Kind = Dimension | Truthful
@@ -34,21 +38,29 @@ SAME = {"abs": 1, "min": 2, "max": 2, "clip": 3}
 NUMBERS = {"exp": 1, "tanh": 1, "floor": 1, "sign": 1}
 ANGLES = {"sin": 1, "cos": 1, "tan": 1}
 ARGUMENTS = {**SAME, **NUMBERS, **ANGLES, "sqrt": 1, "atan2": 2}
-KNOWN = (*ARGUMENTS, "in", "der")
-LATER = ("lookup", "previous", "delay", "rising", "falling", "after")
+KNOWN = (*ARGUMENTS, *MEMORY, "in", "der")
+LATER = ("lookup",)
+WHERE = {
+    "previous": "it is for equations, updates, resets and guards of a sampled automaton",
+    "delay": "it is for equations, balances, updates, resets and guards",
+    **dict.fromkeys(("rising", "falling", "after"), "it is for guards: `when`"),
+}
+"""What functions with memory are for."""
 
 
 @dataclass(frozen=True)
 class Scope:
     """What names mean at one place: their dimensions, and the modes that `in(...)` may name.
 
-    `angles` are the units of the parameters that are declared in a unit of angle.
+    `angles` are the units of the parameters that are declared in a unit of angle, `memory` the
+    functions with memory that may be used.
     """
 
     names: Mapping[str, Kind | None]
     modes: frozenset[str] = frozenset()
     place: str = "here"
     angles: Mapping[str, Unit] = field(default_factory=dict)
+    memory: frozenset[str] = frozenset()
 
 
 class DimensionCheck:
@@ -193,6 +205,8 @@ class DimensionCheck:
         name, arguments = tree.function, tree.arguments
         if name == "in":
             return self._in(tree)
+        if name in WHERE:
+            return self._memory(tree)
         wanted = ARGUMENTS.get(name)
         if wanted is None:
             label = f"`{name}` is not a function that can be used here"
@@ -207,6 +221,28 @@ class DimensionCheck:
         if any(kind is None for kind in kinds):
             return None
         return self._function(tree, [kind for kind in kinds if kind is not None])
+
+    def _memory(self, tree: Application) -> Kind | None:
+        """`delay` and `previous` have the kind of what they keep, the others are conditions."""
+        name, arguments = tree.function, tree.arguments
+        wanted = 2 if name == "delay" else 1
+        if name not in self.scope.memory:
+            label = f"`{name}` is not a function that can be used here"
+            self._report("name", tree.span, label, WHERE[name])
+            return None
+        if len(arguments) != wanted:
+            label = f"`{name}` takes {wanted} argument(s), not {len(arguments)}"
+            self._report("arguments", tree.span, label)
+            return None
+        if name in ("delay", "after"):
+            self.quantity(arguments[-1], SECOND, f"the time of {name}")
+        if name in KEPT or name in EDGES:
+            kept = dataclasses.replace(self.scope, memory=self.scope.memory & {*KEPT})
+            inside = DimensionCheck(kept, self.problems)
+            if name in KEPT:
+                return inside.kind(arguments[0])
+            inside.truth(arguments[0], name)
+        return "truth"
 
     def _function(self, tree: Application, kinds: list[Dimension]) -> Dimension | None:
         name, first = tree.function, kinds[0]

@@ -29,6 +29,7 @@ from language.problem import SpecError
 from language.program import Constant
 from language.region import region_of_equation, sources
 from language.syntax import (
+    MEMORY,
     Application,
     Arithmetic,
     Broken,
@@ -42,12 +43,14 @@ from language.syntax import (
     Relation,
     Tree,
     Truth,
+    memory_key,
     names,
 )
 from language.units import Unit
 
 Names = Mapping[str, Expr]
-"""What each name of the model is at one place; `in(x.y)` is looked up as `in x.y`."""
+"""What each name of the model is at one place; `in(x.y)` is looked up as `in x.y`,
+what functions with memory are under their `memory_key`."""
 
 
 def expression(tree: Tree, known: Names) -> Expr:
@@ -77,6 +80,8 @@ def expression(tree: Tree, known: Names) -> Expr:
             return Select(*(expression(part, known) for part in (condition, then, other)))
         case Application("in", (Name(path, _),), _):
             return known[f"in {path}"]
+        case Application(function, _, _) if function in MEMORY:
+            return known[memory_key(tree)]
         case Application(function, arguments, _):
             return Call(function, tuple(expression(part, known) for part in arguments))
 

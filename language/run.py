@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from language.check_memory import uses_memory
 from language.evaluate import Scalar
 from language.exponential import exponential
 from language.field import (
@@ -63,6 +64,11 @@ def run_motion(
             label = "all runs of an automaton have one method and one number of substeps"
             problems.error("run", run.span, label)
     inputs = _inputs(automaton, problems)
+    remembering = uses_memory(model)
+    if remembering:
+        label = "a run inside a tick follows what has no memory"
+        problems.error("run", remembering.span, label)
+        problems.stop_if_any()
     field = Field(model, constant_names(automaton), inputs, MODE, f"{model.name} ")
     blocks = field_blocks(field)
     method = _method(automaton, field, runs[0], blocks, values, problems)

@@ -2,7 +2,8 @@
 
 Blocks: `init` (before the first tick), `step` (one tick) and what they run:
 `start`, `predict_<mode>`, `correct_<mode>`, `run_<mode>` (the advance), `equations_<mode>`,
-`jump_<mode>`, `update_<mode>`, `remember`; the blocks of a run are those of its model's field.
+`jump_<mode>`, `keep` (delayed values), `update_<mode>`, `remember`; the blocks of a run are those
+of its model's field.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from language.constants import derive_block, parameter_constants, values_of
 from language.evaluate import Scalar
 from language.kalman import Kalman, kalman, observer_variables
 from language.lower import constant_names, equations, expression
+from language.memory import delays_of, keep_block, memory_variables, with_delays
 from language.model import CHART, Automaton, Mode, Region
 from language.operation import (
     Assign,
@@ -75,8 +77,11 @@ class _Sampled:
         self.transitions = transition_infos(automaton, problems)
         self.observers: dict[str, Kalman] = {}
         self.faults: list[str] = []
-        self.now = self._names("input")
         self.before = self._names("before")
+        self.delays = delays_of(automaton)
+        names = {n: Ref(f"equation.{n}") for m in automaton.all_modes for n in m.equations}
+        self.all = with_delays(self.delays, {**self._names("input"), **names})
+        self.now = {name: value for name, value in self.all.items() if name not in names}
 
     def _names(self, group: str) -> dict[str, Expr]:
         automaton = self.automaton
@@ -138,6 +143,7 @@ class _Sampled:
         inputs = self.automaton.inputs
         return {
             "remember": tuple(Assign(f"before.{n}", Ref(f"input.{n}")) for n in inputs),
+            "keep": keep_block(self.automaton, self.delays, self.all),
             "start": self._start(),
             "derive": derive_block(self.automaton),
             "init": self._init(),
@@ -158,6 +164,7 @@ class _Sampled:
                 about = f"ticks that the guard has been true, at most {info.ticks + 1}"
                 found.append(Variable(info.timer, "whole", about=about))
         found += observer_variables(automaton)
+        found += memory_variables(automaton, self.delays)
         found += mode_and_fired(automaton, "tick")
         found.append(Variable("memory.started", "truth", about="the first tick is done"))
         found.append(Variable("memory.faults", "whole", about="latched fault bits"))
@@ -250,6 +257,8 @@ class _Sampled:
         if self.automaton.regions:
             ops += [Run(f"commit_{region.name}") for region in regions]
         ops.append(Branch(self._fired(), (self._each("equations"),)))
+        if keep_block(self.automaton, self.delays, self.all):
+            ops.append(Run("keep"))
         updated = [r for r in regions if any(mode.update for mode in r.modes.values())]
         ops += [self._in(region, "update") for region in updated]
         if self.automaton.regions:

@@ -137,6 +137,17 @@ Tree = (
 )
 
 
+KEPT = ("previous", "delay")
+EDGES = ("rising", "falling")
+MEMORY = (*KEPT, *EDGES, "after")
+"""Functions with memory."""
+
+
+def memory_key(tree: Application) -> str:
+    """Return the name under which the value of a function with memory is known."""
+    return f"{tree.function} {form(tree.arguments)}"
+
+
 def names(tree: Tree) -> list[Name]:
     """Return every name read in the tree, from left to right."""
     return [part for part in walk(tree) if isinstance(part, Name)]

@@ -8,6 +8,7 @@ from fractions import Fraction
 
 from language.constants import exact_value
 from language.lower import expression
+from language.memory import guard_names, leave, watch_edges
 from language.model import Automaton, Mode, Region, Transition
 from language.operation import (
     Assign,
@@ -80,6 +81,8 @@ def sampled_jump(
     """
     modes = automaton.all_modes
     known = {**now, **{name: Ref(f"equation.{name}") for m in modes for name in m.equations}}
+    edges = watch_edges(automaton, mode, known)
+    known.update(guard_names(automaton, mode))
     own = infos_of(mode, infos)
     counters: list[Op] = []
     chain: Block = ()
@@ -97,7 +100,7 @@ def sampled_jump(
         if not automaton.regions:
             fire += enter_run(automaton, automaton.target(transition))
         chain = (Branch(enabled, tuple(fire), chain),)
-    return (*counters, *chain)
+    return (*edges, *counters, *chain)
 
 
 def sampled_commit(automaton: Automaton, region: Region, infos: tuple[TransitionInfo, ...]) -> Op:
@@ -135,6 +138,7 @@ def _commit(automaton: Automaton, transition: Transition, own: list[TransitionIn
         Assign(f"state.{name}", Ref(f"work.reset_{name}")) for name in transition.reset
     ]
     ops += [Assign(info.timer, whole(0)) for info in own if info.timer]
+    ops += leave(automaton, automaton.source(transition), automaton.target(transition))
     mode = mode_variable("memory.mode", transition.region)
     ops.append(Assign(mode, whole(automaton.target(transition).number)))
     return ops

@@ -1,0 +1,285 @@
+"""Memory of a sampled automaton: `previous`, `delay`, `rising`, `falling`, `after` as operations.
+
+A delay of N ticks is a ring of N values; the oldest is overwritten once a tick, when the equations
+of the resulting mode hold and before the updates. Until it was written once, a delayed value is
+the value of now. An edge is a truth value per `rising` or `falling`: whether the opposite was seen
+at the tick before, in the same activation of the mode. `after` is a counter of ticks per mode.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from language.constants import exact_value
+from language.lower import Names, expression
+from language.model import Automaton, Formula, Mode
+from language.operation import (
+    Assign,
+    Binary,
+    Block,
+    Branch,
+    Compare,
+    Count,
+    Expr,
+    Item,
+    Loop,
+    Op,
+    Ref,
+    Select,
+    Store,
+    Unary,
+    Value,
+    add,
+    whole,
+)
+from language.program import ValueType, Variable
+from language.region import mode_variable
+from language.syntax import (
+    EDGES,
+    KEPT,
+    Application,
+    Choice,
+    Logic,
+    Name,
+    Not,
+    Relation,
+    Tree,
+    Truth,
+    memory_key,
+    walk,
+)
+
+MAX_DELAY = 4096
+"""Longest delay in values kept: 32 kB of an instance."""
+KEPT_ONCE = Ref("memory.kept")
+
+
+@dataclass(frozen=True)
+class Delay:
+    """A value as it was some ticks ago (`ticks` 1: `previous`)."""
+
+    number: int
+    tree: Application
+    ticks: int
+    type: ValueType
+
+    @property
+    def name(self) -> str:
+        """The variable that holds the values: a scalar where there is one, else a ring."""
+        return f"memory.delay_{self.number}"
+
+    @property
+    def oldest(self) -> str:
+        """The variable that says which value of the ring is the oldest."""
+        return f"memory.oldest_{self.number}"
+
+
+@dataclass(frozen=True)
+class Edge:
+    """A `rising` or `falling` in the guards of a mode (its key path)."""
+
+    number: int
+    mode: str
+    tree: Application
+
+    @property
+    def opposite(self) -> str:
+        """The variable: the opposite was seen at an earlier instant of this activation."""
+        return f"memory.opposite_{self.number}"
+
+
+def formulas(mode: Mode) -> Iterator[Formula]:
+    """Yield the equations, updates, guards and resets of a mode."""
+    yield from mode.equations.values()
+    yield from mode.update.values()
+    for transition in mode.transitions:
+        yield transition.when
+        yield from transition.reset.values()
+
+
+def applications(automaton: Automaton, functions: tuple[str, ...]) -> dict[str, Application]:
+    """Return each different use of some functions, by key; what is inside comes first."""
+    found: dict[str, Application] = {}
+    for mode in automaton.all_modes:
+        trees = [formula.tree for formula in formulas(mode)]
+        trees += [balance.right for balance in mode.flow.values()]
+        for tree in trees:
+            for part in reversed(walk(tree)):
+                if isinstance(part, Application) and part.function in functions:
+                    found.setdefault(memory_key(part), part)
+    return found
+
+
+def ticks_of(automaton: Automaton, time: Tree) -> int:
+    """Return a time of fixed values in ticks, rounded up, exactly (rule 4). Raises SpecError."""
+    assert automaton.period is not None
+    return math.ceil(exact_value(Formula(time, ""), automaton) / automaton.period)
+
+
+def delays_of(automaton: Automaton) -> tuple[Delay, ...]:
+    """Return what a sampled automaton remembers of its values."""
+    found: list[Delay] = []
+    for tree in applications(automaton, KEPT).values():
+        ticks = ticks_of(automaton, tree.arguments[1]) if tree.function == "delay" else 1
+        kind: ValueType = "truth" if is_truth(automaton, tree.arguments[0]) else "real"
+        found.append(Delay(len(found) + 1, tree, ticks, kind))
+    return tuple(found)
+
+
+def is_truth(automaton: Automaton, tree: Tree) -> bool:
+    """Tell whether a checked expression is true or false, not a quantity."""
+    match tree:
+        case Truth() | Not() | Logic() | Relation():
+            return True
+        case Name(path, _) if path in automaton.inputs:
+            return automaton.inputs[path].truth
+        case Name(path, _):
+            declared = path in automaton.parameters or path in automaton.states
+            return not declared and path not in automaton.dimensions
+        case Choice(_, then, _, _):
+            return is_truth(automaton, then)
+        case Application(function, arguments, _):
+            return function == "in" or (function in KEPT and is_truth(automaton, arguments[0]))
+        case _:
+            return False
+
+
+def with_delays(delays: tuple[Delay, ...], known: Names) -> dict[str, Expr]:
+    """Return what names are, and what each delayed value is."""
+    found = dict(known)
+    for delay in delays:
+        now = expression(delay.tree.arguments[0], found)
+        old: Expr = Ref(delay.name)
+        if delay.ticks > 1:
+            old = Item(delay.name, Ref(delay.oldest))
+        key = memory_key(delay.tree)
+        found[key] = Select(KEPT_ONCE, old, now) if delay.ticks else now
+    return found
+
+
+def keep_block(automaton: Automaton, delays: tuple[Delay, ...], known: Names) -> Block:
+    """Return what a tick keeps, once its equations hold: all read the values of before it."""
+    values: list[Op] = []
+    fill: list[Op] = []
+    replace: list[Op] = []
+    commit: list[Op] = []
+    for delay in delays:
+        kept = Ref(f"work.keep_{delay.number}")
+        if delay.ticks:
+            values.append(Assign(kept.name, expression(delay.tree.arguments[0], known)))
+        if delay.ticks == 1:
+            commit.append(Assign(delay.name, kept))
+        if delay.ticks > 1:
+            slot, oldest = Ref("work.slot"), Ref(delay.oldest)
+            fill.append(Loop(delay.ticks, slot.name, (Store(delay.name, slot, kept),)))
+            last = Compare("==", oldest, whole(delay.ticks - 1))
+            replace.append(Store(delay.name, oldest, kept))
+            replace.append(Assign(oldest.name, Select(last, whole(0), add(oldest, whole(1)))))
+    ring: Block = (Branch(KEPT_ONCE, tuple(replace), tuple(fill)),) if fill else ()
+    done: Block = (Assign(KEPT_ONCE.name, Value(True)),) if values else ()
+    return (*values, *ring, *commit, *done, *_elapse(automaton))
+
+
+def _elapse(automaton: Automaton) -> Iterator[Op]:
+    """One more tick was spent in the mode."""
+    for timer, mode, longest in _timers(automaton).values():
+        variable = mode_variable("memory.mode", mode.region)
+        active = Compare("==", Ref(variable), whole(mode.number))
+        yield Count(timer, active, longest, f"{automaton.name} {mode.key}")
+
+
+def _timers(automaton: Automaton) -> dict[str, tuple[str, Mode, int]]:
+    """Return, by mode, the counter of its ticks and how far it counts."""
+    found: dict[str, tuple[str, Mode, int]] = {}
+    for mode in automaton.all_modes:
+        longest = max((ticks_of(automaton, a.arguments[0]) for a in _afters(mode)), default=0)
+        if longest:
+            found[mode.key] = (f"timer.after_{len(found) + 1}", mode, longest)
+    return found
+
+
+def _afters(mode: Mode) -> list[Application]:
+    parts = [part for t in mode.transitions for part in walk(t.when.tree)]
+    return [part for part in parts if isinstance(part, Application) and part.function == "after"]
+
+
+def edges_of(automaton: Automaton) -> tuple[Edge, ...]:
+    """Return the edges that the guards of each mode read."""
+    found: dict[tuple[str, str], Edge] = {}
+    for mode in automaton.all_modes:
+        for transition in mode.transitions:
+            for part in walk(transition.when.tree):
+                if isinstance(part, Application) and part.function in EDGES:
+                    key = mode.key, memory_key(part)
+                    found.setdefault(key, Edge(len(found) + 1, mode.key, part))
+    return tuple(found.values())
+
+
+def guard_names(automaton: Automaton, mode: Mode) -> dict[str, Expr]:
+    """Return what the edges and times of a mode's guards are."""
+    found: dict[str, Expr] = {}
+    for edge in edges_of(automaton):
+        if edge.mode == mode.key:
+            found[memory_key(edge.tree)] = Ref(f"work.edge_{edge.number}")
+    timers = _timers(automaton)
+    for part in _afters(mode):
+        ticks = ticks_of(automaton, part.arguments[0])
+        over: Expr = Value(True)
+        if ticks:
+            over = Compare(">=", Ref(timers[mode.key][0]), whole(ticks))
+        found[memory_key(part)] = over
+    return found
+
+
+def watch_edges(automaton: Automaton, mode: Mode, known: Mapping[str, Expr]) -> list[Op]:
+    """Return the edges of now, and what they leave for the next tick (rule 8)."""
+    ops: list[Op] = []
+    for edge in edges_of(automaton):
+        if edge.mode == mode.key:
+            level = expression(edge.tree.arguments[0], known)
+            rising = edge.tree.function == "rising"
+            here, seen = Ref(f"work.level_{edge.number}"), Ref(edge.opposite)
+            ops.append(Assign(here.name, level if rising else Unary("not", level)))
+            ops.append(Assign(f"work.edge_{edge.number}", Binary("and", here, seen)))
+            ops.append(Assign(seen.name, Unary("not", here)))
+    return ops
+
+
+def leave(automaton: Automaton, source: Mode, target: Mode) -> list[Op]:
+    """Return what a transition forgets: the edges of its source; its target's time starts."""
+    ops: list[Op] = [
+        Assign(edge.opposite, Value(False))
+        for edge in edges_of(automaton)
+        if edge.mode == source.key
+    ]
+    timers = _timers(automaton)
+    if target.key in timers:
+        ops.append(Assign(timers[target.key][0], whole(0)))
+    return ops
+
+
+def memory_variables(automaton: Automaton, delays: tuple[Delay, ...]) -> list[Variable]:
+    """Return the variables of all of it; `finished` leaves out what is not used."""
+    found = [
+        Variable("memory.kept", "truth", about="delayed values are kept"),
+        Variable("work.slot", "whole"),
+    ]
+    for delay in delays:
+        size = delay.ticks if delay.ticks > 1 else 0
+        found.append(Variable(delay.name, delay.type, size=size, about=_about(delay)))
+        found.append(Variable(delay.oldest, "whole", about="which of them is the oldest"))
+        found.append(Variable(f"work.keep_{delay.number}", delay.type))
+    for edge in edges_of(automaton):
+        found.append(Variable(edge.opposite, "truth", about=f"opposite seen in `{edge.mode}`"))
+        found.append(Variable(f"work.level_{edge.number}", "truth"))
+        found.append(Variable(f"work.edge_{edge.number}", "truth"))
+    for timer, mode, longest in _timers(automaton).values():
+        about = f"ticks since entry of `{mode.name}`, at most {longest}"
+        found.append(Variable(timer, "whole", about=about))
+    return found
+
+
+def _about(delay: Delay) -> str:
+    return "value of the tick before" if delay.ticks == 1 else f"values of {delay.ticks} ticks"
