@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from codegen.cache import key_of, stored
 from codegen.names import CNames
 from codegen.source import c_files, render
 from language.missing import ToolMissing as ToolMissing
@@ -60,6 +61,19 @@ def compiler() -> list[str]:
     raise ToolMissing(f"the C compiler `{name}` is missing: apt-get install gcc libc6-dev")
 
 
+def compiler_version() -> str:
+    """Return where the compiler is and the first line that it says of itself. Raises BuildError."""
+    command = compiler()
+    try:
+        done = subprocess.run(
+            [*command, "--version"], capture_output=True, text=True, timeout=SECONDS, check=False
+        )
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise BuildError(f"the C compiler `{command[0]}` does not run: {error}") from None
+    first = (done.stdout or done.stderr).strip().split("\n")[0]
+    return f"{os.path.realpath(shutil.which(command[0]) or command[0])}: {first}"
+
+
 def observed(program: Program) -> tuple[Observed, ...]:
     """Return what is compared after a tick: all that the instance carries.
 
@@ -106,12 +120,12 @@ def compile_program(sources: Sequence[Path], target: Path, flags: Sequence[str] 
 
 @contextmanager
 def executable(program: Program, flags: Sequence[str] = FLAGS) -> Iterator[Path]:
-    """Give the compiled harness of a program, in a folder that goes away again."""
+    """Give the compiled harness of a program, kept from an earlier run if there was one."""
     with tempfile.TemporaryDirectory(prefix="modewright-") as name:
         folder = Path(name)
-        target = folder / "program"
-        compile_program(write_harness(program, folder), target, flags)
-        yield target
+        sources = write_harness(program, folder)
+        key = key_of(sources, [*compiler(), *flags, *WARNINGS], compiler_version())
+        yield stored(key, lambda target: compile_program(sources, target, flags), folder)
 
 
 def run_executable(target: Path, records: bytes) -> bytes:

@@ -10,7 +10,7 @@ from html import escape
 from modewright.diagram import Arrow, Diagram, ModeBox, RegionBox, lifted
 from modewright.layers import Edge, Layout, Point, Size, layout
 
-CHARACTER, LINE, TITLE = 6.7, 14.0, 20.0
+CHARACTER, LINE, TITLE = 7.0, 14.0, 20.0
 """Width of a character, height of a line, height of a title [px]: monospace at 11 px."""
 PAD = 9.0
 START = 30.0

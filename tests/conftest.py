@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -17,6 +18,16 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     """Add our options to pytest."""
     parser.addoption("--update", action="store_true", help="rewrite golden files")
     parser.addoption("--recordings", default=None, help="folder of the real recordings")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Keep compiled programs in a folder of the tests, not in the user's home."""
+    folder = tmp_path_factory.mktemp("cache")
+    folder.chmod(0o700)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("MODEWRIGHT_CACHE", str(folder))
+        yield
 
 
 @pytest.fixture

@@ -1,0 +1,132 @@
+"""Cache: compiled programs, kept per user, so that the same C is compiled once.
+
+A key is the digest of sources, compiler and flags. The folder is the user's own and closed to
+others (0700); one that is not is left alone, and programs are compiled anew each time.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+import os
+import stat
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from pathlib import Path
+
+VARIABLE = "MODEWRIGHT_CACHE"
+MOST_PROGRAMS = 200
+"""Programs kept; beyond, those not used for a day go, the oldest first (100 kB each)."""
+DAY = 86400.0
+log = logging.getLogger("modewright.cache")
+
+
+def cache_folder() -> Path:
+    """Return where programs are kept: $MODEWRIGHT_CACHE, else below the user's cache folder."""
+    if given := os.environ.get(VARIABLE):
+        return Path(given)
+    base = os.environ.get("XDG_CACHE_HOME", "")
+    return Path(base if os.path.isabs(base) else Path.home() / ".cache") / "modewright"
+
+
+def cache_fault(folder: Path) -> str:
+    """Return why a folder must not be used as a cache; an empty text if it may be."""
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        found = folder.lstat()
+    except OSError as error:
+        return f"{folder} cannot be made: {error.strerror}"
+    if not stat.S_ISDIR(found.st_mode):
+        return f"{folder} is not a folder"
+    if found.st_uid != os.getuid():
+        return f"{folder} belongs to another user"
+    if found.st_mode & 0o077:
+        return f"{folder} is open to other users: chmod 700 {folder}"
+    if not os.access(folder, os.W_OK | os.X_OK):
+        return f"{folder} is not writable"
+    return ""
+
+
+def key_of(sources: Sequence[Path], command: Sequence[str], version: str) -> str:
+    """Return the key of a program: what is compiled, by what, and how."""
+    digest = hashlib.sha256()
+    for text in (*command, version, *(path.name for path in sources)):
+        digest.update(text.encode() + b"\0")
+    for path in sorted(sources[0].parent.glob("*.[ch]")) if sources else ():
+        digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
+    return digest.hexdigest()
+
+
+def stored(key: str, make: Callable[[Path], None], spare: Path) -> Path:
+    """Return the program of a key, made by `make` if it is not kept; in `spare` without a cache."""
+    try:
+        folder = cache_folder()
+        fault = cache_fault(folder)
+    except (OSError, RuntimeError) as error:  # no home folder
+        folder, fault = spare, str(error)
+    if fault:
+        log.warning("nothing is kept: %s", fault)
+        make(spare / "program")
+        return spare / "program"
+    target = folder / key
+    if _is_sound(target):
+        log.debug("compiled before: %s", target)
+        with suppress(OSError):
+            os.utime(target)
+        return target
+    make(spare / "program")
+    log.info("compiled: %s", target)
+    try:
+        _keep(spare / "program", target)
+        _tidy(folder)
+    except OSError as error:
+        log.warning("not kept: %s", error)
+        return spare / "program"
+    return target if os.access(target, os.X_OK) else spare / "program"
+
+
+def _is_sound(target: Path) -> bool:
+    """Tell whether a kept program is the user's own, whole, and may be run."""
+    try:
+        found = target.lstat()
+        wanted = _seal(target).read_text()
+        data = target.read_bytes()
+    except (OSError, UnicodeDecodeError):
+        return False
+    is_own = stat.S_ISREG(found.st_mode) and found.st_uid == os.getuid()
+    is_closed = not found.st_mode & 0o022
+    is_whole = hashlib.sha256(data).hexdigest() == wanted
+    return is_own and is_closed and is_whole and os.access(target, os.X_OK)
+
+
+def _keep(made: Path, target: Path) -> None:
+    """Copy a program and the digest of its bytes beside it, each whole or not at all."""
+    data = made.read_bytes()
+    seal = hashlib.sha256(data).hexdigest().encode()
+    for path, content, mode in ((target, data, 0o700), (_seal(target), seal, 0o600)):
+        handle, name = tempfile.mkstemp(dir=target.parent)
+        try:
+            with os.fdopen(handle, "wb") as file:
+                file.write(content)
+            os.chmod(name, mode)
+            os.replace(name, path)
+        except OSError:
+            Path(name).unlink(missing_ok=True)
+            raise
+
+
+def _seal(target: Path) -> Path:
+    return target.with_name(target.name + ".sha256")
+
+
+def _tidy(folder: Path) -> None:
+    programs = [path for path in folder.iterdir() if len(path.name) == 64]
+    if len(programs) <= MOST_PROGRAMS:
+        return
+    ages = sorted((time.time() - path.stat().st_mtime, path) for path in programs)
+    for age, path in ages[MOST_PROGRAMS:]:
+        if age > DAY:
+            path.unlink(missing_ok=True)
+            _seal(path).unlink(missing_ok=True)

@@ -1,0 +1,159 @@
+"""The cache of compiled programs: compiled once, never run when it could be another's."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from codegen import build, cache
+from codegen.build import FLAGS, executable, run_executable
+from lockstep.compare import compare
+from tests.lockstep.heater import heater, heater_tape
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    path = tmp_path / "cache" / "modewright"
+    monkeypatch.setenv("MODEWRIGHT_CACHE", str(path))
+    return path
+
+
+@pytest.fixture
+def compiled(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
+    """What was compiled, call by call."""
+    made: list[Path] = []
+    original = build.compile_program
+
+    def counting(sources: list[Path], target: Path, flags: tuple[str, ...] = FLAGS) -> None:
+        made.append(target)
+        original(sources, target, flags)
+
+    monkeypatch.setattr(build, "compile_program", counting)
+    return made
+
+
+def programs(folder: Path) -> list[Path]:
+    return [path for path in folder.iterdir() if len(path.name) == 64]
+
+
+def test_the_second_lockstep_run_compiles_nothing(folder: Path, compiled: list[Path]) -> None:
+    first, second = compare(heater_tape()), compare(heater_tape())
+    assert first == second and first.is_equal
+    assert len(compiled) == 1
+    assert folder.stat().st_mode & 0o777 == 0o700
+
+
+def test_other_flags_another_compiler_and_another_program_are_compiled(
+    folder: Path, compiled: list[Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for flags in (FLAGS, (*FLAGS, "-O1")):
+        with executable(heater(), flags):
+            pass
+    monkeypatch.setattr(build, "compiler_version", lambda: "another")
+    with executable(heater()):
+        pass
+    assert len(compiled) == len(programs(folder)) == 3
+
+
+def damage_truncated(target: Path) -> None:
+    target.write_bytes(target.read_bytes()[:100])
+
+
+def damage_replaced(target: Path) -> None:
+    target.write_text("#!/bin/sh\nexit 7\n")
+
+
+def damage_open(target: Path) -> None:
+    target.chmod(0o722)
+
+
+def damage_link(target: Path) -> None:
+    other = target.parent.parent / "other"
+    other.write_bytes(target.read_bytes())
+    other.chmod(0o700)
+    target.unlink()
+    target.symlink_to(other)
+
+
+def damage_seal(target: Path) -> None:
+    target.with_name(target.name + ".sha256").unlink()
+
+
+def damage_no_run(target: Path) -> None:
+    target.chmod(0o600)
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [damage_truncated, damage_replaced, damage_open, damage_link, damage_seal, damage_no_run],
+    ids=lambda damage: damage.__name__,
+)
+def test_a_damaged_program_is_compiled_anew(
+    damage: object, folder: Path, compiled: list[Path]
+) -> None:
+    compare(heater_tape())
+    (target,) = programs(folder)
+    assert callable(damage)
+    damage(target)
+    assert compare(heater_tape()).is_equal
+    assert len(compiled) == 2
+    assert compare(heater_tape()).is_equal
+    assert len(compiled) == 2, "what was damaged is replaced"
+
+
+def test_a_folder_that_others_may_write_is_not_used(folder: Path, compiled: list[Path]) -> None:
+    folder.mkdir(parents=True)
+    folder.chmod(0o777)
+    assert compare(heater_tape()).is_equal
+    assert compare(heater_tape()).is_equal
+    assert len(compiled) == 2
+    assert list(folder.iterdir()) == []
+    assert "open to other users" in cache.cache_fault(folder)
+
+
+def test_a_folder_of_another_user_is_not_used(
+    folder: Path, compiled: list[Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder.mkdir(parents=True, mode=0o700)
+    uid = os.getuid()
+    monkeypatch.setattr(os, "getuid", lambda: uid + 1)
+    assert compare(heater_tape()).is_equal
+    assert list(folder.iterdir()) == []
+    assert "another user" in cache.cache_fault(folder)
+
+
+def test_a_link_and_a_file_are_no_cache_folder(folder: Path, tmp_path: Path) -> None:
+    folder.parent.mkdir()
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir(mode=0o700)
+    folder.symlink_to(elsewhere)
+    assert "is not a folder" in cache.cache_fault(folder)
+    folder.unlink()
+    folder.write_text("")
+    assert cache.cache_fault(folder)
+    with executable(heater()) as target:
+        assert run_executable(target, b"") == b""
+
+
+def test_the_oldest_programs_go_after_a_day(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cache, "MOST_PROGRAMS", 1)
+    with executable(heater()):
+        pass
+    (old,) = programs(folder)
+    os.utime(old, (1.0, 1.0))
+    with executable(heater(), (*FLAGS, "-O1")) as new:
+        assert programs(folder) == [new]
+    assert len(list(folder.iterdir())) == 2, "its seal has gone too"
+
+
+def test_the_cache_is_below_the_users_cache_folder(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.delenv("MODEWRIGHT_CACHE")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    assert cache.cache_folder() == tmp_path / "modewright"
+    monkeypatch.setenv("XDG_CACHE_HOME", "relative")
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert cache.cache_folder() == tmp_path / ".cache" / "modewright"
