@@ -12,6 +12,7 @@ from language.operation import (
     Binary,
     Block,
     Call,
+    Choose,
     Expr,
     Ref,
     Select,
@@ -45,10 +46,17 @@ def jacobian(rates: Block, states: tuple[str, ...], constants: Mapping[str, Scal
     known: dict[str, Affine] = {name: Affine({}, float(value)) for name, value in constants.items()}
     known.update({f"work.at_{name}": Affine({name: 1.0}, 0.0) for name in states})
     for op in rates:
+        if isinstance(op, Choose):  # it depends on a region's mode: not known before
+            known.update({target: OTHER for target in _targets(op)})
+            continue
         assert isinstance(op, Assign)
         known[op.target] = _affine(op.value, known)
     rows = [known[f"work.rate_{name}"].slopes for name in states]
     return tuple(tuple(row.get(column, 0.0) for column in states) for row in rows)
+
+
+def _targets(choice: Choose) -> list[str]:
+    return [op.target for _, block in choice.cases for op in block if isinstance(op, Assign)]
 
 
 def _affine(expr: Expr, known: Mapping[str, Affine]) -> Affine:

@@ -86,20 +86,9 @@ def _variables(automaton: Automaton, field: Field) -> list[Variable]:
         *mode_and_fired(automaton, "micro-step"),
         *(Variable(f"memory.armed_{slot}", "truth") for slot in field.slots),
         *(Variable(f"memory.due_{slot}", "truth") for slot in field.slots),
-        *_reset_variables(automaton),
         *field_variables(field),
         Variable("work.merge", "real", "s", about="what crosses within it is one instant"),
     ]
-
-
-def _reset_variables(automaton: Automaton) -> list[Variable]:
-    found = {
-        name: Variable(f"work.reset_{name}", "real", str(automaton.states[name].unit.dimension))
-        for mode in automaton.all_modes
-        for transition in mode.transitions
-        for name in transition.reset
-    }
-    return list(found.values())
 
 
 def _selection(automaton: Automaton, infos: tuple[TransitionInfo, ...]) -> Selection:
@@ -113,7 +102,7 @@ def _selection(automaton: Automaton, infos: tuple[TransitionInfo, ...]) -> Selec
         due = Ref(f"memory.due_{slot}")
         return Binary("and", guard, due) if info_of(transition).timer else guard
 
-    return Selection(fired_variable, lambda transition: info_of(transition).number, enabled)
+    return Selection("jump", fired_variable, lambda transition: info_of(transition).number, enabled)
 
 
 def _jump(

@@ -88,6 +88,10 @@ def field_variables(field: Field) -> list[Variable]:
         kind = dimensions.get(name)
         found.append(Variable(f"work.at_{name}", "real" if kind else "truth", str(kind or "1")))
     found += [Variable(f"work.guard_{slot}", "truth") for slot in field.slots]
+    for mode in modes:
+        for name in (name for transition in mode.transitions for name in transition.reset):
+            unit = str(field.automaton.states[name].unit.dimension)
+            found.append(Variable(f"work.reset_{name}", "real", unit))
     return found
 
 

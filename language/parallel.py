@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from language.field import Field, enter, known_at, resets
 from language.lower import choice
-from language.model import Automaton, Mode, Region, Transition
+from language.model import Mode, Region, Transition
 from language.operation import Assign, Block, Branch, Choose, Expr, Op, Run, whole
 from language.region import by_priority, slot
 
@@ -23,19 +23,23 @@ class Selection:
     `enabled` is whether a transition may fire, given the ending of its guard's variables.
     """
 
+    verb: str
     taken: Callable[[str], str]
     number: Callable[[Transition], int]
     enabled: Callable[[Transition, str], Expr]
 
 
 def parallel_blocks(field: Field, selection: Selection) -> dict[str, Block]:
-    """Return `jump_<region>_<mode>` of the regions beside the chart, `commit_<region>` of all."""
+    """Return `<verb>_<region>_<mode>` of the regions beside the chart, `commit_<verb>_<region>`.
+
+    `verb` keeps those of a run apart from those of the automaton that runs.
+    """
     blocks: dict[str, Block] = {}
     for region in field.automaton.regions:
         for mode in region.modes.values():
-            blocks[f"jump_{mode.label}"] = _choose(field, mode, selection)
+            blocks[f"{selection.verb}_{mode.label}"] = _choose(field, mode, selection)
     for region in field.automaton.all_regions:
-        blocks[f"commit_{region.name}"] = (_commit(field, region, selection),)
+        blocks[_commit_name(selection, region)] = (_commit(field, region, selection),)
     return blocks
 
 
@@ -46,19 +50,15 @@ def parallel_step(field: Field, mode: Mode, selection: Selection) -> Block:
     ops += _choose(field, mode, selection)
     for region in mode.beside:
         others = region.modes.values()
-        cases: dict[str, Block] = {other.name: (Run(f"jump_{other.label}"),) for other in others}
+        cases: dict[str, Block] = {
+            other.name: (Run(f"{selection.verb}_{other.label}"),) for other in others
+        }
         ops.append(choice(region, known_at(field), cases))
-    return (*ops, *(Run(f"commit_{region.name}") for region in regions))
+    return (*ops, *(Run(_commit_name(selection, region)) for region in regions))
 
 
-def reset_writers(automaton: Automaton) -> dict[str, dict[str, Transition]]:
-    """Return, per state, a transition of each region that resets it."""
-    found: dict[str, dict[str, Transition]] = {}
-    for mode in automaton.all_modes:
-        for transition in mode.transitions:
-            for name in transition.reset:
-                found.setdefault(name, {}).setdefault(mode.region, transition)
-    return found
+def _commit_name(selection: Selection, region: Region) -> str:
+    return f"commit_{selection.verb}_{region.name}"
 
 
 def _choose(field: Field, mode: Mode, selection: Selection) -> Block:

@@ -20,7 +20,7 @@ from language.field import (
     switch,
 )
 from language.lower import constant_names, rounded, tunables_of
-from language.model import Automaton, Formula, Mode, Run as ModelRun
+from language.model import CHART, Automaton, Formula, Mode, Run as ModelRun
 from language.motion import MERGE, RUN_HALVINGS, Method, motion_blocks, motion_variables
 from language.operation import (
     Assign,
@@ -30,15 +30,19 @@ from language.operation import (
     Expr,
     FaultBit,
     Loop,
+    Op,
     Ref,
     Value,
     real,
     subtract,
     whole,
 )
+from language.parallel import Selection, parallel_blocks, parallel_step
 from language.problem import Problems
 from language.program import Constant, Variable
+from language.region import mode_variable
 from language.rk4 import rk4
+from language.wiring import enter_initial
 
 EVENT_LIMIT = "event_limit"
 MODE = "memory.run_mode"
@@ -78,10 +82,9 @@ def run_motion(
         **method.blocks,
         **motion_blocks(field, method, merge, RUN_HALVINGS, lambda mode: None),
     }
-    for mode in model.modes.values():
-        made[f"switch_{mode.name}"] = _switch(field, mode, problems)
+    made.update(_switches(field, problems))
     variables = (
-        Variable(MODE, "whole", about=f"mode of the run of {model.name}"),
+        *_modes(model),
         Variable("work.left", "real", "s", about="rest of the substep"),
         Variable("work.event", "whole"),
         Variable("work.substep", "whole"),
@@ -145,7 +148,7 @@ def _method(
         return rk4(field)
     h = float(automaton.period / run.substeps)
     formulas: list[Formula] = []
-    for mode in field.automaton.modes.values():
+    for mode in field.automaton.all_modes:
         formulas += mode.equations.values()
         for balance in mode.flow.values():
             formulas += [Formula(balance.left, ""), Formula(balance.right, "")]
@@ -153,10 +156,48 @@ def _method(
     return exponential(field, blocks, values, h, depends_on, run.span, problems)
 
 
-def _switch(field: Field, mode: Mode, problems: Problems) -> Block:
-    for transition in mode.transitions:
-        if transition.wait:
-            label = "a run inside a tick follows transitions without a wait only"
-            problems.error("run", transition.wait.span, label)
+def _switches(field: Field, problems: Problems) -> dict[str, Block]:
+    """Return `switch_<mode>`: one micro-step of the run's model."""
+    model = field.automaton
+    for mode in model.all_modes:
+        for transition in mode.transitions:
+            if transition.wait:
+                label = "a run inside a tick follows transitions without a wait only"
+                problems.error("run", transition.wait.span, label)
+    if not model.regions:
+        return {f"switch_{mode.name}": _switch(field, mode) for mode in model.modes.values()}
+    keys = [transition.key for mode in model.all_modes for transition in mode.transitions]
+    selection = Selection(
+        "switch",
+        lambda region: f"work.taken_{region}",
+        lambda transition: keys.index(transition.key) + 1,
+        lambda transition, slot: Ref(f"work.guard_{slot}"),
+    )
+    blocks = parallel_blocks(field, selection)
+    for mode in model.modes.values():
+        blocks[f"switch_{mode.name}"] = parallel_step(field, mode, selection)
+    return blocks
+
+
+def _switch(field: Field, mode: Mode) -> Block:
     enabled: dict[int, Expr] = {k: Ref(f"work.guard_{k}") for k in range(len(mode.transitions))}
     return switch(field, mode, enabled, {})
+
+
+def _modes(model: Automaton) -> list[Variable]:
+    """Return the variables of the modes of a run, and of what its regions take."""
+    found = []
+    for region in model.all_regions:
+        where = "" if region.name == CHART else f", region {region.name}"
+        about = f"mode of the run of {model.name}{where}"
+        found.append(Variable(mode_variable(MODE, region.name), "whole", about=about))
+        found.append(Variable(f"work.taken_{region.name}", "whole"))
+    return found
+
+
+def start_regions(model: Automaton) -> list[Op]:
+    """Return what puts the regions beside the chart of a run's model where they start.
+
+    A run enters a mode of the model's chart; the regions beside it go on from tick to tick.
+    """
+    return [op for op in enter_initial(model, MODE) if op.target != MODE]

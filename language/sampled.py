@@ -40,7 +40,7 @@ from language.program import (
     Variable,
 )
 from language.region import fired_variable, in_modes, mode_variable
-from language.run import EVENT_LIMIT, run_block, run_motion
+from language.run import EVENT_LIMIT, run_block, run_motion, start_regions
 from language.transition import enter_run, sampled_commit, sampled_jump, transition_infos
 from language.wiring import (
     assembled,
@@ -217,6 +217,8 @@ class _Sampled:
         initial = self.automaton.modes[self.automaton.initial]
         ops = initial_ops(self.automaton, self.now, self.prefix)
         ops += enter_initial(self.automaton, "memory.mode")
+        if self.automaton.model and any(mode.run for mode in self.automaton.modes.values()):
+            ops += start_regions(self.automaton.model)
         ops.append(Assign("memory.started", Value(True)))
         ops += enter_run(self.automaton, initial)
         if initial.name in self.observers:

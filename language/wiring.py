@@ -108,7 +108,7 @@ def none_fired(automaton: Automaton) -> list[Op]:
     return [Assign(fired_variable(region.name), whole(0)) for region in automaton.all_regions]
 
 
-def enter_initial(automaton: Automaton, base: str) -> list[Op]:
+def enter_initial(automaton: Automaton, base: str) -> list[Assign]:
     """Return what makes the initial modes active; `base` is the variable of the chart."""
     return [
         Assign(mode_variable(base, region.name), whole(region.modes[region.initial].number))
@@ -158,7 +158,7 @@ def assembled(
         period=automaton.period,
         major_step=automaton.period or automaton.step,
         constants=tuple(constants),
-        variables=tuple(variables),
+        variables=tuple({variable.name: variable for variable in variables}.values()),
         outputs=output_wires(automaton),
         modes=mode_infos(automaton.chart),
         regions=tuple(RegionInfo(r.name, mode_infos(r)) for r in automaton.regions),

@@ -18,7 +18,8 @@ def folder(tmp_path: Path) -> Path:
     """Write the driveline with its modes moved into a region `gap`, and the ideal system."""
     text = PLANT.read_text().replace("automaton: driveline", "automaton: driveline_beside")
     head, modes = text.split("initial: drive_contact\n")
-    modes, outputs = modes.split("outputs:")
+    modes, rest = modes.split("elements:")
+    _, outputs = rest.split("outputs:")
     inside = "".join(f"    {line}\n" for line in modes.splitlines())
     region = f"regions:\n  gap:\n    initial: drive_contact\n{inside}"
     spec = tmp_path / "spec"
@@ -58,3 +59,51 @@ def test_an_automaton_without_modes_has_one(folder: Path) -> None:
     automaton = used.instances["plant"].automaton
     assert [mode.name for mode in automaton.modes.values()] == ["always"]
     assert [region.name for region in automaton.all_regions] == ["chart", "gap"]
+
+
+FOLLOWER = """\
+language: 1
+automaton: follower
+period: 1 ms
+numbers: float64
+model: driveline_beside
+inputs: {T_em: {unit: N*m, range: [-400, 400]}, w_start: {unit: rad/s, range: [0, 400]}}
+states:
+  w_w:     {initial: 40 km/h / r_w, range: [-50, 300]}
+  w_em:    {initial: w_w * R, range: [-400, 2400]}
+  theta_d: {initial: 0.0740754719736 rad, range: [-0.5, 0.5]}
+  theta_b: {initial: alpha, range: [-0.2, 0.2]}
+equations: {free: in(driveline_beside.gap.no_contact)}
+modes:
+  going: {runs: {of: driveline_beside.always, method: rk4, substeps: 4, events: 8}}
+outputs: [w_w, w_em, theta_d, theta_b, free, mode]
+"""
+SYSTEM = """\
+language: 1
+system: both
+inputs: {T_req: {unit: N*m}}
+instances: {plant: {of: driveline_beside}, est: {of: follower}}
+connections: {plant.T_em: T_req, est.T_em: T_req, est.w_start: plant.w_w}
+"""
+
+
+def test_a_run_follows_the_regions_of_its_model(folder: Path) -> None:
+    spec = folder / "spec"
+    (spec / "follower.yaml").write_text(FOLLOWER)
+    (spec / "both.yaml").write_text(SYSTEM)
+    (spec / "both_tip_out.yaml").write_text(
+        "language: 1\nscenario: both_tip_out\nof: both\nhorizon: 2.5 s\n"
+        "initial: {plant.theta_d: 0.0740754719736 rad}\n"
+        "inputs: {T_req: {start: 30 N*m, steps: {0.479 s: -20 N*m}}}\n"
+    )
+    trajectory, verdicts = mw.lockstep("both", "both_tip_out", root=folder)
+    assert [verdict.differing for verdict in verdicts] == [0]
+    moved = [event for event in trajectory.events if event.instance == "plant"]
+    assert len(moved) == 10
+    signals = trajectory.signals
+    for name, tolerance in (("w_w", 1e-7), ("w_em", 1e-5), ("theta_d", 1e-7)):
+        off = np.abs(signals[f"plant.{name}"] - signals[f"est.{name}"])
+        assert off.max() < tolerance, (name, off.max())
+    free = signals["plant.gap"] == 0
+    assert (signals["est.free"] == free).mean() > 0.999
+    assert 0.01 < free.mean() < 0.99
