@@ -1,23 +1,47 @@
-"""Command explain: the Program that engine and generator share."""
+"""Command explain: a spec after each pass, with the place that every value came from."""
 
 from __future__ import annotations
 
+import json
 from typing import Annotated
 
 import typer
 
-from modewright.commands.options import Sets, values_of
+from modewright.commands.options import Json, Sets, values_of
+
+PASSES = ("document", "model", "program")
 
 
 def explain(
-    automaton: Annotated[str, typer.Argument(help="an automaton: name or file")], sets: Sets = None
+    spec: Annotated[str, typer.Argument(help="a spec: name or file")],
+    other: Annotated[
+        str | None, typer.Argument(help="a second one: what differs between the two")
+    ] = None,
+    stage: Annotated[
+        str, typer.Option("--pass", help="document (expanded), model (checked) or program")
+    ] = "document",
+    sets: Sets = None,
+    as_json: Json = False,
 ) -> None:
-    """Print the Program that engine and generator share.
+    """Print a spec with all variants and effects laid, and where each value came from.
 
     \b
-    modewright explain estimator
+    modewright explain driveline_load
+    modewright explain driveline driveline_load
+    modewright explain estimator --pass program
     """
-    from language.printing import program_text
-    from modewright import api
+    from modewright import explaining
 
-    print(program_text(api.program(automaton, values_of(sets))), end="")
+    if stage not in PASSES:
+        raise typer.BadParameter(f"one of {', '.join(PASSES)}", param_hint="--pass")
+    if as_json and stage != "document":
+        raise typer.BadParameter("the document only is printed as JSON", param_hint="--json")
+    values = values_of(sets)
+    if as_json and other:
+        print(json.dumps(explaining.compared_json(spec, other), indent=2))
+    elif as_json:
+        print(json.dumps(explaining.explained_json(spec), indent=2))
+    elif other:
+        print(explaining.compared(spec, other, stage, values), end="")  # type: ignore[arg-type]
+    else:
+        print(explaining.explained(spec, stage, values), end="")  # type: ignore[arg-type]

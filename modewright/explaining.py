@@ -1,0 +1,85 @@
+"""Explaining: a spec after each pass as text, and the difference of two."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+from language.document import Document
+from language.load import automaton_of, command_line_value, program_of
+from language.model_text import model_text
+from language.printing import program_text
+from language.problem import Problems, SpecError
+from language.project import Project, expanded, read_document
+from language.provenance import Row, difference_text, differences, rows, spec_text
+
+Pass = Literal["document", "model", "program"]
+Values = Mapping[str, str]
+
+
+def explained(spec: str, stage: Pass, values: Values, root: Path | None = None) -> str:
+    """Return a spec after a pass, as text. Raises SpecError."""
+    project = Project(root or Path())
+    document = read_document(project.path_of(spec))
+    if stage == "document":
+        return spec_text(_expanded(document, project).root)
+    given = {name: command_line_value(text) for name, text in values.items()}
+    automaton = automaton_of(document, project, given)
+    return model_text(automaton) if stage == "model" else program_text(program_of(automaton))
+
+
+def compared(spec: str, other: str, stage: Pass, values: Values, root: Path | None = None) -> str:
+    """Return what differs between two specs after a pass, as text. Raises SpecError."""
+    if stage == "document":
+        project = Project(root or Path())
+        old, new = (_named(name, project).root for name in (spec, other))
+        return difference_text(differences(old, new))
+    before, after = (explained(name, stage, values, root).splitlines() for name in (spec, other))
+    found = difflib.unified_diff(before, after, spec, other, lineterm="")
+    return "".join(f"{line}\n" for line in found)
+
+
+def explained_json(spec: str, root: Path | None = None) -> dict[str, Any]:
+    """Return the values of an expanded spec with their places, as plain data. Raises SpecError."""
+    document = _named(spec, Project(root or Path()))
+    found = [_row_json(row) for row in rows(document.root)]
+    return {"kind": document.kind, "name": document.name, "values": found}
+
+
+def compared_json(spec: str, other: str, root: Path | None = None) -> dict[str, Any]:
+    """Return what differs between two expanded specs, as plain data. Raises SpecError."""
+    project = Project(root or Path())
+    old, new = (_named(name, project).root for name in (spec, other))
+    found = [
+        {
+            "path": difference.path,
+            "old": _row_json(difference.old) if difference.old else None,
+            "new": _row_json(difference.new) if difference.new else None,
+        }
+        for difference in differences(old, new)
+    ]
+    return {"differences": found}
+
+
+def _named(spec: str, project: Project) -> Document:
+    return _expanded(read_document(project.path_of(spec)), project)
+
+
+def _expanded(document: Document, project: Project) -> Document:
+    problems = Problems()
+    made = expanded(document, project, problems)
+    if problems.has_errors:
+        raise SpecError(problems.found)
+    return made
+
+
+def _row_json(row: Row) -> dict[str, Any]:
+    return {
+        "path": row.path,
+        "value": row.value,
+        "place": row.origin.place,
+        "layer": row.origin.layer,
+        "changes": [{"place": o.place, "layer": o.layer} for o in row.changes],
+    }

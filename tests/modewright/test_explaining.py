@@ -1,0 +1,116 @@
+"""Explaining: a spec with the places of its values; the difference of two."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from language.load import load_automaton, program_of
+from language.printing import digest
+from language.project import Project
+from modewright.cli import app
+from modewright.explaining import compared, compared_json, explained, explained_json
+from tests.language.making import ROOT, SHIPPED, project_of
+
+CALM = """language: 1
+variant: calm
+extends: driveline
+parameters: {J_em: {value: 0.06 kg*m^2}}
+effects:
+  tyre_slip@vehicle: {values: {C_t: 50 kN*m}}
+"""
+WILD = "language: 1\nvariant: wild\nextends: calm\nparameters: {J_em: {value: 0.07 kg*m^2}}\n"
+
+
+@pytest.fixture
+def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Project:
+    monkeypatch.chdir(tmp_path)
+    return project_of(tmp_path, calm=CALM, wild=WILD)
+
+
+def values(spec: str) -> dict[str, dict[str, Any]]:
+    return {row["path"]: row for row in explained_json(spec)["values"]}
+
+
+@pytest.mark.parametrize("name", ["driveline", "estimator", "estimator_simple", "driveline_load"])
+def test_what_is_printed_can_be_read_again(name: str, tmp_path: Path) -> None:
+    printed = explained(name, "document", {}, ROOT)
+    (tmp_path / "spec").mkdir()
+    (tmp_path / "spec" / "again.yaml").write_text(printed, "utf-8")
+    again = program_of(load_automaton(name, Project(tmp_path)))
+    assert digest(again) == digest(program_of(load_automaton(name, SHIPPED)))
+
+
+def test_every_value_says_its_file_line_and_layer(project: Project) -> None:
+    found = values("wild")
+    inertia = found["parameters.J_em.value"]
+    assert (inertia["value"], inertia["place"], inertia["layer"]) == (
+        "0.07 kg*m^2",
+        "spec/wild.yaml:4",
+        "variant wild",
+    )
+    given = found["parameters.C_t_vehicle.value"]
+    assert (given["value"], given["place"], given["layer"]) == (
+        "50 kN*m",
+        "spec/calm.yaml:6",
+        "variant calm",
+    )
+    assert found["parameters.R.value"]["layer"] == "automaton driveline"
+    assert found["parameters.l_r_vehicle.value"]["layer"] == "effect tyre_slip@vehicle"
+    assert str(found["parameters.l_r_vehicle.value"]["place"]).endswith("tyre_slip.yaml:8")
+
+
+def test_a_rewritten_value_says_by_what(project: Project) -> None:
+    row = values("calm")["equations.T_aer"]
+    assert (row["value"], row["layer"]) == ("a_aer * r_w^3 * w_v_vehicle^2", "automaton driveline")
+    (change,) = row["changes"]
+    assert change["layer"] == "effect tyre_slip@vehicle"
+    assert change["place"].endswith("tyre_slip.yaml:16")
+
+
+def test_the_difference_of_two_is_by_key_path(project: Project) -> None:
+    found = {d["path"]: d for d in compared_json("calm", "wild")["differences"]}
+    assert set(found) == {"automaton", "parameters.J_em.value"}
+    assert found["parameters.J_em.value"]["old"]["value"] == "0.06 kg*m^2"
+    text = compared("calm", "wild", "document", {})
+    assert "- parameters.J_em.value: 0.06 kg*m^2" in text
+    assert "# spec/wild.yaml:4 (variant wild)" in text
+    assert compared("calm", "calm", "document", {}) == ""
+
+
+def test_what_one_of_two_has_is_told(project: Project) -> None:
+    found = {d["path"]: d for d in compared_json("driveline", "calm")["differences"]}
+    assert found["terms.w_w.tyre_vehicle"]["old"] is None
+    assert found["terms.w_w.tyre_vehicle"]["new"]["value"] == "-T_t_vehicle"
+
+
+def test_the_later_passes_are_printed_and_compared(project: Project) -> None:
+    model = explained("calm", "model", {})
+    assert "initial: w_w" in model
+    assert "value: 50000" in model
+    assert explained("calm", "program", {}).startswith("program calm\n")
+    text = compared("calm", "wild", "model", {})
+    assert "-      value: 0.06" in text and "+      value: 0.07" in text
+    text = compared("calm", "wild", "program", {})
+    assert "+calibration.J_em = 0.07" in text
+
+
+def test_a_system_a_scenario_and_a_map_are_explained() -> None:
+    for name in ("ev_driveline", "tip_out", "reference_trace"):
+        assert "(" in explained(name, "document", {}, ROOT)
+
+
+def test_the_command_prints_one_or_two(
+    project: Project, capsys: pytest.CaptureFixture[str]
+) -> None:
+    app(["explain", "calm", "--json"], standalone_mode=False)
+    assert json.loads(capsys.readouterr().out)["name"] == "calm"
+    app(["explain", "calm", "wild", "--json"], standalone_mode=False)
+    assert len(json.loads(capsys.readouterr().out)["differences"]) == 2
+    app(["explain", "calm", "wild"], standalone_mode=False)
+    assert len(capsys.readouterr().out.splitlines()) == 4
+    app(["explain", "calm", "--pass", "program"], standalone_mode=False)
+    assert capsys.readouterr().out.startswith("program calm")
