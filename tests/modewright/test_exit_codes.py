@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from modewright import api
+from modewright import explaining
 from modewright.cli import app
 from modewright.exits import exit_code
 
@@ -143,7 +143,7 @@ def test_a_defect_of_ours_is_4_with_a_report(
     def broken(*_: object) -> None:
         raise ZeroDivisionError("seven")
 
-    monkeypatch.setattr(api, "program", broken)
+    monkeypatch.setattr(explaining, "explained", broken)
     assert run("explain", "estimator") == 4
     first, second = capsys.readouterr().err.splitlines()
     assert first == "error: a defect of modewright: ZeroDivisionError: seven"
