@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable, Sequence
 from fractions import Fraction
+from typing import Protocol
 
 from engine.interpreter import Stepper
 from engine.trajectory import Event
@@ -15,6 +17,42 @@ EVENTS_PER_STEP = 100
 """More located events than this within one major step are Zeno behaviour (rule 12)."""
 
 
+class Around(Protocol):
+    """What surrounds a continuous automaton: who sets its inputs and who watches it."""
+
+    is_watching: bool
+
+    def aim(self, start: Fraction, stop: Fraction) -> None:
+        """Set the inputs for a flow from `start` to `stop`."""
+
+    def place(self, time: Fraction) -> None:
+        """Set the inputs to what they are at a time of that flow."""
+
+    def watch(self, time: Fraction) -> None:
+        """See the outputs at the start of a flow, and at its end before anything jumps."""
+
+    def look(self, time: Fraction) -> None:
+        """See the outputs at a time that was asked for."""
+
+
+class Alone:
+    """Surroundings in which nothing changes and nobody watches."""
+
+    is_watching = False
+
+    def aim(self, start: Fraction, stop: Fraction) -> None:
+        """Leave the inputs as they are."""
+
+    def place(self, time: Fraction) -> None:
+        """Leave the inputs as they are."""
+
+    def watch(self, time: Fraction) -> None:
+        """See nothing."""
+
+    def look(self, time: Fraction) -> None:
+        """See nothing."""
+
+
 class Stopped(Exception):
     """The run cannot go on: the message says what happened, where and when."""
 
@@ -23,9 +61,16 @@ class ContinuousRun:
     """One continuous automaton at one time: exact (a fraction of a second), with its timers."""
 
     def __init__(
-        self, name: str, program: Program, stepper: Stepper, log: Callable[[Event], None]
+        self,
+        name: str,
+        program: Program,
+        stepper: Stepper,
+        log: Callable[[Event], None],
+        around: Around | None = None,
     ) -> None:
         """Take the inputs from the stepper as they are; `start` enters the initial mode."""
+        self._around = around or Alone()
+        self._looks: deque[Fraction] = deque()
         self.name = name
         self.program = program
         self.stepper = stepper
@@ -46,11 +91,13 @@ class ContinuousRun:
         self.stepper.run("equations")
         self.is_settled = False
 
-    def flow_to(self, time: Fraction) -> None:
+    def flow_to(self, time: Fraction, looks: Sequence[Fraction] = ()) -> None:
         """Flow up to `time`, through every event before it. Raises Stopped.
 
-        An event at `time` itself is left to `settle`: inputs that step there come first.
+        An event at `time` itself is left to `settle`: inputs that step there come first. `looks`
+        are times before it at which the outputs are looked at; they change nothing.
         """
+        self._looks = deque(looks)
         step = self.program.major_step
         while self.time < time:
             boundary = (self.time // step + 1) * step
@@ -76,6 +123,7 @@ class ContinuousRun:
         self.stepper.run("watch")
         self._start_timers()
         self.stepper.run("equations")
+        self._around.watch(self.time)
         self.is_settled = True
 
     def _taken(self) -> list[TransitionInfo]:
@@ -102,6 +150,7 @@ class ContinuousRun:
             stop = end if due is None else min(end, max(due, self.time))
             crossed = self._flow(stop)
             if not crossed and (due is None or self.time < due):
+                self._look_here(horizon)
                 continue
             located += 1
             if located > EVENTS_PER_STEP:
@@ -109,6 +158,7 @@ class ContinuousRun:
                 raise Stopped(f"{self._here()}: {text}: {_fired(self._in_step)}")
             if self.time < horizon:
                 self.settle()
+                self._look_here(horizon)
             else:
                 self.is_settled = False
 
@@ -121,13 +171,51 @@ class ContinuousRun:
         self.stepper.set("work.h", h)
         merge = MERGE * float(max(stop, self.program.major_step))
         self.stepper.set("work.merge", merge)
+        start, states = self.time, self._read_states()
+        self._around.aim(start, stop)
         self.stepper.run("flow")
         self._require_finite()
         crossed = bool(self.stepper.get("work.crossed"))
         elapsed = self.stepper.get("work.elapsed")
         at_end = not crossed or h - elapsed <= merge
         self.time = stop if at_end else self.time + Fraction(elapsed)
+        if self._looks and self._looks[0] < self.time:
+            self._look_inside(start, stop, states)
+        self._around.place(self.time)
+        if self._around.is_watching:
+            self.stepper.run("equations")
+            self._around.watch(self.time)
         return crossed
+
+    def _look_inside(self, start: Fraction, stop: Fraction, states: Sequence[float]) -> None:
+        """Look at times inside the flow that was just done: from its start by the method alone.
+
+        So what is recorded has no influence: states and inputs are put back as they were.
+        """
+        ends = self._read_states()
+        while self._looks and self._looks[0] < self.time:
+            time = self._looks.popleft()
+            self._put(states)
+            self._around.aim(start, stop)
+            self.stepper.set("work.h", float(time - start))
+            self.stepper.run("peek")
+            self._look(time)
+        self._put(ends)
+
+    def _look_here(self, horizon: Fraction) -> None:
+        """Look at the present time if it was asked for, after all its jumps."""
+        if self._looks and self._looks[0] == self.time < horizon:
+            self._looks.popleft()
+            self._look(self.time)
+
+    def _look(self, time: Fraction) -> None:
+        self._around.place(time)
+        self.stepper.run("equations")
+        self._around.look(time)
+
+    def _put(self, states: Sequence[float]) -> None:
+        for name, value in zip(self._states, states, strict=True):
+            self.stepper.set(name, value)
 
     def _is_active(self, info: TransitionInfo) -> bool:
         return bool(self.stepper.get(self._modes[info.region]) == info.source)

@@ -31,7 +31,7 @@ Path = Callable[[float], Point]
 """The states in SI at a time [s] since the start of a flow."""
 Reals = NDArray[np.float64]
 
-OWN_MOTION = ("flow", "point", "move_", "step_", "series_", "locate_")
+OWN_MOTION = ("flow", "peek", "point", "move_", "step_", "series_", "locate_")
 """What the blocks that integrate or locate are named, or how their names begin."""
 RTOL = 1e-11
 """Local error per step over the largest value so far: 2^-53 with five digits for sums of steps."""
@@ -139,6 +139,9 @@ class LibraryStepper:
         self._rates = self._inner.reader(tuple(f"work.rate_{name}" for name in self._names))
         self._sizes = np.full(len(names), SMALLEST_SCALE)
         self._time = 0.0
+        self._is_timed = any(v.name == "work.s" for v in self._inner.program.variables) and any(
+            v.name.startswith("work.rise_") for v in program.variables
+        )
         self._guards = {}
         for mode in program.modes:
             count = sum(1 for t in program.transitions if t.source == mode.number)
@@ -162,6 +165,8 @@ class LibraryStepper:
         """Run a block, `flow` by scipy."""
         if block == "flow":
             self._flow(self.get("work.h"))
+        elif block == "peek":
+            self._peek(self.get("work.h"))
         else:
             self._inner.run(block)
 
@@ -177,10 +182,16 @@ class LibraryStepper:
         self.set("work.crossed", change is not None)
         self._time += elapsed
 
+    def _peek(self, h: float) -> None:
+        """Move the states over h [s], whatever the guards do."""
+        mode = self.program.mode_name(self.get("memory.mode"))
+        for name, value in zip(self._names, self._path(mode, h)(h), strict=True):
+            self.set(f"state.{name}", value)
+
     def _path(self, mode: str, h: float) -> Path:
         """Return the solution from the states over h [s]. Raises Stopped where there is none."""
         start: Point = list(self._states())
-        first = self._rates_at(mode, start)
+        first = self._rates_at(mode, start, 0.0)
         for name, value, rate in zip(self._names, start, first, strict=True):
             if not (math.isfinite(value) and math.isfinite(rate)):
                 raise Stopped(f"{self._here(mode)}: state `{name}` is {value}, its rate {rate}")
@@ -207,12 +218,12 @@ class LibraryStepper:
         """
         evaluations = 0
 
-        def rates(_: float, point: Reals) -> Point:
+        def rates(time: float, point: Reals) -> Point:
             nonlocal evaluations
             evaluations += 1
             if evaluations > EVALUATIONS:
                 raise Stopped(f"{self._here(mode)}: more than {EVALUATIONS} rates in one flow")
-            return self._rates_at(mode, point.tolist())
+            return self._rates_at(mode, point.tolist(), float(time))
 
         tolerances = {"rtol": RTOL, "atol": RTOL * self._sizes}
         with np.errstate(over="ignore", invalid="ignore"):  # such a step is rejected by its error
@@ -230,7 +241,7 @@ class LibraryStepper:
         low = 0.0
         for look in range(1, LOOKS + 1):
             high = h * (look / LOOKS)
-            if self._changed(mode, path(high)):
+            if self._changed(mode, path(high), high):
                 return self._halved(mode, path, low, high)
             low = high
         return None
@@ -239,24 +250,26 @@ class LibraryStepper:
         """Return the upper end of the bracket (low, high] [s]: a guard has changed there."""
         for _ in range(HALVINGS):
             middle = 0.5 * (low + high)
-            if self._changed(mode, path(middle)):
+            if self._changed(mode, path(middle), middle):
                 high = middle
             else:
                 low = middle
         return high
 
-    def _changed(self, mode: str, point: Point) -> bool:
+    def _changed(self, mode: str, point: Point, time: float) -> bool:
         now, armed = self._guards[mode]
-        self._put(point)
+        self._put(point, time)
         self._inner.run(f"guards_{mode}")
         return now() != armed()
 
-    def _rates_at(self, mode: str, point: Point) -> Point:
-        self._put(point)
+    def _rates_at(self, mode: str, point: Point, time: float) -> Point:
+        self._put(point, time)
         self._inner.run(f"rates_{mode}")
         return list(self._rates())
 
-    def _put(self, point: Point) -> None:
+    def _put(self, point: Point, time: float) -> None:
+        if self._is_timed:
+            self._inner.set("work.s", time)
         for name, value in zip(self._names, point, strict=True):
             self._inner.set(f"work.at_{name}", value)
 

@@ -75,6 +75,10 @@ def used_columns(automaton: Automaton, mapping: RecordingMap) -> tuple[list[str]
         if thing.name in fed:
             problems.error("duplicate", column.span, f"input `{thing.name}` is fed twice")
         fed.add(thing.name)
+        if column.hold == "linear":
+            label = f"column `{column.name}` is held `linear`: a replay reads the latest"
+            hint = "`hold: previous`; linear is for a scenario's `recording`"
+            problems.error("form", column.span, label, hint)
         used.append(column.name)
     for name, thing in automaton.inputs.items():
         if name not in fed and thing.default is None:

@@ -2,30 +2,26 @@
 
 from __future__ import annotations
 
-import dataclasses
-import heapq
-import itertools
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
+from functools import partial
 from typing import Any
-
-import numpy as np
 
 from engine.continuous import ContinuousRun, Stopped
 from engine.interpreter import Interpreter, Stepper
-from engine.trajectory import Event, Trajectory, column_array, fault_names
-from language.load import program_of
-from language.model import CHART, Automaton, Formula, Scenario, Stimulus, System
-from language.problem import Problems, Source, Span, SpecError
+from engine.rows import Rows, recorded
+from engine.schedule import Schedule
+from engine.signals import Signals
+from engine.starting import programs_of
+from engine.stimulus import resolved
+from engine.surroundings import Surroundings
+from engine.trajectory import Event, Trajectory, fault_names
+from language.model import CHART, Connection, Scenario, System
 from language.program import Program
-from language.syntax import Number
-from language.units import NO_UNIT
 
 Build = Callable[[Program], Stepper]
 Ticked = Callable[[str, Program, Stepper], None]
-MAX_INSTANTS = 100_000_000
-"""Most ticks and rows of one run: about an hour of the interpreter."""
 
 
 def simulate(
@@ -34,31 +30,10 @@ def simulate(
     """Return the trajectory of a system through a scenario.
 
     `build` makes the steppers (the interpreter, or a compiled one with the same protocol);
-    `ticked` is called after each tick of a sampled instance.
+    `ticked` is called after each tick of a sampled instance. Raises SpecError for what is wrong
+    with a recording.
     """
-    return _Simulation(system, scenario, build, ticked).run()
-
-
-def programs_of(system: System, scenario: Scenario) -> dict[str, Program]:
-    """Return the Program of each instance, with the scenario's start values."""
-    found = {}
-    for name, instance in system.instances.items():
-        start = {
-            key.partition(".")[2]: value
-            for key, value in scenario.initial.items()
-            if key.partition(".")[0] == name
-        }
-        found[name] = program_of(_started(instance.automaton, start))
-    return found
-
-
-def _started(automaton: Automaton, start: Mapping[str, Fraction]) -> Automaton:
-    states = dict(automaton.states)
-    nowhere = Span(Source("scenario"), 1, 1)
-    for name, value in start.items():
-        formula = Formula(Number(value, NO_UNIT, nowhere), f"states.{name}.initial")
-        states[name] = dataclasses.replace(states[name], initial=formula)
-    return dataclasses.replace(automaton, states=states)
+    return _Simulation(system, resolved(system, scenario), build, ticked).run()
 
 
 class _Simulation:
@@ -71,128 +46,159 @@ class _Simulation:
         self.scenario = scenario
         self.ticked = ticked
         self.programs = programs_of(system, scenario)
+        self.schedule = Schedule(system, scenario, self.programs)
         self.steppers = {name: build(program) for name, program in self.programs.items()}
+        self.signals = Signals(system, scenario, self.programs, self.steppers)
+        self.rows = Rows(recorded(system, scenario, self.programs))
         self.events: list[Event] = []
-        self.flows = {
-            name: ContinuousRun(name, program, self.steppers[name], self.events.append)
+        self.wires: dict[str, list[Connection]] = {name: [] for name in self.programs}
+        for (owner, _), connection in system.connections.items():
+            self.wires[owner].append(connection)
+        self.seen: dict[tuple[str, str, str], int] = {}
+        self.flags = {
+            f"{name}.{variable.name}"
             for name, program in self.programs.items()
-            if program.period is None
+            for variable in program.variables
+            if variable.name.startswith("is_new.")
         }
-        self.ticks = dict.fromkeys(self.programs, 0)
-        self.inputs = {name: 0.0 for name in system.inputs}
-        self.wires = self._wires()
-        self.columns = {
-            f"{name}.{wire.name}": (name, wire)
-            for name, program in self.programs.items()
-            for wire in program.outputs
-        }
-        self.rows: list[tuple[Any, ...]] = []
-        self.times: list[Fraction] = []
+        self.around: dict[str, Surroundings] = {}
+        self.flows: dict[str, ContinuousRun] = {}
+        for name, program in self.programs.items():
+            if program.period is None:
+                self._add_flow(name, program)
+
+    def _add_flow(self, name: str, program: Program) -> None:
+        stepper, log = self.steppers[name], self.events.append
+        around = Surroundings(name, stepper, self.signals, self.wires[name], program)
+        self.around[name] = around
+        self.flows[name] = ContinuousRun(name, program, stepper, log, around)
 
     def run(self) -> Trajectory:
+        """Run to the horizon, or until something stops the run: what was done is kept."""
         stopped = None
+        rows = iter(self.schedule.rows)
+        row = next(rows)
         try:
             self._start()
-            for time in self._instants():
+            for time in self.schedule.instants():
+                between = []
+                while row < time:
+                    between.append(row)
+                    row = next(rows)
+                self._flow_to(time, between)
                 self._instant(time)
+                if row == time:
+                    self.rows.add(time, self.signals.now, self.signals.formula)
+                    row = next(rows)
         except Stopped as reason:
             stopped = str(reason)
         return self._trajectory(stopped)
 
-    def _wires(self) -> dict[str, list[tuple[str, str | float]]]:
-        """Per instance: its inputs and what they read."""
-        found: dict[str, list[tuple[str, str | float]]] = {name: [] for name in self.programs}
-        for (owner, name), connection in self.system.connections.items():
-            source = connection.source
-            value = float(source) if isinstance(source, Fraction) else source
-            found[owner].append((f"input.{name}", value))
-        for owner, program in self.programs.items():
-            connected = {name for name, _ in found[owner]}
-            for name, default in program.defaults.items():
-                if f"input.{name}" not in connected:
-                    found[owner].append((f"input.{name}", default))
-        return found
-
     def _start(self) -> None:
         for name, program in self.programs.items():
+            stepper = self.steppers[name]
             for variable in program.inputs:
-                self.steppers[name].set(variable.name, 0.0)
+                stepper.set(variable.name, False if variable.type == "truth" else 0.0)
+            for key, default in program.defaults.items():
+                stepper.set(f"input.{key}", default)
             for variable in program.variables:
                 if variable.name.startswith("is_new."):
-                    self.steppers[name].set(variable.name, True)
-        self._read_inputs(Fraction(0))
+                    stepper.set(variable.name, True)
+        for line in self.signals.lines.values():
+            if line.course is None:
+                line.put(Fraction(0), self.signals.now(line.line.source))
         for name, flow in self.flows.items():
-            self._feed(name)
+            self._feed(name, Fraction(0))
             flow.start()
 
-    def _instants(self) -> Iterator[Fraction]:
-        """Yield every instant at which an input steps, an instance ticks or a row is kept."""
-        horizon = self.scenario.horizon
-        steps = {time for s in self.scenario.inputs.values() for time, _ in s.steps}
-        grids = [(Fraction(0), self.scenario.every)]
-        for name, program in self.programs.items():
-            if program.period is not None:
-                grids.append((self.system.instances[name].offset, program.period))
-        count = sum(max(0, int((horizon - start) // period) + 1) for start, period in grids)
-        if count > MAX_INSTANTS:
-            label = f"the scenario has {count} ticks and rows; at most {MAX_INSTANTS} are run"
-            problems = Problems()
-            problems.error("range", self.scenario.span, label, "a shorter `horizon`")
-            raise SpecError(problems.found)
-        last = None
-        for time in heapq.merge(sorted(steps), *(_grid(*grid) for grid in grids)):
-            if time > horizon:
-                return
-            if time != last:
-                yield time
-            last = time
+    def _flow_to(self, time: Fraction, between: Sequence[Fraction]) -> None:
+        """Flow all continuous instances up to an instant, and keep the rows before it."""
+        try:
+            for flow in self.flows.values():
+                flow.flow_to(time, between)
+        finally:
+            self._keep(between)
+
+    def _keep(self, between: Sequence[Fraction]) -> None:
+        """Keep the rows that every continuous instance has reached."""
+        for row in between:
+            found: dict[str, Any] = {}
+            for around in self.around.values():
+                if row not in around.looked:
+                    return
+                found.update(around.looked.pop(row))
+            self.rows.add(row, partial(self._seen_at, row, found), self.signals.formula)
+
+    def _seen_at(self, row: Fraction, found: Mapping[str, Any], name: str) -> Any:
+        return found[name] if name in found else self.signals.at(row, row)(name)
 
     def _instant(self, time: Fraction) -> None:
-        for flow in self.flows.values():
-            flow.flow_to(time)
-        self._read_inputs(time)
+        """Flow has ended: inputs take their new values, then jumps, then ticks in their order."""
+        self.signals.read_inputs(time)
         for name in self.flows:
             if time > 0 or not self._is_controlled(name):
                 self._update_flow(name, time)
+        if time == 0:
+            for run in self.signals.sensors.values():
+                run.start(self.signals.now(run.sensor.source))
         for name in self.system.order:
-            if self._ticks_at(name, time):
+            if name in self.schedule.samples and self.schedule.samples[name].has(time):
+                self._sample(name, time)
+            elif name in self.schedule.ticks and self.schedule.ticks[name].has(time):
                 self._tick(name, time)
         for name in self.flows:
             self._update_flow(name, time)
-        if time % self.scenario.every == 0:
-            self.times.append(time)
-            self.rows.append(
-                tuple(self._value(name, wire.source) for name, wire in self.columns.values())
-            )
+        for name in self.schedule.captured(time):
+            self._capture(name, time)
 
-    def _read_inputs(self, time: Fraction) -> None:
-        for name, stimulus in self.scenario.inputs.items():
-            self.inputs[name] = _at(stimulus, time)
+    def _sample(self, name: str, time: Fraction) -> None:
+        run = self.signals.sensors[name]
+        run.sample(time, self.signals.now(run.sensor.source))
+        self._put_into_lines([name], time)
 
-    def _feed(self, name: str) -> bool:
+    def _capture(self, name: str, time: Fraction) -> None:
+        """Keep a signal that arrives later, as it is when everything at an instant has happened."""
+        if name in self.signals.sensors:
+            run = self.signals.sensors[name]
+            run.capture(time, self.signals.now(run.sensor.source))
+        else:
+            line = self.signals.lines[name]
+            line.put(time, self.signals.now(line.line.source))
+
+    def _put_into_lines(self, sources: Sequence[str], time: Fraction) -> None:
+        for line in self.signals.lines.values():
+            if line.line.source in sources:
+                line.put(time, self.signals.now(line.line.source))
+
+    def _feed(self, name: str, time: Fraction) -> bool:
         """Set the inputs of an instance; tell whether one changed."""
         stepper, changed = self.steppers[name], False
-        for target, source in self.wires[name]:
-            value = self._source(source)
-            if stepper.get(target) != value:
-                stepper.set(target, value)
+        for connection in self.wires[name]:
+            thing = connection.target[1]
+            value = self.signals.connected(connection)
+            if self.system.instances[name].automaton.inputs[thing].truth:
+                value = bool(value)
+            elif not math.isfinite(value):
+                raise Stopped(f"{self._where(name, time)}: input `{thing}` is {value}")
+            if stepper.get(f"input.{thing}") != value:
+                stepper.set(f"input.{thing}", value)
                 changed = True
         return changed
 
-    def _source(self, source: str | float) -> Any:
-        if not isinstance(source, str):
-            return source
-        if source in self.inputs:
-            return self.inputs[source]
-        owner, wire = self.columns[source]
-        return self._value(owner, wire.source)
-
-    def _value(self, owner: str, variable: str) -> Any:
-        return self.steppers[owner].get(variable)
+    def _flag_new(self, name: str) -> None:
+        """A measured input is new where a sensor that it reads has sampled since the last tick."""
+        for connection in self.wires[name]:
+            thing = connection.target[1]
+            read = [sensor for sensor in connection.reads if sensor in self.schedule.samples]
+            if read and f"{name}.is_new.{thing}" in self.flags:
+                counts = {sensor: self.signals.sensors[sensor].count for sensor in read}
+                news = [self.seen.get((name, thing, s), 0) != count for s, count in counts.items()]
+                self.seen.update({(name, thing, s): count for s, count in counts.items()})
+                self.steppers[name].set(f"is_new.{thing}", any(news))
 
     def _update_flow(self, name: str, time: Fraction) -> None:
         """An input that changed is an event: guards are read again (rule 11)."""
-        changed, flow = self._feed(name), self.flows[name]
+        changed, flow = self._feed(name, time), self.flows[name]
         if changed and time == 0:
             flow.start()
         if changed or not flow.is_settled:
@@ -202,20 +208,18 @@ class _Simulation:
 
     def _is_controlled(self, name: str) -> bool:
         """Tell whether an input reads a sampled instance: its first value is that of tick 0."""
-        sources = [source for _, source in self.wires[name] if isinstance(source, str)]
-        return any(source in self.columns for source in sources)
-
-    def _ticks_at(self, name: str, time: Fraction) -> bool:
-        period = self.programs[name].period
-        if period is None:
-            return False
-        since = time - self.system.instances[name].offset
-        return since >= 0 and since % period == 0
+        reads = [read for connection in self.wires[name] for read in connection.reads]
+        return any(read.partition(".")[0] in self.programs for read in reads)
 
     def _tick(self, name: str, time: Fraction) -> None:
         stepper, program = self.steppers[name], self.programs[name]
-        self._feed(name)
+        sources = [f"{name}.{wire.name}" for wire in program.outputs]
+        self._feed(name, time)
+        self._flag_new(name)
+        self._move_lags(sources, time)
         stepper.run("step")
+        self._move_lags(sources, time)
+        self._put_into_lines(sources, time)
         for variable in program.fired_variables():
             fired = stepper.get(variable)
             if fired:
@@ -224,30 +228,32 @@ class _Simulation:
                 self.events.append(
                     Event(float(time), 0, name, info.name, modes[0], modes[1], info.region)
                 )
-        self.ticks[name] += 1
         if self.ticked:
             self.ticked(name, program, stepper)
         self._require_finite(name, time)
+
+    def _move_lags(self, sources: Sequence[str], time: Fraction) -> None:
+        for run in self.signals.sensors.values():
+            if run.sensor.lag and run.sensor.source in sources:
+                run.lag.move(time, self.signals.now(run.sensor.source))
 
     def _require_finite(self, name: str, time: Fraction) -> None:
         stepper = self.steppers[name]
         for wire in self.programs[name].outputs:
             value = stepper.get(wire.source)
             if isinstance(value, float) and not math.isfinite(value):
-                mode = self.programs[name].mode_name(stepper.get("memory.mode"))
-                where = f"t = {float(time):.9g} s, `{name}` in mode `{mode}`"
-                raise Stopped(f"{where}: output `{wire.name}` is {value}")
+                raise Stopped(f"{self._where(name, time)}: output `{wire.name}` is {value}")
+
+    def _where(self, name: str, time: Fraction) -> str:
+        mode = self.programs[name].mode_name(self.steppers[name].get("memory.mode"))
+        return f"t = {float(time):.9g} s, `{name}` in mode `{mode}`"
 
     def _trajectory(self, stopped: str | None) -> Trajectory:
-        columns = list(zip(*self.rows, strict=True)) if self.rows else [()] * len(self.columns)
-        signals = {}
-        for (key, (_, wire)), values in zip(self.columns.items(), columns, strict=True):
-            signals[key] = column_array(wire.type, values)
         return Trajectory(
             name=self.scenario.name,
-            times=np.array([float(time) for time in self.times]),
-            signals=signals,
-            units={key: wire.unit for key, (_, wire) in self.columns.items()},
+            times=self.rows.seconds(),
+            signals=self.rows.signals(),
+            units=self.rows.units(),
             modes={
                 f"{name}.{'mode' if region == CHART else region}": {
                     mode.number: mode.name for mode in program.modes_of(region)
@@ -264,17 +270,3 @@ class _Simulation:
                 for fault in fault_names(name, program, self.steppers[name].get("memory.faults"))
             ),
         )
-
-
-def _at(stimulus: Stimulus, time: Fraction) -> float:
-    """Return the value of a right-continuous step function."""
-    value = stimulus.steps[0][1]
-    for start, later in stimulus.steps:
-        if start <= time:
-            value = later
-    return value.numerator / value.denominator
-
-
-def _grid(start: Fraction, period: Fraction) -> Iterator[Fraction]:
-    """Yield start, start + period, start + 2 periods ... exactly."""
-    return (start + k * period for k in itertools.count())

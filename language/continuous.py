@@ -1,14 +1,20 @@
 """Continuous: a continuous automaton as a Program that an engine moves from event to event.
 
 Entries: `init` (start values from the inputs), `equations` (the values of now), `watch` (what each
-guard is now), `jump` (one micro-step: `memory.fired` is the transition, 0 if none) and `flow`
-(states over `work.h`, up to the first change of a guard, after `work.elapsed`).
+guard is now), `jump` (one micro-step: `memory.fired` is the transition, 0 if none), `flow`
+(states over `work.h`, up to the first change of a guard, after `work.elapsed`) and `peek` (states
+over `work.h`, whatever the guards do: to look at a point inside a step without ending it).
+
+An input that varies inside a step is `input.u + s (work.rise_u + s work.bend_u)` at the time s of
+the step: a parabola through its values at the ends and the middle, the times of RK4's stages.
 """
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 from language.constants import derive_block, parameter_constants
-from language.field import Field, at_state, by_mode, field_blocks, field_variables, switch
+from language.field import Field, at_state, at_time, by_mode, field_blocks, field_variables, switch
 from language.lower import constant_names, equations
 from language.model import Automaton, Mode, Transition
 from language.motion import FLOW_HALVINGS, motion_blocks, motion_variables
@@ -20,6 +26,9 @@ from language.operation import (
     Expr,
     Ref,
     Run,
+    add,
+    multiply,
+    real,
     whole,
 )
 from language.parallel import Selection, parallel_blocks, parallel_step
@@ -41,11 +50,16 @@ from language.wiring import (
 
 BETWEEN = ("work.h", "work.merge", "work.elapsed", "work.crossed")
 """What an engine sets before `flow` and reads after it."""
-ENTRIES = ("init", "derive", "equations", "watch", "jump", "flow")
+ENTRIES = ("init", "derive", "equations", "watch", "jump", "flow", "peek")
 
 
-def continuous_program(automaton: Automaton, problems: Problems) -> Program:
-    """Return the Program of a checked continuous automaton. Raises SpecError."""
+def continuous_program(
+    automaton: Automaton, problems: Problems, varying: Collection[str] = ()
+) -> Program:
+    """Return the Program of a checked continuous automaton. Raises SpecError.
+
+    `varying` names the inputs that change inside a step.
+    """
     parameters = parameter_constants(automaton, problems)
     transitions = transition_infos(automaton, problems)
     inputs: dict[str, Expr] = {name: Ref(f"input.{name}") for name in automaton.inputs}
@@ -56,7 +70,8 @@ def continuous_program(automaton: Automaton, problems: Problems) -> Program:
         **states,
         **in_modes(automaton, "memory.mode"),
     }
-    field = Field(automaton, known, inputs, "memory.mode", f"{automaton.name} ")
+    moving = {**inputs, **{name: _parabola(name) for name in varying}}
+    field = Field(automaton, known, moving, "memory.mode", f"{automaton.name} ", bool(varying))
     method = rk4(field)
     armed = {slot: f"memory.armed_{slot}" for slot in field.slots}
     selection = _selection(automaton, transitions)
@@ -75,8 +90,19 @@ def continuous_program(automaton: Automaton, problems: Problems) -> Program:
     problems.stop_if_any()
     constants = (*parameters.values(), *method.constants)
     variables = [*_variables(automaton, field), *motion_variables(field, method)]
+    variables += [Variable(name, "real") for name in _courses(varying)]
     program = assembled(automaton, blocks, constants, variables, transitions)
-    return finished(program, ENTRIES, keep=BETWEEN)
+    return finished(program, ENTRIES, keep=(*BETWEEN, *_courses(varying)))
+
+
+def _parabola(name: str) -> Expr:
+    s, bend = Ref("work.s"), Ref(f"work.bend_{name}")
+    inner = add(Ref(f"work.rise_{name}"), multiply(s, bend))
+    return add(Ref(f"input.{name}"), multiply(s, inner))
+
+
+def _courses(varying: Collection[str]) -> list[str]:
+    return [f"work.{part}_{name}" for name in varying for part in ("rise", "bend")]
 
 
 def _variables(automaton: Automaton, field: Field) -> list[Variable]:
@@ -122,6 +148,8 @@ def _jump(
 
 
 def _entries(automaton: Automaton, field: Field, known: dict[str, Expr]) -> dict[str, Block]:
+    now = (*at_state(field), *at_time(field, real(0.0)))
+    ends = [Assign(f"state.{name}", Ref(f"work.end_{name}")) for name in field.states]
     watch = tuple((mode.number, _watch(mode)) for mode in automaton.modes.values())
     return {
         "derive": derive_block(automaton),
@@ -130,9 +158,10 @@ def _entries(automaton: Automaton, field: Field, known: dict[str, Expr]) -> dict
             *enter_initial(automaton, "memory.mode"),
         ),
         "equations": (by_mode(field, "equations"),),
-        "watch": (*at_state(field), Choose("memory.mode", watch)),
-        "jump": (*none_fired(automaton), *at_state(field), by_mode(field, "jump")),
+        "watch": (*now, Choose("memory.mode", watch)),
+        "jump": (*none_fired(automaton), *now, by_mode(field, "jump")),
         "flow": (by_mode(field, "move"),),
+        "peek": (by_mode(field, "step"), *ends),
     }
 
 

@@ -39,7 +39,8 @@ from language.region import (
 class Field:
     """A continuous automaton where it moves: on its own, or as a run inside a tick.
 
-    `inputs` are what its inputs read; `mode` is the variable that holds its mode.
+    `inputs` are what its inputs read; `mode` is the variable that holds its mode; `timed` says
+    whether an input changes with `work.s`, the time since the start of the step.
     """
 
     automaton: Automaton
@@ -47,6 +48,7 @@ class Field:
     inputs: Names
     mode: str
     prefix: str
+    timed: bool = False
 
     @property
     def states(self) -> tuple[str, ...]:
@@ -115,6 +117,11 @@ def all_known_at(field: Field) -> dict[str, Expr]:
 def at_state(field: Field) -> list[Op]:
     """Return the operations that put the point where the states are."""
     return [Assign(f"work.at_{name}", Ref(f"state.{name}")) for name in field.states]
+
+
+def at_time(field: Field, time: Expr) -> list[Op]:
+    """Return the operations that put the inputs where they are at a time of the step [s]."""
+    return [Assign("work.s", time)] if field.timed else []
 
 
 def by_mode(field: Field, verb: str) -> Choose:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 from language.automaton import read_automaton
 from language.check import check_automaton
@@ -36,12 +36,15 @@ def load_automaton(
     return automaton_of(read_document(project.path_of(reference)), project, values)
 
 
-def program_of(automaton: Automaton) -> Program:
-    """Return the Program of a checked automaton. Raises SpecError."""
+def program_of(automaton: Automaton, varying: Collection[str] = ()) -> Program:
+    """Return the Program of a checked automaton; `varying` inputs change inside its steps.
+
+    Raises SpecError.
+    """
     problems = Problems()
     if automaton.is_sampled:
         return sampled_program(automaton, problems)
-    return continuous_program(automaton, problems)
+    return continuous_program(automaton, problems, varying)
 
 
 def command_line_value(text: str, option: str = "--set", name: str = "") -> Scalar:

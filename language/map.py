@@ -6,11 +6,11 @@ from fractions import Fraction
 from typing import Literal, cast
 
 from language.document import Document, Entry, Table
+from language.literal import constant
 from language.model import Column, RecordingMap
-from language.problem import Problems
+from language.problem import Problems, Span
 from language.project import Project, expanded
 from language.reader import Reader
-from language.scenario import constant
 from language.units import NO_UNIT, NUMBER, SECOND, Dimension, fits, product
 
 MAP_KEYS = ("language", "map", "time", "columns", "constants")
@@ -27,17 +27,21 @@ def read_map(document: Document, project: Project) -> RecordingMap:
         label = f"`{document.name}` is a {document.kind}, not a map"
         problems.error("form", document.name_span, label)
     problems.stop_if_any()
-    found = _MapReader(problems).read(document)
+    found = map_of(document.root, document.name, document.name_span, problems)
     problems.stop_if_any()
     return found
+
+
+def map_of(root: Table, name: str, at: Span, problems: Problems) -> RecordingMap:
+    """Return the map that a mapping of a file holds; what is wrong is reported."""
+    return _MapReader(problems).read(root, name, at)
 
 
 class _MapReader(Reader):
     """The sections of a map."""
 
-    def read(self, document: Document) -> RecordingMap:
-        tree = self.table(document.root, f"map {document.name}", MAP_KEYS)
-        at = document.name_span
+    def read(self, root: Table, name: str, at: Span) -> RecordingMap:
+        tree = self.table(root, f"map {name}", MAP_KEYS)
         time = self.table(tree.get("time"), "time", ("column", "unit"))
         unit = self.unit(time.get("unit"))
         if not fits(unit.dimension, SECOND):
@@ -52,7 +56,7 @@ class _MapReader(Reader):
         if not columns:
             self.problems.error("missing", at, "a map has at least one column in `columns`")
         return RecordingMap(
-            name=document.name,
+            name=name,
             time=self.text(time.get("column"), "time.column", at),
             time_unit=unit,
             columns={column.name: column for column in columns},
@@ -73,7 +77,7 @@ class _MapReader(Reader):
         if (to is None) == (compare is None):
             label = "a column has `to` (an input) or `compare` (an output)"
             self.problems.error("missing", entry.span, label)
-        self.choice(table.get("hold"), "hold", ("previous",), "previous")
+        hold = self.choice(table.get("hold"), "hold", ("previous", "linear"), "previous")
         blank = self.choice(table.get("blank"), "blank", ("refuse", "skip"), "refuse")
         delay = table.get("delay")
         shift, unit = (
@@ -94,6 +98,7 @@ class _MapReader(Reader):
             blank=cast(Literal["refuse", "skip"], blank),
             time=self.text(time, "time", entry.span) if time else None,
             span=entry.span,
+            hold=cast(Literal["previous", "linear"], hold),
         )
 
     def _scale(self, table: Table) -> tuple[Fraction, Dimension]:

@@ -8,7 +8,8 @@ from fractions import Fraction
 from typing import Literal
 
 from language.problem import Span
-from language.syntax import Tree
+from language.signal import Line, RecordingUse, Sensor, Stimulus
+from language.syntax import Tree, names
 from language.units import Dimension, Unit
 
 Range = tuple[Fraction, Fraction]
@@ -281,48 +282,76 @@ class SystemInput:
     unit: Unit
     default: Fraction | None
     span: Span
+    truth: bool = False
 
 
 @dataclass(frozen=True)
 class Connection:
-    """What an input of an instance reads: a system input, an output or a constant (SI)."""
+    """What an input of an instance reads: a signal by name, a constant (SI) or an expression.
+
+    Signals are inputs of the system, its sensors and lines, and outputs `instance.output`.
+    """
 
     target: tuple[str, str]
-    source: str | Fraction
+    source: str | Fraction | Formula
     span: Span
+
+    @property
+    def reads(self) -> tuple[str, ...]:
+        """The signals that are read."""
+        if isinstance(self.source, Formula):
+            return tuple(dict.fromkeys(name.path for name in names(self.source.tree)))
+        return (self.source,) if isinstance(self.source, str) else ()
 
 
 @dataclass(frozen=True)
 class System:
-    """Instances, how they are connected, in the order in which they run at one instant."""
+    """Instances, how they are connected; `order`: how they and sensors run.
+
+    `dimensions` are those of the outputs that are expressions with a real value.
+
+    `alone` is the name of the one instance where the system was made around an automaton.
+    """
 
     name: str
     inputs: Mapping[str, SystemInput]
     instances: Mapping[str, Instance]
     connections: Mapping[tuple[str, str], Connection]
-    outputs: Mapping[str, str]
+    outputs: Mapping[str, str | Formula]
     order: tuple[str, ...]
     span: Span
+    sensors: Mapping[str, Sensor] = field(default_factory=dict)
+    lines: Mapping[str, Line] = field(default_factory=dict)
+    dimensions: Mapping[str, Dimension] = field(default_factory=dict)
+    alone: str | None = None
 
-
-@dataclass(frozen=True)
-class Stimulus:
-    """An input over time: right-continuous steps, the first at time 0 (SI, exact)."""
-
-    steps: tuple[tuple[Fraction, Fraction], ...]
+    @property
+    def signals(self) -> tuple[str, ...]:
+        """What can be recorded: inputs, outputs of instances, sensors, outputs of the system."""
+        parts = [
+            f"{i.name}.{name}" for i in self.instances.values() for name in i.automaton.outputs
+        ]
+        return tuple(dict.fromkeys([*self.inputs, *parts, *self.sensors, *self.outputs]))
 
 
 @dataclass(frozen=True)
 class Scenario:
-    """Inputs, initial values, horizon of a system and what is recorded of it."""
+    """Inputs, initial values, horizon of a system and what is recorded of it.
+
+    `horizon` is None where it is that of the recording; an initial value given as a text is the
+    first value of that column; `signals` is empty where everything is recorded.
+    """
 
     name: str
     of: str
-    horizon: Fraction
-    initial: Mapping[str, Fraction]
+    horizon: Fraction | None
+    initial: Mapping[str, Fraction | str]
     inputs: Mapping[str, Stimulus]
     every: Fraction
     span: Span
+    seed: int = 0
+    signals: tuple[str, ...] = ()
+    recording: RecordingUse | None = None
 
 
 @dataclass(frozen=True)
@@ -340,6 +369,7 @@ class Column:
     blank: Literal["refuse", "skip"]
     time: str | None
     span: Span
+    hold: Literal["previous", "linear"] = "previous"
 
 
 @dataclass(frozen=True)

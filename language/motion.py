@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from language.field import Field, any_guard
+from language.field import Field, any_guard, at_time
 from language.model import Mode
 from language.operation import (
     Assign,
@@ -165,6 +165,7 @@ def _move(field: Field, mode: Mode, crossed: Expr) -> Block:
     ops: list[Op] = [Run(f"step_{mode.name}"), Assign("work.elapsed", Ref("work.h"))]
     if watched:
         ops += [Assign(f"work.at_{name}", Ref(f"work.end_{name}")) for name in field.states]
+        ops += at_time(field, Ref("work.h"))
         ops.append(Run(f"guards_{mode.name}"))
     ops.append(Assign("work.crossed", crossed if watched else Value(False)))
     if watched:

@@ -5,7 +5,7 @@ Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.1 table 1
 
 from __future__ import annotations
 
-from language.field import Field, at_state
+from language.field import Field, at_state, at_time
 from language.motion import Method
 from language.operation import (
     Assign,
@@ -48,12 +48,13 @@ def rk4(field: Field) -> Method:
 def _step(field: Field, mode: str) -> Block:
     h = Ref("work.h")
     fractions: tuple[Expr, ...] = (multiply(real(0.5), h), multiply(real(0.5), h), h)
-    ops: list[Op] = [*at_state(field)]
+    ops: list[Op] = [*at_state(field), *at_time(field, real(0.0))]
     for stage in (1, 2, 3, 4):
         ops.append(Run(f"rates_{mode}"))
         ops += [Assign(f"work.k{stage}_{name}", Ref(f"work.rate_{name}")) for name in field.states]
         if stage < 4:
             part = fractions[stage - 1]
+            ops += at_time(field, part)
             for name in field.states:
                 moved = add(Ref(f"state.{name}"), multiply(part, Ref(f"work.k{stage}_{name}")))
                 ops.append(Assign(f"work.at_{name}", moved))
@@ -73,6 +74,7 @@ def _series(field: Field, mode: str) -> Block:
     """The cubic through both ends with the rates f0 = k1 at the start and f1 at the end."""
     h = Ref("work.h")
     ops: list[Op] = [Assign(f"work.at_{name}", Ref(f"work.end_{name}")) for name in field.states]
+    ops += at_time(field, h)
     ops.append(Run(f"rates_{mode}"))
     for name in field.states:
         f0, f1 = Ref(f"work.k1_{name}"), Ref(f"work.rate_{name}")

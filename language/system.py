@@ -5,26 +5,37 @@ from __future__ import annotations
 from collections.abc import Mapping
 from fractions import Fraction
 
-from language.document import Document, Entry, Scalar, Table
+from language.connection import ConnectionReader
+from language.document import Document, Entry, Scalar
 from language.graph import chain, circle, topological
 from language.load import automaton_of
 from language.model import Automaton, Connection, Instance, System, SystemInput
 from language.problem import Problems, Span, nearest
 from language.project import Project, expanded, read_document
 from language.reader import Reader
-from language.units import SECOND, Dimension, fits
+from language.units import SECOND, fits
 
-SYSTEM_KEYS = ("language", "system", "inputs", "instances", "connections", "outputs")
+SYSTEM_KEYS = tuple(
+    "language system inputs instances sensors connections outputs".split()  # noqa: SIM905
+)
+SYSTEM_INPUT_KEYS = ("unit", "default", "range", "type")
 INSTANCE_KEYS = ("of", "values", "offset")
 
+Connections = Mapping[tuple[str, str], Connection]
+Order = tuple[str, ...]
 Overrides = Mapping[str, Scalar]
 """Parameter values from the command line, by `parameter` or `instance.parameter`."""
 
 
 def read_system(document: Document, project: Project, overrides: Overrides | None = None) -> System:
-    """Read a system with all its automata, checked. Raises SpecError with all problems."""
-    document = expanded(document, project)
+    """Read a system with all its automata, checked. Raises SpecError with all problems.
+
+    An automaton is read as a system of its own: see `around`.
+    """
+    plain, document = document, expanded(document, project)
     problems = Problems()
+    if document.kind == "automaton":
+        return around(automaton_of(plain, project, overrides))
     if document.kind != "system":
         label = f"`{document.name}` is a {document.kind}, not a system"
         problems.error("form", document.name_span, label)
@@ -32,6 +43,24 @@ def read_system(document: Document, project: Project, overrides: Overrides | Non
     system = _SystemReader(problems, project, dict(overrides or {})).read(document)
     problems.stop_if_any()
     return system
+
+
+def around(automaton: Automaton) -> System:
+    """Return the system of one instance, named as its automaton, with the same inputs."""
+    name, at = automaton.name, automaton.span
+    return System(
+        name=name,
+        inputs={
+            thing.name: SystemInput(thing.name, thing.unit, thing.default, thing.span, thing.truth)
+            for thing in automaton.inputs.values()
+        },
+        instances={name: Instance(name, automaton, Fraction(0), name, at)},
+        connections={(name, key): Connection((name, key), key, at) for key in automaton.inputs},
+        outputs={},
+        order=(name,),
+        span=at,
+        alone=name,
+    )
 
 
 class _SystemReader(Reader):
@@ -53,22 +82,38 @@ class _SystemReader(Reader):
         if not self.problems.has_errors:
             self._unused_overrides(instances)
         self.problems.stop_if_any()
-        connections = self._connections(tree, inputs, instances)
+        wires = ConnectionReader(self.problems, inputs, instances)
+        wires.read_sensors(tree.get("sensors"))
+        connections = wires.connections(tree.get("connections"))
         self._unconnected(connections, instances)
-        outputs = self._outputs(tree, instances)
-        order = self._order(connections, instances, document.name_span)
+        outputs = wires.outputs(tree.get("outputs"))
+        self.problems.stop_if_any()
+        order = self._order(wires, connections, document.name_span)
         return System(
-            document.name, inputs, instances, connections, outputs, order, document.name_span
+            name=document.name,
+            inputs=inputs,
+            instances=instances,
+            connections=connections,
+            outputs=outputs,
+            order=order,
+            span=document.name_span,
+            sensors=wires.sensors,
+            lines=wires.lines,
+            dimensions=wires.dimensions,
         )
 
     def _input(self, entry: Entry) -> SystemInput:
-        table = self.table(entry.node, f"inputs.{entry.key}", ("unit", "default", "range"))
+        table = self.table(entry.node, f"inputs.{entry.key}", SYSTEM_INPUT_KEYS)
         unit = self.unit(table.get("unit"))
+        truth = self.choice(table.get("type"), "type", ("real", "bool"), "real") == "bool"
         default: Fraction | None = None
         node = table.get("default")
-        if node is not None:
+        if node is not None and truth:
+            word = self.choice(node, "default", ("true", "false"), "false")
+            default = Fraction(word == "true")
+        elif node is not None:
             default, _ = self.quantity(node, f"inputs.{entry.key}.default", node.span, unit)
-        return SystemInput(entry.key, unit, default, entry.span)
+        return SystemInput(entry.key, unit, default, entry.span, truth)
 
     def _instance(self, entry: Entry) -> Instance:
         key = f"instances.{entry.key}"
@@ -116,55 +161,6 @@ class _SystemReader(Reader):
                 label = f"no instance has a parameter `{name}`"
                 self.problems.error("name", value.span, label, nearest(name, known))
 
-    def _connections(
-        self,
-        tree: Table,
-        inputs: Mapping[str, SystemInput],
-        instances: Mapping[str, Instance],
-    ) -> dict[tuple[str, str], Connection]:
-        found = {}
-        for entry in self.table(tree.get("connections"), "connections"):
-            owner, _, name = entry.key.partition(".")
-            target = instances.get(owner)
-            if target is None or name not in target.automaton.inputs:
-                known = [f"{i.name}.{n}" for i in instances.values() for n in i.automaton.inputs]
-                label = f"`{entry.key}` is not an input of an instance"
-                self.problems.error("name", entry.span, label, nearest(entry.key, known))
-                continue
-            source = self.scalar(entry.node, entry.key, entry.span)
-            if source is None:
-                continue
-            with self.problems.collecting():
-                made = self._connection(target, name, source, inputs, instances)
-                found[owner, name] = made
-        return found
-
-    def _connection(
-        self,
-        target: Instance,
-        name: str,
-        source: Scalar,
-        inputs: Mapping[str, SystemInput],
-        instances: Mapping[str, Instance],
-    ) -> Connection:
-        wanted = target.automaton.inputs[name]
-        known: dict[str, Dimension] = {n: thing.unit.dimension for n, thing in inputs.items()}
-        for instance in instances.values():
-            known.update(_output_dimensions(instance))
-        text = source.text
-        if text in known:
-            if not fits(known[text], wanted.unit.dimension) or wanted.truth:
-                want = "true or false" if wanted.truth else f"in `{wanted.unit.dimension}`"
-                label = f"`{text}` is in `{known[text]}`, the input is {want}"
-                self.problems.error("dimension", source.span, label)
-            return Connection((target.name, name), text, source.span)
-        if text[:1].isalpha():
-            label = f"`{text}` is not an input of the system or an output of an instance"
-            self.problems.error("name", source.span, label, nearest(text, known))
-            return Connection((target.name, name), Fraction(0), source.span)
-        value, _ = self.quantity(source, text, source.span, wanted.unit)
-        return Connection((target.name, name), value, source.span)
-
     def _unconnected(
         self,
         connections: Mapping[tuple[str, str], Connection],
@@ -177,54 +173,46 @@ class _SystemReader(Reader):
                     hint = "connect it, or give it a `default` in the automaton"
                     self.problems.error("missing", instance.span, label, hint)
 
-    def _outputs(self, tree: Table, instances: Mapping[str, Instance]) -> dict[str, str]:
-        found = {}
-        known = [
-            f"{instance.name}.{name}"
-            for instance in instances.values()
-            for name in instance.automaton.outputs
-        ]
-        for entry in self.named(tree.get("outputs"), "outputs"):
-            source = self.scalar(entry.node, entry.key, entry.span)
-            if source and source.text not in known:
-                label = f"`{source.text}` is not an output of an instance"
-                self.problems.error("name", source.span, label, nearest(source.text, known))
-            elif source:
-                found[entry.key] = source.text
-        return found
-
-    def _order(
-        self,
-        connections: Mapping[tuple[str, str], Connection],
-        instances: Mapping[str, Instance],
-        span: Span,
-    ) -> tuple[str, ...]:
+    def _order(self, wires: ConnectionReader, connections: Connections, span: Span) -> Order:
         """Instances at one instant run in the order of direct feed-through (rule 19)."""
-        edges: dict[str, list[str]] = {name: [] for name in instances}
+        instances = wires.instances
+        edges: dict[str, list[str]] = {name: [] for name in (*instances, *wires.sensors)}
+        for sensor in wires.sensors.values():
+            if not sensor.delay:
+                edges[sensor.source.partition(".")[0]].append(sensor.name)
         for connection in connections.values():
-            if isinstance(connection.source, str) and "." in connection.source:
-                owner, target = connection.source.partition(".")[0], connection.target[0]
-                self._both_continuous(instances[owner], instances[target], connection)
-                if instances[target].automaton.is_sampled:
-                    edges[owner].append(target)
+            target = instances[connection.target[0]]
+            for read in connection.reads:
+                owner = read.partition(".")[0] if read not in wires.lines else ""
+                self._continuous_reads(wires, read, target, connection)
+                if owner in edges and target.automaton.is_sampled:
+                    edges[owner].append(target.name)
         found = topological(edges)
         if found is None:
             label = f"instances read each other at the same instant: {chain(circle(edges))}"
-            hint = "an output that reads no input of its tick breaks the circle: a state"
+            hint = "a delay breaks the circle: `delay(signal, 1 ms)`, or a sensor with `delay`"
             self.problems.error("loop", span, label, hint)
         return tuple(found or instances)
+
+    def _continuous_reads(
+        self, wires: ConnectionReader, read: str, target: Instance, at: Connection
+    ) -> None:
+        """Refuse what a continuous automaton would read inside its integration."""
+        if target.automaton.is_sampled:
+            return
+        sensor = wires.sensors.get(read)
+        if sensor and sensor.period is None:
+            label = (
+                f"`{target.name}` is continuous and reads sensor `{read}`, which has no `sample`"
+            )
+            self.problems.error("connection", at.span, label, "like `sample: 1 ms`")
+        source = wires.lines[read].source if read in wires.lines else read
+        owner = wires.instances.get(source.partition(".")[0])
+        if owner and "." in source:
+            self._both_continuous(owner, target, at)
 
     def _both_continuous(self, owner: Instance, target: Instance, at: Connection) -> None:
         if not owner.automaton.is_sampled and not target.automaton.is_sampled:
             label = f"`{owner.name}` and `{target.name}` are both continuous"
             hint = "this version connects a continuous automaton to sampled ones only"
             self.problems.error("connection", at.span, label, hint)
-
-
-def _output_dimensions(instance: Instance) -> dict[str, Dimension]:
-    automaton = instance.automaton
-    return {
-        f"{instance.name}.{name}": automaton.dimensions[automaton.source_of(name)]
-        for name in automaton.outputs
-        if automaton.source_of(name) in automaton.dimensions
-    }

@@ -6,13 +6,13 @@ import csv
 import dataclasses
 import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from engine import simulate as simulation
+from engine import starting
 from engine.continuous import Stopped
 from engine.reference import (
     OWN_MOTION,
@@ -22,7 +22,8 @@ from engine.reference import (
     with_library_numbers,
     without_motion,
 )
-from engine.simulate import programs_of, simulate
+from engine.simulate import simulate
+from engine.starting import programs_of
 from engine.trajectory import Event, Trajectory
 from language.load import program_of
 from language.model import Automaton, Scenario, System
@@ -146,9 +147,9 @@ def largest_gap(first: tuple[Event, ...], second: tuple[Event, ...]) -> float:
     return max(abs(a.time - b.time) for a, b in zip(first, second, strict=True))
 
 
-def blank_motion(automaton: Automaton) -> Program:
+def blank_motion(automaton: Automaton, varying: Collection[str] = ()) -> Program:
     """Return the Program of an automaton, with nothing in its blocks that integrate or locate."""
-    program = program_of(automaton)
+    program = program_of(automaton, varying)
     if program.period is not None:
         return program
     blocks = {n: () if n.startswith(OWN_MOTION) else b for n, b in program.blocks.items()}
@@ -247,14 +248,14 @@ def test_no_block_of_ours_that_integrates_or_locates_is_kept(
     program = programs_of(*tip_out)["plant"]
     kept = without_motion(program).blocks
     verbs = {name.partition("_")[0] for name in program.blocks if name not in kept}
-    assert verbs == {"flow", "point", "move", "step", "series", "locate"}
+    assert verbs == {"flow", "peek", "point", "move", "step", "series", "locate"}
     assert set(kept) >= {"init", "equations", "watch", "jump"}
 
 
 def test_the_result_is_the_same_without_our_motion(
     tip_out: tuple[System, Scenario], theirs: Trajectory, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(simulation, "program_of", blank_motion)
+    monkeypatch.setattr(starting, "program_of", blank_motion)
     again = reference(*tip_out)
     assert again.events == theirs.events
     assert again.csv() == theirs.csv()

@@ -261,7 +261,7 @@ def test_a_scenario_is_extended(tmp_path: Path) -> None:
     )
     system = read_system(read_document(project.path_of("shelf")), project)
     made = read_scenario(read_document(project.path_of("v")), project, system)
-    assert (made.name, float(made.horizon)) == ("v", 3.0)
+    assert (made.name, float(made.horizon or 0)) == ("v", 3.0)
     steps = [(float(time), float(value)) for time, value in made.inputs["push"].steps]
     assert steps == [(0.0, 1.0), (1.0, 5.0), (2.0, 6.0)]
     assert check("v", tmp_path) == []

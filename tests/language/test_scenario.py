@@ -8,9 +8,10 @@ from pathlib import Path
 import pytest
 from hypothesis import given, strategies as st
 
+from language.literal import constant
 from language.model import Scenario, System
 from language.project import read_document
-from language.scenario import MAX_HORIZON, constant, read_scenario
+from language.scenario import MAX_HORIZON, read_scenario
 from language.system import read_system
 from language.units import parse_unit
 from tests.language.making import SHIPPED, dimension, document, project_of, refusal, si, told, tree

@@ -102,10 +102,7 @@ def test_a_bare_value_is_in_the_unit_of_the_input(folder: Path, value: str) -> N
         ("g.in_x: p.x", "`g.in_x` is not an input of an instance"),
         ("in_x: p.x", "`in_x` is not an input of an instance"),
         ("f.in_x: [p.x]", "`f.in_x` is a single value"),
-        (
-            "f.in_x: p.x + 1 m",
-            "`p.x + 1 m` is not an input of the system or an output of an instance",
-        ),
+        ("f.in_x: p.x + 1 s", "`+` joins `m` and `s`"),
     ],
 )
 def test_what_cannot_be_joined_is_refused(folder: Path, connection: str, label: str) -> None:
@@ -131,10 +128,6 @@ def test_a_truth_value_or_a_mode_is_no_number(folder: Path, output: str) -> None
     assert lines(folder, f"{JOINED}, g.in_x: p.x, g.ratio: {output}", instances)
 
 
-@pytest.mark.xfail(
-    reason="system._connection refuses every source of a truth input: it can only have its default",
-    strict=True,
-)
 @pytest.mark.parametrize("source", ["p.far", "true"])
 def test_a_truth_input_takes_a_truth_value(folder: Path, source: str) -> None:
     assert lines(folder, f"{JOINED}, f.run: {source}") == []

@@ -1,0 +1,107 @@
+"""Rows: what is recorded of a run - every signal that was asked for, at every row's time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.trajectory import Values, column_array
+from language.model import Formula, Scenario, System
+from language.program import Program, ValueType
+from language.syntax import names
+from language.wires import output_block
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """A recorded signal: the name, its type and unit, and the output block or signal it reads."""
+
+    name: str
+    type: ValueType
+    unit: str
+    block: str | None
+    source: str
+
+
+def recorded(
+    system: System, scenario: Scenario, programs: Mapping[str, Program]
+) -> tuple[Recorded, ...]:
+    """Return what is recorded: the scenario's choice, else outputs of all and expressions."""
+    known: dict[str, Recorded] = {}
+    for name, thing in system.inputs.items():
+        kind: ValueType = "truth" if thing.truth else "real"
+        known[name] = Recorded(name, kind, str(thing.unit.dimension), None, name)
+    everything: list[str] = []
+    for owner, program in programs.items():
+        for wire in program.outputs:
+            name = f"{owner}.{wire.name}"
+            known[name] = Recorded(name, wire.type, wire.unit, None, name)
+            everything.append(name)
+    for name, sensor in system.sensors.items():
+        known[name] = Recorded(name, "real", str(sensor.dimension), None, name)
+        everything.append(name)
+    for name, output in system.outputs.items():
+        if isinstance(output, Formula):
+            dimension = system.dimensions.get(name)
+            kind = "real" if dimension else "truth"
+            block = output_block(name)
+            known[name] = Recorded(name, kind, str(dimension or "1"), block, name)
+            everything.append(name)
+        else:
+            part = known[output]
+            known[name] = Recorded(name, part.type, part.unit, None, part.source)
+    return tuple(known[name] for name in scenario.signals or everything)
+
+
+def sources_of(found: tuple[Recorded, ...], system: System) -> frozenset[str]:
+    """Return the signals that must be seen to fill a row."""
+    needed: set[str] = set()
+    for column in found:
+        output = system.outputs.get(column.name)
+        if column.block and isinstance(output, Formula):
+            needed |= {name.path for name in names(output.tree)}
+        else:
+            needed.add(column.source)
+    return frozenset(needed)
+
+
+class Rows:
+    """The rows of a run, in the order of time."""
+
+    def __init__(self, columns: tuple[Recorded, ...]) -> None:
+        """Take what is recorded."""
+        self.columns = columns
+        self.times: list[Fraction] = []
+        self._rows: list[tuple[Any, ...]] = []
+
+    def add(
+        self,
+        time: Fraction,
+        read: Callable[[str], Any],
+        formula: Callable[[str, Callable[[str], Any]], Any],
+    ) -> None:
+        """Add the row of a time: `read` gives a signal, `formula` evaluates an output."""
+        self.times.append(time)
+        row = [formula(c.block, read) if c.block else read(c.source) for c in self.columns]
+        self._rows.append(tuple(row))
+
+    def signals(self) -> dict[str, Values]:
+        """Return the values of each signal (n_rows,)."""
+        columns = list(zip(*self._rows, strict=True)) if self._rows else [()] * len(self.columns)
+        return {
+            column.name: column_array(column.type, values)
+            for column, values in zip(self.columns, columns, strict=True)
+        }
+
+    def units(self) -> dict[str, str]:
+        """Return the unit of each signal."""
+        return {column.name: column.unit for column in self.columns}
+
+    def seconds(self) -> NDArray[np.float64]:
+        """Return the times [s] (n_rows,)."""
+        return np.array([float(time) for time in self.times])

@@ -1,0 +1,111 @@
+"""Schedule: the instants at which something happens in a system, in exact time."""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+from collections.abc import Iterator, Mapping
+from fractions import Fraction
+
+from language.model import Scenario, System
+from language.problem import Problems, SpecError
+from language.program import Program
+from language.signal import Stimulus
+
+MAX_INSTANTS = 100_000_000
+"""Most ticks, samples and rows of one run: about an hour of the interpreter."""
+
+
+class Grid:
+    """The instants start, start + period, start + 2 periods ... from time 0 on."""
+
+    def __init__(self, start: Fraction, period: Fraction) -> None:
+        """Take the first instant, which may be before time 0, and the period [s]."""
+        self.period = period
+        self.start = start if start >= 0 else start + -(start // period) * period
+
+    def has(self, time: Fraction) -> bool:
+        """Tell whether a time is one of the instants."""
+        return time >= self.start and (time - self.start) % self.period == 0
+
+    def count(self, horizon: Fraction) -> int:
+        """Return how many instants there are up to the horizon."""
+        return max(0, int((horizon - self.start) // self.period) + 1)
+
+    def __iter__(self) -> Iterator[Fraction]:
+        """Yield the instants for ever."""
+        return (self.start + k * self.period for k in itertools.count())
+
+
+class Schedule:
+    """When instances tick, sensors sample and capture, and delayed signals arrive."""
+
+    def __init__(self, system: System, scenario: Scenario, programs: dict[str, Program]) -> None:
+        """Take a resolved scenario."""
+        assert scenario.horizon is not None
+        self.horizon = scenario.horizon
+        self.rows = Grid(Fraction(0), scenario.every)
+        self.ticks = {
+            name: Grid(system.instances[name].offset, program.period)
+            for name, program in programs.items()
+            if program.period is not None
+        }
+        self.samples: dict[str, Grid] = {}
+        self.captures: dict[str, list[Grid]] = {}
+        for name, sensor in system.sensors.items():
+            if sensor.period is not None:
+                self.samples[name] = Grid(sensor.offset, sensor.period)
+                if sensor.delay:
+                    late = Grid(sensor.offset - sensor.delay, sensor.period)
+                    self.captures[name] = [late]
+        self._arrivals: list[Grid] = []
+        for connection in system.connections.values():
+            for line in (system.lines[read] for read in connection.reads if read in system.lines):
+                reader, owner = connection.target[0], line.source.partition(".")[0]
+                at = self.captures.setdefault(line.name, [])
+                ticking = self.ticks.get(owner) or self.samples.get(line.source)
+                if reader in self.ticks and ticking is None and line.source not in system.inputs:
+                    own = self.ticks[reader]
+                    at.append(Grid(own.start - line.delay, own.period))
+                elif reader not in self.ticks and ticking is not None:
+                    self._arrivals.append(Grid(ticking.start + line.delay, ticking.period))
+        self._events = sorted(set(_events(system, scenario.inputs)))
+        self._require_bounded(scenario)
+
+    @property
+    def _grids(self) -> list[Grid]:
+        captures = [grid for grids in self.captures.values() for grid in grids]
+        return [*self.ticks.values(), *self.samples.values(), *captures, *self._arrivals]
+
+    def instants(self) -> Iterator[Fraction]:
+        """Yield every instant from 0 to the horizon at which something may happen."""
+        last = None
+        ends = (Fraction(0), self.horizon)
+        for time in heapq.merge(ends, self._events, *self._grids):
+            if time > self.horizon:
+                return
+            if time != last:
+                yield time
+            last = time
+
+    def captured(self, time: Fraction) -> list[str]:
+        """Return the sensors and lines that capture their signal at an instant."""
+        return [n for n, grids in self.captures.items() if any(grid.has(time) for grid in grids)]
+
+    def _require_bounded(self, scenario: Scenario) -> None:
+        count = sum(grid.count(self.horizon) for grid in (self.rows, *self._grids))
+        if count > MAX_INSTANTS:
+            label = f"the scenario has {count} ticks and rows; at most {MAX_INSTANTS} are run"
+            problems = Problems()
+            problems.error("range", scenario.span, label, "a shorter `horizon`")
+            raise SpecError(problems.found)
+
+
+def _events(system: System, inputs: Mapping[str, Stimulus]) -> Iterator[Fraction]:
+    """Yield when a piece of an input starts, and when that arrives at the end of a line."""
+    for name, stimulus in inputs.items():
+        delays = [line.delay for line in system.lines.values() if line.source == name]
+        for piece in stimulus.pieces:
+            if piece.start > 0:
+                yield piece.start
+            yield from (piece.start + delay for delay in delays if piece.start + delay > 0)

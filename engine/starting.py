@@ -1,0 +1,51 @@
+"""Starting: the Program of each instance of a system, with the start values of a scenario."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from fractions import Fraction
+
+from language.load import program_of
+from language.model import Automaton, Formula, Scenario, System
+from language.problem import Source, Span
+from language.program import Program
+from language.syntax import Number
+from language.units import NO_UNIT
+
+
+def programs_of(system: System, scenario: Scenario) -> dict[str, Program]:
+    """Return the Program of each instance, with the start values of a resolved scenario.
+
+    Inputs of continuous automata that change between instants are parabolas inside a step.
+    """
+    found = {}
+    for name, instance in system.instances.items():
+        start = {
+            key.partition(".")[2]: Fraction(value)
+            for key, value in scenario.initial.items()
+            if key.partition(".")[0] == name
+        }
+        varying = [
+            thing
+            for (owner, thing), connection in system.connections.items()
+            if owner == name and not instance.automaton.is_sampled
+            if not instance.automaton.inputs[thing].truth
+            if any(_varies(system, scenario, read) for read in connection.reads)
+        ]
+        found[name] = program_of(_started(instance.automaton, start), varying)
+    return found
+
+
+def _varies(system: System, scenario: Scenario, signal: str) -> bool:
+    source = system.lines[signal].source if signal in system.lines else signal
+    return source in scenario.inputs and scenario.inputs[source].varies
+
+
+def _started(automaton: Automaton, start: Mapping[str, Fraction]) -> Automaton:
+    states = dict(automaton.states)
+    nowhere = Span(Source("scenario"), 1, 1)
+    for name, value in start.items():
+        formula = Formula(Number(value, NO_UNIT, nowhere), f"states.{name}.initial")
+        states[name] = dataclasses.replace(states[name], initial=formula)
+    return dataclasses.replace(automaton, states=states)

@@ -1,0 +1,95 @@
+"""Stimulus: the inputs of a scenario as functions of exact time, recordings resolved."""
+
+from __future__ import annotations
+
+import dataclasses
+from bisect import bisect_right
+from collections.abc import Callable
+from fractions import Fraction
+
+from engine.recording import Channel, Recording, read_recording
+from language.model import Scenario, System
+from language.problem import Problems, SpecError
+from language.signal import Stimulus
+from language.stimulus import held, linear
+from language.wires import piece_block
+
+Formulas = Callable[[str, float], float]
+"""The value of a piece's formula, by the name of its block, at a time [s]."""
+
+
+class Course:
+    """An input over time: right-continuous; inside a step, the piece of the step's start."""
+
+    def __init__(self, name: str, stimulus: Stimulus, formulas: Formulas) -> None:
+        """Take the input's name, its pieces, and what evaluates formulas."""
+        self.name = name
+        self.pieces = stimulus.pieces
+        self.truth = stimulus.truth
+        self.varies = stimulus.varies
+        self._starts = [piece.start for piece in stimulus.pieces]
+        self._formulas = formulas
+
+    def at(self, time: Fraction, since: Fraction | None = None) -> float | bool:
+        """Return the value at a time; `since` picks the piece active then: the limit from below."""
+        within = time if since is None else since
+        number = max(0, bisect_right(self._starts, within) - 1)
+        piece = self.pieces[number]
+        if piece.formula:
+            return self._formulas(piece_block(self.name, number), float(max(time, Fraction(0))))
+        exact = piece.value
+        if piece.slope:
+            exact += piece.slope * (max(time, Fraction(0)) - piece.start)
+        return bool(exact) if self.truth else exact.numerator / exact.denominator
+
+    def events(self) -> list[Fraction]:
+        """Return when pieces start, after time 0."""
+        return [start for start in self._starts if start > 0]
+
+
+def resolved(system: System, scenario: Scenario) -> Scenario:
+    """Return a scenario in which a recording is replaced by the inputs that it gives.
+
+    Time 0 is the first instant at which every input that the recording gives has had a value.
+    Raises SpecError for what is wrong with the file.
+    """
+    use = scenario.recording
+    if use is None:
+        return scenario
+    columns = {s.column for s in scenario.inputs.values() if s.column}
+    columns |= {value for value in scenario.initial.values() if isinstance(value, str)}
+    recording = read_recording(use.path, use.mapping, sorted(columns))
+    fed = [recording.channels[s.column] for s in scenario.inputs.values() if s.column]
+    start = max((channel.times[0] for channel in fed), default=Fraction(0))
+    if recording.end <= start:
+        problems = Problems()
+        label = "the recording ends before every input has a value"
+        problems.error("range", use.span, label)
+        raise SpecError(problems.found)
+    return dataclasses.replace(
+        scenario,
+        horizon=recording.end - start if scenario.horizon is None else scenario.horizon,
+        initial={
+            name: _first(recording, value, start) if isinstance(value, str) else value
+            for name, value in scenario.initial.items()
+        },
+        inputs={
+            name: _pieces(recording.channels[s.column], start, s) if s.column else s
+            for name, s in scenario.inputs.items()
+        },
+        recording=None,
+    )
+
+
+def _pieces(channel: Channel, start: Fraction, stimulus: Stimulus) -> Stimulus:
+    values = [Fraction(value) for value in channel.values]
+    points = [(time - start, value) for time, value in zip(channel.times, values, strict=True)]
+    pieces = linear(points) if channel.column.hold == "linear" else held(points)
+    first = max(0, bisect_right([piece.start for piece in pieces], Fraction(0)) - 1)
+    return Stimulus(pieces[first:], truth=stimulus.truth)
+
+
+def _first(recording: Recording, column: str, start: Fraction) -> Fraction:
+    """Return the value of a column at the start: the latest one until then, or the first."""
+    channel = recording.channels[column]
+    return Fraction(channel.values[max(0, bisect_right(channel.times, start) - 1)])

@@ -1,0 +1,71 @@
+"""Surroundings: what a continuous instance reads from the wires, and who watches its outputs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from fractions import Fraction
+from typing import Any
+
+from engine.interpreter import Stepper
+from engine.signals import Signals
+from language.model import Connection
+from language.program import Program
+
+
+class Surroundings:
+    """The wires around one continuous instance (see engine/continuous.py, Around)."""
+
+    def __init__(
+        self,
+        name: str,
+        stepper: Stepper,
+        signals: Signals,
+        connections: Sequence[Connection],
+        program: Program,
+    ) -> None:
+        """Take the instance with its Program, and the connections of its inputs."""
+        self.name = name
+        self.looked: dict[Fraction, dict[str, Any]] = {}
+        self._stepper = stepper
+        self._signals = signals
+        variables = {variable.name for variable in program.variables}
+        self._varying = [c for c in connections if f"work.rise_{c.target[1]}" in variables]
+        self._outputs = [f"{name}.{wire.name}" for wire in program.outputs]
+        own = [run for run in signals.sensors.values() if run.sensor.source in self._outputs]
+        self._lagging = [run for run in own if run.sensor.lag]
+        self._unsampled = [run for run in own if run.sensor.period is None]
+        self._since = Fraction(0)
+        self.is_watching = bool(self._lagging)
+
+    def aim(self, start: Fraction, stop: Fraction) -> None:
+        """Lay a parabola through an input at the start, the middle and the end of a flow."""
+        self._since = start
+        h = float(stop - start)
+        for connection in self._varying:
+            value = self._valued(connection)
+            first, middle, last = value(start), value((start + stop) / 2), value(stop)
+            name = connection.target[1]
+            self._stepper.set(f"input.{name}", first)
+            self._stepper.set(f"work.rise_{name}", (4.0 * middle - 3.0 * first - last) / h)
+            self._stepper.set(f"work.bend_{name}", 2.0 * (first - 2.0 * middle + last) / (h * h))
+
+    def place(self, time: Fraction) -> None:
+        """Set the inputs to what they are at a time of that flow: the limit from below."""
+        for connection in self._varying:
+            name = f"input.{connection.target[1]}"
+            self._stepper.set(name, self._valued(connection)(time))
+
+    def watch(self, time: Fraction) -> None:
+        """Carry the lags of sensors on to a time."""
+        for run in self._lagging:
+            run.lag.move(time, self._signals.now(run.sensor.source))
+
+    def look(self, time: Fraction) -> None:
+        """Keep the outputs, and the sensors that give their value whenever they are read."""
+        found = {name: self._signals.now(name) for name in self._outputs}
+        for run in self._unsampled:
+            found[run.sensor.name] = run.look(time, found[run.sensor.source])
+        self.looked[time] = found
+
+    def _valued(self, connection: Connection) -> Callable[[Fraction], Any]:
+        return lambda time: self._signals.connected(connection, self._signals.at(time, self._since))

@@ -1,0 +1,77 @@
+"""Wires: the expressions between the instances of a system, as a Program of their own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from fractions import Fraction
+
+from language.lower import expression
+from language.model import Connection, Formula, Scenario, System
+from language.operation import Assign, Block, Ref
+from language.program import Program, Variable
+from language.syntax import names
+from language.wiring import finished
+
+RESULT = "wire.value"
+
+
+def wire_formulas(system: System, scenario: Scenario) -> dict[str, Formula]:
+    """Return the expressions of a system and a scenario: connections, outputs, inputs."""
+    found: dict[str, Formula] = {}
+    for connection in system.connections.values():
+        if isinstance(connection.source, Formula):
+            found[block_of(connection)] = connection.source
+    for name, output in system.outputs.items():
+        if isinstance(output, Formula):
+            found[output_block(name)] = output
+    for name, stimulus in scenario.inputs.items():
+        for number, piece in enumerate(stimulus.pieces):
+            if piece.formula:
+                found[piece_block(name, number)] = piece.formula
+    return found
+
+
+def block_of(connection: Connection) -> str:
+    """Return the name of the block that evaluates a connection."""
+    return "connection." + ".".join(connection.target)
+
+
+def piece_block(name: str, number: int) -> str:
+    """Return the name of the block that evaluates a piece of an input."""
+    return f"piece.{name}.{number}"
+
+
+def output_block(name: str) -> str:
+    """Return the name of the block that evaluates an output of the system."""
+    return f"output.{name}"
+
+
+def wires_program(formulas: Mapping[str, Formula], truths: frozenset[str]) -> Program:
+    """Return a Program with a block for each expression: `signal.<name>` to `wire.value`.
+
+    `truths` are the signals that are true or false.
+    """
+    read = {name.path for formula in formulas.values() for name in names(formula.tree)}
+    known = {name: Ref(f"signal.{name}") for name in read}
+    blocks: dict[str, Block] = {
+        key: (Assign(RESULT, expression(formula.tree, known), formula.key),)
+        for key, formula in formulas.items()
+    }
+    variables = [
+        Variable(f"signal.{name}", "truth" if name in truths else "real") for name in sorted(read)
+    ]
+    program = Program(
+        name="wires",
+        number="float64",
+        period=None,
+        major_step=Fraction(1),
+        constants=(),
+        variables=(*variables, Variable(RESULT, "real")),
+        outputs=(),
+        modes=(),
+        transitions=(),
+        faults=(),
+        functions=(),
+        blocks=blocks,
+    )
+    return finished(program, tuple(blocks), keep=(RESULT,))

@@ -1,0 +1,82 @@
+"""Stimulus: inputs of a scenario that come from a recording."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import modewright as mw
+from tests.language.making import project_of, told
+
+CART = """language: 1
+automaton: cart
+step: 7 ms
+inputs: {u: {unit: m/s}, hill: {default: 0}}
+states: {x: {unit: m, initial: 0 m}, top: {unit: m/s, initial: u}}
+flow: {x: der(x) = u, top: der(top) = 0}
+initial: only
+modes: {only: {number: 0}}
+outputs: [x, top]
+"""
+RUN = """language: 1
+scenario: run
+of: cart
+horizon: {horizon}
+recording:
+  file: drive.csv
+  time: {{column: t, unit: ms}}
+  columns:
+    speed: {{to: u, unit: km/h, hold: {hold}}}
+    way: {{compare: x, unit: m}}
+initial: {{x: column(way)}}
+record: {{every: 0.25 s, signals: [x, u, top]}}
+"""
+DRIVE = "t,speed,way\n1000,3.6,5\n2000,10.8,6\n2500,10.8,7\n"
+"""1 m/s at 1 s, 3 m/s at 2 s and at 2.5 s."""
+
+
+def run(folder: Path, hold: str, horizon: str = "recording", drive: str = DRIVE) -> mw.Trajectory:
+    project_of(folder, cart=CART, run=RUN.format(hold=hold, horizon=horizon))
+    (folder / "spec" / "drive.csv").write_text(drive)
+    return mw.simulate("cart", "run", root=folder)
+
+
+def test_a_recording_is_an_input_that_is_linear_between_its_stamps(tmp_path: Path) -> None:
+    found = run(tmp_path, "linear")
+    assert found.times.tolist() == [0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5]
+    assert found.signals["u"] == pytest.approx([1.0, 1.5, 2.0, 2.5, 3.0, 3.0, 3.0])
+    assert found.signals["cart.x"][[0, 4, 6]] == pytest.approx([5.0, 7.0, 8.5], abs=1e-13)
+    assert found.signals["cart.top"][0] == 1.0
+
+
+def test_a_recording_is_an_input_that_is_held(tmp_path: Path) -> None:
+    found = run(tmp_path, "previous")
+    assert found.signals["u"] == pytest.approx([1.0, 1.0, 1.0, 1.0, 3.0, 3.0, 3.0])
+    assert found.signals["cart.x"][[4, 6]] == pytest.approx([6.0, 7.5], abs=1e-13)
+
+
+def test_after_the_end_of_a_recording_its_last_value_is_held(tmp_path: Path) -> None:
+    found = run(tmp_path, "linear", "2 s")
+    assert found.signals["u"][-1] == pytest.approx(3.0)
+    assert found.signals["cart.x"][-1] == pytest.approx(10.0, abs=1e-13)
+
+
+def test_what_is_wrong_with_a_recording_is_told_with_its_place(tmp_path: Path) -> None:
+    broken = DRIVE.replace("10.8,6", "fast,6")
+    (line,) = told(lambda: run(tmp_path, "linear", drive=broken))
+    assert line == "3:6 `fast` in column `speed` is not a finite number"
+    (tmp_path / "spec" / "drive.csv").unlink()
+    (line,) = told(lambda: mw.simulate("cart", "run", root=tmp_path))
+    assert "the recording cannot be read" in line
+
+
+def test_columns_of_a_recording_fit_the_inputs(tmp_path: Path) -> None:
+    text = RUN.format(hold="linear", horizon="recording")
+    wrong = text.replace("unit: km/h", "unit: km").replace("column(way)", "column(wey)")
+    project_of(tmp_path, cart=CART, run=wrong)
+    found = [f"{p.label} {p.help}" for p in mw.check("run", tmp_path)]
+    assert found == [
+        "`wey` is not a column of the scenario's recording did you mean `way`?",
+        "column `speed` is in `m`, input `u` is in `m/s` ",
+    ]
