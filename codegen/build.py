@@ -13,7 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from codegen.cache import key_of, stored
-from codegen.names import CNames
+from codegen.expression import literal
+from codegen.names import REAL, CNames
 from codegen.source import c_files, render
 from language.missing import ToolMissing as ToolMissing
 from language.program import Program, Variable
@@ -147,7 +148,7 @@ def _first_error(text: str) -> str:
 
 
 def _harness(program: Program) -> Mapping[str, object]:
-    place = CNames(program)
+    place, real = CNames(program), REAL[program.number]
     inputs = [
         {"place": place(v.name).replace("in->", "in."), "truth": v.type == "truth"}
         for v in fed(program)
@@ -155,9 +156,16 @@ def _harness(program: Program) -> Mapping[str, object]:
     fields = [
         {
             "place": place(o.name).replace("self->", "self."),
-            "type": "double" if o.kind == "real" else "int64_t",
+            "type": real if o.kind == "real" else "int64_t",
         }
         for o in observed(program)
     ]
     width = max(1, len(inputs))
-    return {"name": program.name, "inputs": inputs, "fields": fields, "width": width}
+    return {
+        "name": program.name,
+        "inputs": inputs,
+        "fields": fields,
+        "width": width,
+        "real": real,
+        "zero": literal(0.0, program.number),
+    }

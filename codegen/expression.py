@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Protocol
 
+from codegen.names import REAL
+from language.number import NumberType, decimal
 from language.operation import (
     Binary,
     Call,
@@ -19,7 +21,11 @@ from language.operation import (
 
 
 class Place(Protocol):
-    """Where the variables of a Program live in C."""
+    """Where the variables of a Program live in C, and the type of its reals."""
+
+    @property
+    def number(self) -> NumberType:
+        """The type of the reals."""
 
     def __call__(self, name: str) -> str:
         """Return the C text for a variable or constant."""
@@ -28,8 +34,10 @@ class Place(Protocol):
         """Return a number as it is written beside a whole-number variable: a mode by its name."""
 
 
-LIBRARY: Mapping[str, str] = {"abs": "fabs", "sqrt": "sqrt", "floor": "floor", "real": "(double)"}
+LIBRARY: Mapping[str, str] = {"abs": "fabs", "sqrt": "sqrt", "floor": "floor"}
 """Operations that C gives exactly; all others are in ha_math."""
+SUFFIX: Mapping[NumberType, str] = {"float64": "", "float32": "f"}
+"""What C adds to the name of a function for its form in a type: sqrt, sqrtf."""
 LOGIC: Mapping[str, str] = {"and": "&&", "or": "||"}
 CHAINS: Mapping[str, str] = {"+": "+-", "-": "+-", "*": "*/", "/": "*/"}
 """Operators of the left operand that C evaluates first without parentheses: (a + b) - c."""
@@ -39,7 +47,7 @@ def c_expression(expr: Expr, place: Place) -> str:
     """Return the C text: parentheses around every operand but those that C takes first anyway."""
     match expr:
         case Value(value):
-            return literal(value)
+            return literal(value, place.number)
         case Ref(name):
             return place(name)
         case Item(name, index):
@@ -58,14 +66,17 @@ def c_expression(expr: Expr, place: Place) -> str:
             parts = [_operand(part, place) for part in (condition, then, other)]
             return f"{parts[0]} ? {parts[1]} : {parts[2]}"
         case Call(function, arguments):
-            return _call(function, [c_expression(argument, place) for argument in arguments])
+            texts = [c_expression(argument, place) for argument in arguments]
+            return _call(function, texts, place.number)
 
 
-def literal(value: float | int | bool) -> str:
+def literal(value: float | int | bool, number: NumberType) -> str:
     """Return a literal: the shortest decimal that reads back as the same bits (rule R4)."""
     if isinstance(value, bool):
         return "true" if value else "false"
-    return repr(value)
+    if isinstance(value, int):
+        return repr(value)
+    return decimal(value, number) + SUFFIX[number].upper()
 
 
 def _operand(expr: Expr, place: Place) -> str:
@@ -80,8 +91,8 @@ def _binary(whole: Binary, operator: str, left: Expr, right: Expr, place: Place)
     return f"{first} {operator} {_operand(right, place)}"
 
 
-def _call(function: str, arguments: list[str]) -> str:
+def _call(function: str, arguments: list[str], number: NumberType) -> str:
     if function == "real":
-        return f"(double)({arguments[0]})"
-    name = LIBRARY.get(function, f"ha_{function}")
+        return f"({REAL[number]})({arguments[0]})"
+    name = LIBRARY.get(function, f"ha_{function}") + SUFFIX[number]
     return f"{name}({', '.join(arguments)})"

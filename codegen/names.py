@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from language.model import CHART
+from language.number import NumberType
 from language.program import Program, Variable, short
 
+REAL: Mapping[NumberType, str] = {"float64": "double", "float32": "float"}
 MODES = ("memory.mode", "memory.run_mode")
 UNSIGNED = ("timer.", "memory.fired", "memory.faults")
 
@@ -17,6 +20,11 @@ class CNames:
 
     program: Program
     local: frozenset[str] = frozenset()
+
+    @property
+    def number(self) -> NumberType:
+        """The type of the reals."""
+        return self.program.number
 
     def __call__(self, name: str) -> str:
         """Return the C text for a variable or constant."""
@@ -59,10 +67,10 @@ def c_member(name: str) -> str:
     return short(name).replace(".", "_")
 
 
-def c_type(variable: Variable) -> str:
-    """Return the C type of a variable."""
+def c_type(variable: Variable, number: NumberType) -> str:
+    """Return the C type of a variable, whose reals are of a number type."""
     if variable.type == "real":
-        return "double"
+        return REAL[number]
     if variable.type == "truth":
         return "bool"
     if variable.name.startswith("timer."):

@@ -9,11 +9,12 @@ from typing import Any
 
 import jinja2
 
-from codegen.expression import c_expression, literal
-from codegen.names import CNames, c_member, c_type, mode_constant, run_mode_constant
+from codegen.expression import SUFFIX, c_expression, literal
+from codegen.names import REAL, CNames, c_member, c_type, mode_constant, run_mode_constant
 from codegen.statement import Writer, wrapped
 from codegen.usage import Usage, locals_of, usages
-from language.functions import FUNCTIONS
+from language.functions import FUNCTIONS_OF
+from language.number import NumberType, decimal
 from language.operation import Assign, Run
 from language.printing import digest
 from language.program import (
@@ -29,6 +30,22 @@ GROUPS = ("state", "equation", "before", "innovation", "timer")
 """Nested structs of the instance, in order."""
 ENTRIES = ("init", "derive", "step")
 INLINE = ("min", "max", "clip", "sign", "pow2")
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How IEEE 754 keeps a real: `bits` in all, `digits` after the point, exponents of 2."""
+
+    bits: int
+    digits: int
+    lowest: int
+    highest: int
+
+
+LAYOUT: Mapping[NumberType, Layout] = {
+    "float64": Layout(64, 52, -1022, 1023),
+    "float32": Layout(32, 23, -126, 127),
+}
 
 
 @dataclass(frozen=True)
@@ -52,17 +69,27 @@ def c_files(program: Program) -> dict[str, str]:
         f"{program.name}.c": render("module.c.jinja", context),
     }
     if context["uses_math"]:
-        files.update(math_files())
+        files.update(math_files(program.number))
     return files
 
 
-def math_files() -> dict[str, str]:
-    """Return ha_math: elementary functions whose bits do not depend on a library (rule R6)."""
-    functions = [_function(function) for function in FUNCTIONS.values()]
-    context = {"functions": functions, "version": version()}
+def math_files(number: NumberType) -> dict[str, str]:
+    """Return ha_math (ha_mathf for float32): functions without a library's bits (rule R6)."""
+    suffix = SUFFIX[number]
+    context = {
+        "functions": [_function(function, number) for function in FUNCTIONS_OF[number].values()],
+        "version": version(),
+        "real": REAL[number],
+        "suffix": suffix,
+        "zero": literal(0.0, number),
+        "one": literal(1.0, number),
+        "layout": LAYOUT[number],
+        "lowest": literal(float(LAYOUT[number].lowest), number),
+        "highest": literal(float(LAYOUT[number].highest), number),
+    }
     return {
-        "ha_math.h": render("ha_math.h.jinja", context),
-        "ha_math.c": render("ha_math.c.jinja", context),
+        f"ha_math{suffix}.h": render("ha_math.h.jinja", context),
+        f"ha_math{suffix}.c": render("ha_math.c.jinja", context),
     }
 
 
@@ -86,9 +113,10 @@ def version() -> str:
 
 
 def _context(program: Program) -> dict[str, Any]:
+    number, constants, variables = program.number, program.constants, program.variables
     local = locals_of(program)
     used = usages(program, local)
-    kinds = {variable.name: c_type(variable) for variable in program.variables}
+    kinds = {variable.name: c_type(variable, program.number) for variable in program.variables}
     called = {name.removeprefix("call ") for name in reads(program.blocks.values()) if " " in name}
     shared = _work(program, local)
     blocks = [_block(program, name, local[name], used, kinds) for name in _callees_first(program)]
@@ -109,50 +137,54 @@ def _context(program: Program) -> dict[str, Any]:
         "run_modes": [(run_mode_constant(program, m.number), m.number) for m in program.run_modes],
         "faults": list(enumerate(program.faults)),
         "transitions": program.transitions,
-        "calibration": [_constant(c) for c in program.constants if c.kind == "tunable"],
-        "derived": [_constant(c) for c in program.constants if c.kind == "derived"],
-        "constants": [_constant(c) for c in program.constants if c.name.startswith("constant.")],
-        "solved": [_constant(c) for c in program.constants if c.kind == "solved"],
-        "inputs": [_field(v) for v in program.inputs],
-        "is_new": [_field(v) for v in program.variables if v.name.startswith("is_new.")],
+        "real": REAL[number],
+        "suffix": SUFFIX[number],
+        "calibration": [_constant(c, number) for c in constants if c.kind == "tunable"],
+        "derived": [_constant(c, number) for c in constants if c.kind == "derived"],
+        "constants": [_constant(c, number) for c in constants if c.name.startswith("constant.")],
+        "solved": [_constant(c, number) for c in constants if c.kind == "solved"],
+        "inputs": [_field(v, number) for v in program.inputs],
+        "is_new": [_field(v, number) for v in variables if v.name.startswith("is_new.")],
         "groups": _groups(program),
-        "memory": [_field(v) for v in program.variables if v.name.startswith("memory.")],
+        "memory": [_field(v, number) for v in variables if v.name.startswith("memory.")],
         "outputs": _outputs(program),
-        "work": [_field(variable) for variable in shared],
+        "work": [_field(variable, number) for variable in shared],
         "blocks": [block for block in blocks if block["name"] not in ENTRIES],
         "entries": {block["name"]: block for block in blocks if block["name"] in ENTRIES},
-        "uses_math": bool(called & {*FUNCTIONS, *INLINE}),
+        "uses_math": bool(called & {*FUNCTIONS_OF[number], *INLINE}),
         "uses_libm": bool(called & {"abs", "sqrt", "floor"}),
     }
 
 
-def _field(variable: Variable) -> Field:
+def _field(variable: Variable, number: NumberType) -> Field:
     comment = variable.unit if variable.type == "real" else variable.about
     if variable.type == "real" and variable.about:
         comment = f"{variable.unit}; {variable.about}"
     member = c_member(variable.name)
-    return Field(c_type(variable), member, comment, size=variable.size)
+    return Field(c_type(variable, number), member, comment, size=variable.size)
 
 
-def _constant(constant: Constant) -> Field:
+def _constant(constant: Constant, number: NumberType) -> Field:
     comment = "; ".join(text for text in (constant.unit, constant.key) if text)
     if constant.range:
         low, high = constant.range
-        comment += f"; {low!r} to {high!r}"
-    return Field("double", c_member(constant.name), comment, literal(constant.value))
+        comment += f"; {decimal(low, number)} to {decimal(high, number)}"
+    value = literal(constant.value, number)
+    return Field(REAL[number], c_member(constant.name), comment, value)
 
 
 def _groups(program: Program) -> list[tuple[str, list[Field]]]:
     found = []
     for group in GROUPS:
-        fields = [_field(v) for v in program.variables if v.name.startswith(f"{group}.")]
+        inside = [v for v in program.variables if v.name.startswith(f"{group}.")]
+        fields = [_field(v, program.number) for v in inside]
         if fields:
             found.append((group, fields))
     return found
 
 
 def _outputs(program: Program) -> list[dict[str, str]]:
-    types = {"real": "double", "truth": "bool", "whole": "int16_t"}
+    types = {"real": REAL[program.number], "truth": "bool", "whole": "int16_t"}
     place = CNames(program)
     return [
         {
@@ -223,8 +255,11 @@ def _runs(program: Program, name: str) -> list[str]:
     return [op.block for op in walk(program.blocks[name]) if isinstance(op, Run)]
 
 
+@dataclass(frozen=True)
 class _FunctionNames:
     """Inside a function of ha_math every variable is a local."""
+
+    number: NumberType
 
     def __call__(self, name: str) -> str:
         return short(name)
@@ -233,13 +268,13 @@ class _FunctionNames:
         return str(number)
 
 
-def _function(function: Function) -> dict[str, Any]:
-    place = _FunctionNames()
+def _function(function: Function, number: NumberType) -> dict[str, Any]:
+    place = _FunctionNames(number)
     lines: list[str] = []
     for op in function.body:
         assert isinstance(op, Assign)
-        left = "return " if op.target == "work.y" else f"const double {place(op.target)} = "
+        left = "return " if op.target == "work.y" else f"const {REAL[number]} {place(op.target)} = "
         lines += wrapped(left, c_expression(op.value, place), "")
-    parameters = ", ".join(f"double {name}" for name in function.parameters)
+    parameters = ", ".join(f"{REAL[number]} {name}" for name in function.parameters)
     about = function.about
     return {"name": function.name, "parameters": parameters, "about": about, "lines": lines}

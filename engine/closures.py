@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from language.evaluate import ELEMENTARY, OPERATIONS, divide
+from engine.arithmetic import ARITHMETIC
+from language.evaluate import OPERATIONS
 from language.operation import (
     Assign,
     Binary,
@@ -41,28 +42,29 @@ class Compiler:
         self.slots = slots
         self.faults = {name: 1 << bit for bit, name in enumerate(program.faults)}
         fixed = ("constant.", "solved.")
-        self.fixed = {c.name: c.value for c in program.constants if c.name.startswith(fixed)}
-        self.functions: dict[str, Callable[..., float]] = {}
+        self.arithmetic = ARITHMETIC[program.number]
+        value = self.arithmetic.value
+        self.fixed = {c.name: value(c.value) for c in program.constants if c.name.startswith(fixed)}
+        self.functions: dict[str, Callable[..., Any]] = {}
         for function in sorted(program.functions, key=lambda f: _depth(f, program.functions)):
             self.functions[function.name] = self._function(function)
         self.blocks: dict[str, list[Action]] = {name: [] for name in program.blocks}
         for name, block in program.blocks.items():
             self.blocks[name].extend(self._action(op) for op in block)
 
-    def _function(self, function: Function) -> Callable[..., float]:
+    def _function(self, function: Function) -> Callable[..., Any]:
         slots = {name: slot for slot, name in enumerate(_locals(function))}
         outer, self.slots = self.slots, slots
         actions = [self._action(op) for op in function.body]
         self.slots = outer
         y, count = slots["work.y"], len(function.parameters)
-        rest: Frame = [0.0] * (len(slots) - count)
+        rest: Frame = [None] * (len(slots) - count)
 
-        def call(*values: float) -> float:
+        def call(*values: Any) -> Any:
             frame: Frame = [*values, *rest]
             for action in actions:
                 action(frame)
-            result: float = frame[y]
-            return result
+            return frame[y]
 
         return call
 
@@ -101,6 +103,8 @@ class Compiler:
                 return _negative(self._read(operand))
             case Unary(_, operand):
                 return _not(self._read(operand))
+            case Binary("/", left, right):
+                return _quotient(self.arithmetic.divide, self._read(left), self._read(right))
             case Binary(operator, left, right):
                 return _BINARY[operator](self._read(left), self._read(right))
             case Compare(operator, left, right):
@@ -108,7 +112,7 @@ class Compiler:
             case Select(condition, then, other):
                 return _select(self._read(condition), self._read(then), self._read(other))
             case Call(function, arguments):
-                known = self.functions.get(function) or ELEMENTARY[function]
+                known = self.functions.get(function) or self.arithmetic.elementary[function]
                 return _call(known, [self._read(argument) for argument in arguments])
             case _:
                 raise TypeError(f"not an expression: {expr!r}")
@@ -116,11 +120,13 @@ class Compiler:
     def _fold(self, expr: Expr) -> Any:
         match expr:
             case Value(value):
-                return value
+                return self.arithmetic.value(value)
             case Ref(name):
                 return self.fixed[name]
             case Unary("-", operand):
                 return -self._fold(operand)
+            case Binary("/", left, right):
+                return self.arithmetic.divide(self._fold(left), self._fold(right))
             case Binary(operator, left, right):
                 return OPERATIONS[operator](self._fold(left), self._fold(right))
             case _:
@@ -185,6 +191,10 @@ def _call(function: Callable[..., Any], arguments: list[Read]) -> Read:
     return lambda v: function(*[argument(v) for argument in arguments])
 
 
+def _quotient(divide: Callable[[Any, Any], Any], a: Read, b: Read) -> Read:
+    return lambda v: divide(a(v), b(v))
+
+
 def _and(a: Read, b: Read) -> Read:
     return lambda v: a(v) & b(v)
 
@@ -197,7 +207,6 @@ _BINARY: Mapping[str, Callable[[Read, Read], Read]] = {
     "+": lambda a, b: lambda v: a(v) + b(v),
     "-": lambda a, b: lambda v: a(v) - b(v),
     "*": lambda a, b: lambda v: a(v) * b(v),
-    "/": lambda a, b: lambda v: divide(a(v), b(v)),
     "and": _and,
     "or": _or,
     "<": lambda a, b: lambda v: a(v) < b(v),

@@ -10,7 +10,7 @@ from typing import Protocol
 
 from engine.interpreter import Stepper
 from engine.trajectory import Event
-from language.motion import MERGE
+from language.motion import merge_time
 from language.program import Program, TransitionInfo, short
 
 EVENTS_PER_STEP = 100
@@ -169,7 +169,7 @@ class ContinuousRun:
             self.time = stop
             return False
         self.stepper.set("work.h", h)
-        merge = MERGE * float(max(stop, self.program.major_step))
+        merge = merge_time(self.program.number, self.program.major_step, stop)
         self.stepper.set("work.merge", merge)
         start, states = self.time, self._read_states()
         self._around.aim(start, stop)

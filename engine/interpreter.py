@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Protocol
 
+from engine.arithmetic import ARITHMETIC
 from engine.closures import Compiler, Frame
 from language.program import Program
 
@@ -35,8 +36,14 @@ class Interpreter:
         self.program = program
         names = [v.name for v in program.variables] + [c.name for c in program.constants]
         self._slots = {name: slot for slot, name in enumerate(names)}
-        self._frame: Frame = [_initial(v.type, v.size) for v in program.variables]
-        self._frame += [constant.value for constant in program.constants]
+        self._arithmetic = ARITHMETIC[program.number]
+        initial = {kind: self._arithmetic.value(value) for kind, value in INITIAL.items()}
+        self._frame: Frame = [
+            [initial[v.type]] * v.size if v.size else initial[v.type] for v in program.variables
+        ]
+        self._frame += [self._arithmetic.value(constant.value) for constant in program.constants]
+        self._real = [v.type == "real" for v in program.variables]
+        self._real += [True] * len(program.constants)
         compiler = Compiler(program, self._slots)
         self._blocks = compiler.blocks
         for entry in ("derive", "init"):
@@ -47,11 +54,12 @@ class Interpreter:
 
     def get(self, name: str) -> Any:
         """Return the value of a variable or constant, `group.name`."""
-        return self._frame[self._slots[name]]
+        return self._arithmetic.plain(self._frame[self._slots[name]])
 
     def set(self, name: str, value: float | int | bool) -> None:
-        """Set a variable."""
-        self._frame[self._slots[name]] = value
+        """Set a variable; a real is rounded to the number type, once."""
+        slot = self._slots[name]
+        self._frame[slot] = self._arithmetic.real(value) if self._real[slot] else value
 
     def has(self, name: str) -> bool:
         """Tell whether the Program has a variable or constant."""
@@ -60,15 +68,12 @@ class Interpreter:
     def run(self, block: str) -> None:
         """Run a block."""
         frame = self._frame
-        for action in self._blocks[block]:
-            action(frame)
+        with self._arithmetic.quiet():
+            for action in self._blocks[block]:
+                action(frame)
 
     def reader(self, names: tuple[str, ...]) -> Callable[[], tuple[Any, ...]]:
         """Return a function that returns the values of some variables."""
         slots = [self._slots[name] for name in names]
-        frame = self._frame
-        return lambda: tuple([frame[slot] for slot in slots])
-
-
-def _initial(kind: str, size: int) -> Any:
-    return [INITIAL[kind]] * size if size else INITIAL[kind]
+        frame, plain = self._frame, self._arithmetic.plain
+        return lambda: tuple([plain(frame[slot]) for slot in slots])

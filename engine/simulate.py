@@ -178,11 +178,12 @@ class _Simulation:
             value = self.signals.connected(connection)
             if self.system.instances[name].automaton.inputs[thing].truth:
                 value = bool(value)
-            elif not math.isfinite(value):
-                raise Stopped(f"{self._where(name, time)}: input `{thing}` is {value}")
-            if stepper.get(f"input.{thing}") != value:
-                stepper.set(f"input.{thing}", value)
-                changed = True
+            before = stepper.get(f"input.{thing}")
+            stepper.set(f"input.{thing}", value)
+            now = stepper.get(f"input.{thing}")
+            if not math.isfinite(now):
+                raise Stopped(f"{self._where(name, time)}: input `{thing}` is {now}")
+            changed = changed or now != before
         return changed
 
     def _flag_new(self, name: str) -> None:

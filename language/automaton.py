@@ -19,6 +19,7 @@ from language.model import (
     Range,
     State,
 )
+from language.number import NUMBERS, NumberType
 from language.overlay import lay, without
 from language.problem import Problems, nearest
 from language.project import Project, expanded, read_document
@@ -126,7 +127,7 @@ class _AutomatonReader(Reader):
         self.model = model
         period = self._time(tree.get("period"), "period")
         self.sampled = period is not None
-        self._check_numbers(tree)
+        numbers = self._numbers(tree)
         own = {e.key: self._parameter(e) for e in self.named(tree.get("parameters"), "parameters")}
         chart, *beside = ModeReader(self.problems, model).regions(tree, self.at)
         laid_on = ElementReader(self.problems)
@@ -147,19 +148,17 @@ class _AutomatonReader(Reader):
             elements=laid_on.elements(tree.get("elements")),
             places=laid_on.places(tree.get("places")),
             regions=tuple(beside),
+            numbers=numbers,
         )
         self._check_sections(tree)
         return automaton
 
-    def _check_numbers(self, tree: Table) -> None:
+    def _numbers(self, tree: Table) -> NumberType:
+        """A sampled automaton says what it computes in; a continuous one has float64 by default."""
         node = tree.get("numbers")
-        if self.sampled:
-            scalar = self.scalar(node, "numbers", self.at)
-            if scalar and scalar.text != "float64":
-                label = f"numbers `{scalar.text}` is not known to this version: use float64"
-                self.problems.error("choice", scalar.span, label)
-        elif node is not None:
-            self.problems.error("form", node.span, "`numbers` belongs to a sampled automaton")
+        if node is None and self.sampled:
+            self.scalar(node, "numbers", self.at)
+        return cast(NumberType, self.choice(node, "numbers", NUMBERS, "float64"))
 
     def _check_sections(self, tree: Table) -> None:
         for key in ("flow", "terms", "step") if self.sampled else ("model",):

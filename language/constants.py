@@ -1,4 +1,4 @@
-"""Constants: the values of parameters, in float64 and exactly, and what `X_Derive` recomputes."""
+"""Constants: the values of parameters, rounded and exactly, and what `X_Derive` recomputes."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from language.lower import (
     expression,
     parameter_kinds,
     parameter_order,
-    rounded,
 )
 from language.model import Automaton, Formula
+from language.number import rounded
 from language.operation import Assign, Block
 from language.problem import Problems, SpecError
 from language.program import Constant
@@ -31,9 +31,10 @@ def parameter_constants(automaton: Automaton, problems: Problems) -> dict[str, C
     for name in parameter_order(automaton):
         parameter = automaton.parameters[name]
         if parameter.derived:
-            value = float(evaluate(expression(parameter.derived.tree, known), values))
+            formula = expression(parameter.derived.tree, known)
+            value = float(evaluate(formula, values, automaton.numbers))
         else:
-            value = rounded(parameter.value or Fraction(0))
+            value = rounded(parameter.value or Fraction(0), automaton.numbers)
         if not math.isfinite(value):
             problems.error(
                 "value",
@@ -68,7 +69,7 @@ def values_of(constants: Mapping[str, Constant]) -> dict[str, Scalar]:
 def constant_value(
     formula: Formula, automaton: Automaton, values: Mapping[str, Scalar], what: str
 ) -> float:
-    """Return a formula of parameters in float64. Raises SpecError where it is not one."""
+    """Return a formula of parameters, computed in double. Raises SpecError where it is not one."""
     problems = Problems()
     try:
         value = float(evaluate(expression(formula.tree, constant_names(automaton)), values))

@@ -75,10 +75,11 @@ def continuous_program(
     method = rk4(field)
     armed = {slot: f"memory.armed_{slot}" for slot in field.slots}
     selection = _selection(automaton, transitions)
+    halvings = FLOW_HALVINGS[automaton.numbers]
     blocks = {
         **field_blocks(field),
         **method.blocks,
-        **motion_blocks(field, method, Ref("work.merge"), FLOW_HALVINGS, lambda mode: armed),
+        **motion_blocks(field, method, Ref("work.merge"), halvings, lambda mode: armed),
     }
     for mode in automaton.modes.values():
         ops = equations(mode, dict(known), "equation.", field.prefix)

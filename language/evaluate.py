@@ -1,11 +1,12 @@
-"""Evaluate: the meaning of each elementary operation, and of a constant expression, in float64."""
+"""Evaluate: the meaning of each elementary operation, and of a constant expression."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
 
-from language.functions import FUNCTIONS
+from language.functions import FUNCTIONS_OF
+from language.number import ROUNDING, NumberType
 from language.operation import (
     Assign,
     Binary,
@@ -67,7 +68,13 @@ def power_of_two(k: float) -> float:
     return math.ldexp(1.0, int(k)) if -1022.0 <= k <= 1023.0 else k
 
 
-ELEMENTARY: Mapping[str, Callable[..., Scalar]] = {
+def power_of_two_single(k: float) -> float:
+    """Return 2^k exactly for a whole-valued k from -126 to 127, anything else as it is."""
+    return math.ldexp(1.0, int(k)) if -126.0 <= k <= 127.0 else k
+
+
+Elementary = Mapping[str, Callable[..., Scalar]]
+ELEMENTARY: Elementary = {
     "abs": abs,
     "sqrt": square_root,
     "min": minimum,
@@ -78,6 +85,12 @@ ELEMENTARY: Mapping[str, Callable[..., Scalar]] = {
     "pow2": power_of_two,
     "real": float,
 }
+"""In double: exact or rounded once, so that rounding once more gives the result of float32."""
+EXACT: Mapping[NumberType, Elementary] = {
+    "float64": ELEMENTARY,
+    "float32": {**ELEMENTARY, "pow2": power_of_two_single},
+}
+"""By number type, before the rounding to it."""
 OPERATIONS: Mapping[str, Callable[[Scalar, Scalar], Scalar]] = {
     "+": lambda a, b: a + b,
     "-": lambda a, b: a - b,
@@ -94,34 +107,47 @@ OPERATIONS: Mapping[str, Callable[[Scalar, Scalar], Scalar]] = {
 }
 
 
-def evaluate(expr: Expr, values: Mapping[str, Scalar]) -> Scalar:
-    """Return the value of an expression of scalars. Slow and plain: for check time only."""
+def evaluate(expr: Expr, values: Mapping[str, Scalar], number: NumberType = "float64") -> Scalar:
+    """Return the value of an expression of scalars, each operation rounded to the number type.
+
+    Slow and plain: for check time only.
+    """
+
+    def value(part: Expr) -> Scalar:
+        return evaluate(part, values, number)
+
     match expr:
-        case Value(value):
-            return value
+        case Value():
+            return expr.rounded(number).value
         case Ref(name):
             return values[name]
         case Unary("-", operand):
-            return -evaluate(operand, values)
+            return -value(operand)
         case Unary("not", operand):
-            return not evaluate(operand, values)
+            return not value(operand)
         case Binary(operator, left, right) | Compare(operator, left, right):
-            return OPERATIONS[operator](evaluate(left, values), evaluate(right, values))
+            return in_type(OPERATIONS[operator](value(left), value(right)), number)
         case Select(condition, then, other):
-            return evaluate(then if evaluate(condition, values) else other, values)
+            return value(then if value(condition) else other)
         case Call(function, arguments):
-            return apply(function, [evaluate(argument, values) for argument in arguments])
+            return apply(function, [value(argument) for argument in arguments], number)
         case Item() | _:
             raise TypeError(f"not a constant expression: {expr}")
 
 
-def apply(function: str, arguments: list[Scalar]) -> Scalar:
+def apply(function: str, arguments: list[Scalar], number: NumberType = "float64") -> Scalar:
     """Return the value of an elementary operation or function."""
     if function in ELEMENTARY:
-        return ELEMENTARY[function](*arguments)
-    names = [f"work.{name}" for name in FUNCTIONS[function].parameters]
+        return in_type(EXACT[number][function](*arguments), number)
+    known = FUNCTIONS_OF[number][function]
+    names = [f"work.{name}" for name in known.parameters]
     values: dict[str, Scalar] = dict(zip(names, arguments, strict=True))
-    for op in FUNCTIONS[function].body:
+    for op in known.body:
         assert isinstance(op, Assign)
-        values[op.target] = evaluate(op.value, values)
+        values[op.target] = evaluate(op.value, values, number)
     return values["work.y"]
+
+
+def in_type(result: Scalar, number: NumberType) -> Scalar:
+    """Return a result rounded to the type if it is a real; truth and whole numbers are exact."""
+    return ROUNDING[number](result) if isinstance(result, float) else result

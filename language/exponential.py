@@ -9,12 +9,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from fractions import Fraction
 
 from language.affine import jacobian
 from language.evaluate import Scalar
 from language.field import Field, at_state
 from language.matrix import Matrix, exponential as matrix_exponential, exponential_integral
 from language.motion import Method
+from language.number import DIGITS, NumberType
 from language.operation import (
     Assign,
     Block,
@@ -40,7 +42,6 @@ from language.program import Constant, Variable
 
 LARGEST_NORM = 4.0
 """|A h| up to which the Taylor sum is accurate and short (docs/language.md, section 9)."""
-UNIT_ROUNDOFF = 2.0**-53
 
 
 @dataclass(frozen=True)
@@ -58,10 +59,11 @@ def exponential(
     field: Field,
     blocks: Mapping[str, Block],
     constants: Mapping[str, Scalar],
-    h: float,
+    h: Fraction,
     depends_on: tuple[str, ...],
     span: Span,
     problems: Problems,
+    number: NumberType = "float64",
 ) -> Method:
     """Return the method for a field; `h` [s] is the whole substep."""
     made: dict[str, Block] = {}
@@ -69,14 +71,14 @@ def exponential(
     terms = 1
     for name in field.automaton.modes:
         a = jacobian(blocks[f"rates_{name}"], field.states, constants)
-        norm = scaled_norm(field, a) * h
+        norm = scaled_norm(field, a) * float(h)
         if not norm <= LARGEST_NORM:
             label = f"mode `{name}` is too fast for one step: |A h| = {norm:.3g} is above 4"
             needed = math.ceil(norm / LARGEST_NORM) if math.isfinite(norm) else "more"
             problems.error("step", span, label, f"{needed} times as many `substeps` are enough")
             continue
-        terms = max(terms, taylor_terms(norm))
-        numbers = _numbers(a, h)
+        terms = max(terms, taylor_terms(norm, number))
+        numbers = _numbers(a, float(h))
         solved += _constants(field, name, numbers, depends_on)
         made[f"step_{name}"] = _step(field, name, numbers, h)
     for name in field.automaton.modes:
@@ -86,8 +88,8 @@ def exponential(
         Variable(f"work.pull_{name}", "real", f"({state.unit.dimension})/s")
         for name, state in field.automaton.states.items()
     ]
-    number = Variable("work.order", "real", about="order of a term")
-    return Method(made, terms, tuple(solved), (*variables, number))
+    order = Variable("work.order", "real", about="order of a term")
+    return Method(made, terms, tuple(solved), (*variables, order))
 
 
 def scaled_norm(field: Field, a: Matrix) -> float:
@@ -105,10 +107,10 @@ def scaled_norm(field: Field, a: Matrix) -> float:
     return largest
 
 
-def taylor_terms(norm: float) -> int:
-    """Return the smallest K with norm^(K+1)/(K+1)! <= 2^-53."""
+def taylor_terms(norm: float, number: NumberType = "float64") -> int:
+    """Return the smallest K with norm^(K+1)/(K+1)! <= 2^-53, 2^-24 in float32."""
     terms, size = 0, norm
-    while size > UNIT_ROUNDOFF:
+    while size > 2.0 ** -DIGITS[number]:
         terms += 1
         size = size * norm / (terms + 1)
     return max(1, terms)
@@ -175,7 +177,7 @@ def _pull(field: Field, mode: str, a: Matrix) -> list[Op]:
     return ops
 
 
-def _step(field: Field, mode: str, numbers: _Numbers, h: float) -> Block:
+def _step(field: Field, mode: str, numbers: _Numbers, h: Fraction) -> Block:
     state: dict[str, Expr] = {name: Ref(f"state.{name}") for name in field.states}
     pull: dict[str, Expr] = {name: Ref(f"work.pull_{name}") for name in field.states}
     table = _table(numbers)

@@ -1,13 +1,27 @@
-"""Functions: the elementary functions that are operation lists, by name."""
+"""Functions: the elementary functions that are operation lists, by number type and name."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
+from language import elementary_single as of_single
 from language.elementary import cosine, exponential, hyperbolic_tangent, sine
+from language.number import NumberType
 from language.program import Function
 from language.tangent import angle_of, tangent
 
 MADE = (sine(), cosine(), exponential(), hyperbolic_tangent(), tangent(), angle_of())
+MADE_SINGLE = (
+    of_single.sine(),
+    of_single.cosine(),
+    of_single.exponential(),
+    of_single.hyperbolic_tangent(),
+    of_single.tangent(),
+    angle_of(of_single.ARC),
+)
 FUNCTIONS: Mapping[str, Function] = {function.name: function for function in MADE}
-"""A function that calls another one (tanh calls exp) comes after it."""
+"""In float64; a function that calls another one (tanh calls exp) comes after it."""
+FUNCTIONS_OF: Mapping[NumberType, Mapping[str, Function]] = {
+    "float64": FUNCTIONS,
+    "float32": {function.name: function for function in MADE_SINGLE},
+}

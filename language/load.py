@@ -6,6 +6,7 @@ from collections.abc import Collection, Mapping
 
 from language.automaton import read_automaton
 from language.check import check_automaton
+from language.check_number import check_numbers
 from language.continuous import continuous_program
 from language.document import Document, Scalar
 from language.model import Automaton
@@ -42,6 +43,7 @@ def program_of(automaton: Automaton, varying: Collection[str] = ()) -> Program:
     Raises SpecError.
     """
     problems = Problems()
+    check_numbers(automaton, problems)
     if automaton.is_sampled:
         return sampled_program(automaton, problems)
     return continuous_program(automaton, problems, varying)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from fractions import Fraction
 
 from language.balance import coefficient_of
 from language.model import Automaton, Balance, Formula, Mode, Region
+from language.number import rounded
 from language.operation import (
     Assign,
     Binary,
@@ -59,7 +59,7 @@ def expression(tree: Tree, known: Names) -> Expr:
         case Broken():
             raise TypeError(f"{tree.span}: an expression with a problem is not lowered")
         case Number(value, _, _):
-            return real(rounded(value))
+            return real(value)
         case Truth(value, _):
             return Value(value)
         case Name(path, _):
@@ -84,11 +84,6 @@ def expression(tree: Tree, known: Names) -> Expr:
             return known[memory_key(tree)]
         case Application(function, arguments, _):
             return Call(function, tuple(expression(part, known) for part in arguments))
-
-
-def rounded(value: Fraction) -> float:
-    """Return the nearest double: one rounding from the exact value (codegen rule R4)."""
-    return value.numerator / value.denominator
 
 
 def _power(base: Expr, exponent: int) -> Expr:

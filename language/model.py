@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Literal
 
+from language.number import NumberType
 from language.problem import Span
 from language.signal import Line, RecordingUse, Sensor, Stimulus
 from language.syntax import Tree, names
@@ -225,6 +226,7 @@ class Automaton:
     elements: Mapping[str, Element] = field(default_factory=dict)
     places: Mapping[str, Mapping[str, Formula]] = field(default_factory=dict)
     regions: tuple[Region, ...] = ()
+    numbers: NumberType = "float64"
 
     def source_of(self, output: str) -> str:
         """Return the state or equation that an output reads: its own name unless it says more."""

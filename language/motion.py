@@ -10,9 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from fractions import Fraction
 
 from language.field import Field, any_guard, at_time
 from language.model import Mode
+from language.number import DIGITS, NumberType
 from language.operation import (
     Assign,
     Binary,
@@ -36,13 +38,13 @@ from language.operation import (
 from language.program import Constant, Variable
 from language.region import slots
 
-MERGE = 2.0**-40
-"""Events nearer than this part of the time (4096 ULPs) are one instant (rule 10): rounding of the
-states moves a crossing by some ten ULPs; at 1 s it is 0.9 ps. In a tick: part of the period."""
+MERGE_ULPS = 4096
+"""Events nearer than this are one instant (rule 10): rounding moves a crossing by some ten ULPs."""
 RUN_HALVINGS = 24
-"""Halvings inside a tick: 1 ms / 2^24 = 60 ps (docs/language.md, section 9)."""
-FLOW_HALVINGS = 44
-"""Halvings of a continuous automaton's step: 1 ms / 2^44 is below one ULP of a time of 1 s."""
+"""Halvings inside a tick: 1 ms / 2^24 = 60 ps (docs/language.md, section 9); in float32 an ULP."""
+FLOW_HALVINGS: Mapping[NumberType, int] = {"float64": 44, "float32": 24}
+"""Halvings of a continuous automaton's step: 1 ms / 2^44 is below one ULP of a time of 1 s. In
+float32 the times within a step have 24 bits: from then on the middle is one of the two ends."""
 
 Armed = Mapping[str, str]
 
@@ -55,6 +57,16 @@ class Method:
     terms: int
     constants: tuple[Constant, ...]
     variables: tuple[Variable, ...]
+
+
+def merge_time(number: NumberType, step: Fraction, time: Fraction = Fraction(0)) -> float:
+    """Return the time [s] within which events are one instant, at a time since the start.
+
+    In float64 ULPs of the time: 0.9 ps at 1 s. A float32 knows the time within the step only, and
+    its states are as coarse: ULPs of the step, 0.5 us in 1 ms.
+    """
+    whole = max(time, step) if number == "float64" else step
+    return float(whole) * MERGE_ULPS * 2.0 ** (1 - DIGITS[number])
 
 
 def motion_blocks(

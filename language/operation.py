@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from fractions import Fraction
 from typing import Literal
+
+from language.number import NumberType, rounded
 
 
 @dataclass(frozen=True, slots=True)
 class Value:
-    """A value in the working type."""
+    """A literal; `exact` is what a real was rounded from, so that it is rounded once only."""
 
     value: float | int | bool
+    exact: Fraction | None = field(default=None, compare=False, repr=False)
+
+    def rounded(self, number: NumberType) -> Value:
+        """Return the literal in a number type."""
+        if not isinstance(self.value, float):
+            return self
+        return Value(rounded(self.value if self.exact is None else self.exact, number))
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,8 +156,10 @@ Op = Assign | Store | Branch | Choose | Loop | Count | FaultBit | Run
 Block = tuple[Op, ...]
 
 
-def real(value: float) -> Value:
-    """Return a real literal."""
+def real(value: float | Fraction) -> Value:
+    """Return a real literal; give the exact value where it is known."""
+    if isinstance(value, Fraction):
+        return Value(rounded(value), value)
     return Value(float(value))
 
 

@@ -17,6 +17,7 @@ from fractions import Fraction
 from typing import Literal
 
 from language.model import CHART
+from language.number import NumberType
 from language.operation import Block
 
 ValueType = Literal["real", "truth", "whole"]
@@ -143,7 +144,7 @@ class Program:
     """
 
     name: str
-    number: Literal["float64"]
+    number: NumberType
     period: Fraction | None
     major_step: Fraction
     constants: tuple[Constant, ...]

@@ -95,7 +95,9 @@ C_MACRO = re.compile(
     r"|U?INT\w*_(MAX|MIN|C)|(PTRDIFF|SIZE|WCHAR|WINT|SIG_ATOMIC)_(MAX|MIN)|NULL|errno|M_(E|PI\w*)"
 )
 """Macros of the headers that generated code includes."""
-FILE_WORDS = frozenset({"main", "ha_math", "float", "math", "stdint", "stdbool", "string"})
+FILE_WORDS = frozenset(
+    {"main", "ha_math", "ha_mathf", "float", "math", "stdint", "stdbool", "string"}
+)
 """Names of files beside which an automaton's own files would stand."""
 NOWHERE = Span(Source(""), 0, 0)
 """The place of an absent mapping: nothing is ever reported there."""

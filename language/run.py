@@ -19,9 +19,15 @@ from language.field import (
     field_variables,
     switch,
 )
-from language.lower import constant_names, rounded, tunables_of
+from language.lower import constant_names, tunables_of
 from language.model import CHART, Automaton, Formula, Mode, Run as ModelRun
-from language.motion import MERGE, RUN_HALVINGS, Method, motion_blocks, motion_variables
+from language.motion import (
+    RUN_HALVINGS,
+    Method,
+    merge_time,
+    motion_blocks,
+    motion_variables,
+)
 from language.operation import (
     Assign,
     Block,
@@ -43,6 +49,7 @@ from language.program import Constant, Variable
 from language.region import mode_variable
 from language.rk4 import rk4
 from language.wiring import enter_initial
+from language.working import working
 
 EVENT_LIMIT = "event_limit"
 MODE = "memory.run_mode"
@@ -76,7 +83,7 @@ def run_motion(
     field = Field(model, constant_names(automaton), inputs, MODE, f"{model.name} ")
     blocks = field_blocks(field)
     method = _method(automaton, field, runs[0], blocks, values, problems)
-    merge = real(MERGE * float(automaton.period))
+    merge = real(merge_time(automaton.numbers, automaton.period))
     made = {
         **blocks,
         **method.blocks,
@@ -109,7 +116,7 @@ def run_block(automaton: Automaton, run: ModelRun) -> Block:
         Branch(Ref("work.crossed"), after),
     )
     left = Compare(">", Ref("work.left"), real(0.0))
-    substep = real(float(automaton.period / run.substeps))
+    substep = real(automaton.period / run.substeps)
     body: Block = (
         Assign("work.left", substep, f"{automaton.name} {run.key}"),
         Loop(run.events + 1, "work.event", (Branch(left, segment),)),
@@ -128,7 +135,7 @@ def _inputs(automaton: Automaton, problems: Problems) -> dict[str, Expr]:
             found[name] = Ref(f"before.{name}")
         elif thing.default is not None:
             default = thing.default
-            found[name] = Value(bool(default)) if thing.truth else real(rounded(default))
+            found[name] = Value(bool(default)) if thing.truth else real(default)
         else:
             label = f"the run needs an input `{name}`: `{model.name}` has no default for it"
             problems.error("run", automaton.span, label)
@@ -146,14 +153,16 @@ def _method(
     assert automaton.period is not None
     if run.method == "rk4":
         return rk4(field)
-    h = float(automaton.period / run.substeps)
+    h = automaton.period / run.substeps
     formulas: list[Formula] = []
     for mode in field.automaton.all_modes:
         formulas += mode.equations.values()
         for balance in mode.flow.values():
             formulas += [Formula(balance.left, ""), Formula(balance.right, "")]
     depends_on = tunables_of(automaton, formulas)
-    return exponential(field, blocks, values, h, depends_on, run.span, problems)
+    number = automaton.numbers
+    rates = {name: working(block, number) for name, block in blocks.items()}
+    return exponential(field, rates, values, h, depends_on, run.span, problems, number)
 
 
 def _switches(field: Field, problems: Problems) -> dict[str, Block]:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 from language.elementary import TINY, Body, by_quadrant, horner, kernels, reduced
 from language.operation import (
@@ -62,9 +64,25 @@ BASES = {
     ),
 }
 """0, pi, pi/2, pi/2, plus or minus 0, atan 1/2, pi/4: each in two parts, together within 2^-106."""
-HUGE, SMALLER = real(2.0**1000), real(2.0**-100)
-LARGEST = real(sys.float_info.max)
-"""Above it are only infinities."""
+
+
+@dataclass(frozen=True)
+class ArcNumbers:
+    """The numbers of atan2 in one type; above `largest` are only infinities.
+
+    Sizes above `huge` are made smaller by the factor `smaller`: then they may be added up.
+    """
+
+    series: tuple[float, ...]
+    bases: Mapping[str, tuple[tuple[float, float], ...]]
+    huge: float
+    smaller: float
+    largest: float
+
+
+DOUBLE = ArcNumbers(ATAN_SERIES, BASES, 2.0**1000, 2.0**-100, sys.float_info.max)
+PIECES = ("series", "centre", "upper")
+"""Locals of the series, four coefficients each."""
 
 RISE, RUN = Ref("work.rise"), Ref("work.run")
 
@@ -81,7 +99,7 @@ def tangent() -> Function:
     return body.function("tan", "tangent; |x| <= 1e5 rad, clamped; error < 2.4 ULP")
 
 
-def angle_of() -> Function:
+def angle_of(numbers: ArcNumbers = DOUBLE, error: str = "1.5") -> Function:
     """atan2(rise, run) by atan t, t in [0, 1], about 0, 1/2 or 1 (Cody & Waite 1980, chapter 11).
 
     t is the smaller size over the larger. For a whole a, atan t = atan a + atan r with
@@ -92,7 +110,7 @@ def angle_of() -> Function:
     body = Body()
     up, along = body.let("up", Call("abs", (RISE,))), body.let("along", Call("abs", (RUN,)))
     steep, behind = Compare(">", up, along), Compare("<", RUN, real(0.0))
-    low, high = scaled(body, Select(steep, along, up), Select(steep, up, along))
+    low, high = scaled(body, numbers, Select(steep, along, up), Select(steep, up, along))
     near = Compare("<", multiply(real(16.0), low), multiply(real(7.0), high))
     middle = Compare("<", multiply(real(16.0), low), multiply(real(11.0), high))
     half = subtract(add(low, low), high), add(add(high, high), low)
@@ -103,9 +121,7 @@ def angle_of() -> Function:
     safe = Select(Compare("<=", high, real(0.0)), real(1.0), below)
     r = body.let("r", divide(top, safe))
     square = body.let("square", multiply(r, r))
-    upper = body.let("upper", horner(ATAN_SERIES[8:], square))
-    centre = body.let("centre", horner(ATAN_SERIES[4:8], square, upper))
-    series = body.let("series", horner(ATAN_SERIES[:4], square, centre))
+    series = pieced(body, numbers.series, square)
     core = body.let("core", add(r, multiply(multiply(r, square), series)))
     turn = body.let("turn", Select(steep, Unary("-", core), core))
     arc = body.let("arc", Select(behind, Unary("-", turn), turn))
@@ -113,7 +129,7 @@ def angle_of() -> Function:
     def base(part: int) -> Expr:
         by_bracket = {
             name: Select(near, real(a[part]), Select(middle, real(b[part]), real(c[part])))
-            for name, (a, b, c) in BASES.items()
+            for name, (a, b, c) in numbers.bases.items()
         }
         level = Select(behind, by_bracket["behind"], by_bracket["ahead"])
         return Select(steep, Select(behind, by_bracket["steep behind"], by_bracket["steep"]), level)
@@ -123,16 +139,28 @@ def angle_of() -> Function:
     flat = Select(Compare(">=", RUN, real(0.0)), RISE, size)
     half_turn = Select(Compare("<", RISE, real(0.0)), Unary("-", size), size)
     body.let("y", Select(Compare("<=", up, real(0.0)), flat, half_turn))
-    about = "angle of (run, rise), in (-pi, pi] rad; error < 1.5 ULP"
+    about = f"angle of (run, rise), in (-pi, pi] rad; error < {error} ULP"
     return body.function("atan2", about, ("rise", "run"))
 
 
-def scaled(body: Body, smaller: Expr, larger: Expr) -> tuple[Ref, Ref]:
+def pieced(body: Body, coefficients: tuple[float, ...], x: Expr) -> Expr:
+    """Return c0 + x (c1 + x (c2 + ...)), at most four coefficients a local."""
+    rest: Expr | None = None
+    for k in reversed(range(0, len(coefficients), 4)):
+        rest = body.let(PIECES[k // 4], horner(coefficients[k : k + 4], x, rest))
+    assert rest is not None
+    return rest
+
+
+def scaled(body: Body, numbers: ArcNumbers, smaller: Expr, larger: Expr) -> tuple[Ref, Ref]:
     """Return two sizes of the same quotient that may be added up; infinite ones become 1."""
     least, most = body.let("least", smaller), body.let("most", larger)
-    factor = body.let("factor", Select(Compare(">", most, HUGE), SMALLER, real(1.0)))
-    endless = Compare(">", most, LARGEST)
-    at_limit = Select(Compare(">", least, LARGEST), real(1.0), multiply(least, real(0.0)))
+    factor = body.let(
+        "factor", Select(Compare(">", most, real(numbers.huge)), real(numbers.smaller), real(1.0))
+    )
+    largest = real(numbers.largest)
+    endless = Compare(">", most, largest)
+    at_limit = Select(Compare(">", least, largest), real(1.0), multiply(least, real(0.0)))
     low = Select(endless, at_limit, multiply(least, factor))
     high = Select(endless, real(1.0), multiply(most, factor))
     return body.let("low", low), body.let("high", high)

@@ -5,9 +5,10 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Iterator, Mapping
 
-from language.functions import FUNCTIONS
-from language.lower import expression, rounded
+from language.functions import FUNCTIONS_OF
+from language.lower import expression
 from language.model import CHART, Automaton, Region
+from language.number import NumberType, rounded
 from language.operation import (
     Assign,
     Binary,
@@ -41,6 +42,7 @@ from language.program import (
 )
 from language.region import fired_variable, mode_variable
 from language.syntax import names
+from language.working import in_working_type
 
 
 def input_variables(automaton: Automaton, group: str) -> list[Variable]:
@@ -140,7 +142,8 @@ def defaults_of(automaton: Automaton) -> dict[str, float | bool]:
     found: dict[str, float | bool] = {}
     for name, thing in automaton.inputs.items():
         if thing.default is not None:
-            found[name] = bool(thing.default) if thing.truth else rounded(thing.default)
+            value = rounded(thing.default, automaton.numbers)
+            found[name] = bool(thing.default) if thing.truth else value
     return found
 
 
@@ -154,7 +157,7 @@ def assembled(
     """Return a program of blocks with what follows from the automaton alone."""
     return Program(
         name=automaton.name,
-        number="float64",
+        number=automaton.numbers,
         period=automaton.period,
         major_step=automaton.period or automaton.step,
         constants=tuple(constants),
@@ -187,16 +190,18 @@ def finished(program: Program, entries: tuple[str, ...], keep: tuple[str, ...] =
         if not more:
             break
         constants += [c for c in program.constants if c.name in more]
-    functions = _functions(used)
+    functions = _functions(used, program.number)
     kept = ("input.", "is_new.")
     variables = [v for v in program.variables if v.name in used or v.name.startswith(kept)]
     variables = _without_idle_before(program, variables, blocks)
-    return dataclasses.replace(
-        program,
-        constants=tuple(constants),
-        variables=tuple(variables),
-        functions=functions,
-        blocks=blocks,
+    return in_working_type(
+        dataclasses.replace(
+            program,
+            constants=tuple(constants),
+            variables=tuple(variables),
+            functions=functions,
+            blocks=blocks,
+        )
     )
 
 
@@ -239,19 +244,16 @@ def _reached(blocks: Mapping[str, Block], entries: tuple[str, ...]) -> dict[str,
     return {name: block for name, block in blocks.items() if name in seen}
 
 
-def _functions(used: set[str]) -> tuple[Function, ...]:
-    wanted = {name.removeprefix("call ") for name in used if name.startswith("call ")}
-    stack = [name for name in wanted if name in FUNCTIONS]
+def _functions(used: set[str], number: NumberType) -> tuple[Function, ...]:
+    known = FUNCTIONS_OF[number]
+    stack = [name.removeprefix("call ") for name in used if name.startswith("call ")]
     found: set[str] = set()
     while stack:
         name = stack.pop()
-        if name not in found:
+        if name in known and name not in found:
             found.add(name)
-            calls = _names(FUNCTIONS[name].body)
-            stack += [
-                c.removeprefix("call ") for c in calls if c.removeprefix("call ") in FUNCTIONS
-            ]
-    return tuple(function for name, function in FUNCTIONS.items() if name in found)
+            stack += [called.removeprefix("call ") for called in _names(known[name].body)]
+    return tuple(function for name, function in known.items() if name in found)
 
 
 def _names(block: Block) -> Iterator[str]:

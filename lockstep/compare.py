@@ -5,16 +5,18 @@ The process that interprets loads no compiled code of ours: the C runs as a prog
 
 from __future__ import annotations
 
-import math
+import itertools
 import struct
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from codegen.build import FLAGS, executable, fed, observed, run_executable
 from engine.interpreter import Stepper
+from language.number import NumberType, decimal
 from language.program import Program, short
 
-CANONICAL_NAN = struct.pack("<d", math.nan)
+FORMAT: Mapping[NumberType, str] = {"float64": "d", "float32": "f"}
+"""How a record keeps a real; whole numbers and truth values take 8 bytes."""
 
 
 @dataclass(frozen=True)
@@ -68,9 +70,12 @@ class Tape:
         self._fed = tuple(variable.name for variable in fed(self.program))
         self._observed = observed(self.program)
         self._names = tuple(item.name for item in self._observed)
-        kinds = "".join("d" if item.kind == "real" else "q" for item in self._observed)
-        self._input = struct.Struct(f"<{max(1, len(self._fed))}d")
-        self._value = struct.Struct(f"<{kinds}")
+        real = FORMAT[self.program.number]
+        kinds = [real if item.kind == "real" else "q" for item in self._observed]
+        self._input = struct.Struct(f"<{max(1, len(self._fed))}{real}")
+        self._value = struct.Struct(f"<{''.join(kinds)}")
+        ends = [0, *itertools.accumulate(struct.calcsize(f"<{kind}") for kind in kinds)]
+        self._places = [slice(*ends[k : k + 2]) for k in range(len(kinds))]
 
     def record(self, stepper: Stepper) -> None:
         """Keep the inputs and values of the tick that was just done."""
@@ -82,6 +87,10 @@ class Tape:
     def unpack(self, record: bytes) -> tuple[float | int, ...]:
         """Return the values of a record."""
         return self._value.unpack(record)
+
+    def word(self, record: bytes, position: int) -> bytes:
+        """Return the bytes of one value of a record."""
+        return record[self._places[position]]
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -109,7 +118,7 @@ def compare(tape: Tape, flags: Sequence[str] = FLAGS) -> Verdict:
         ours, theirs = tape.values[tick], output[tick * size : (tick + 1) * size]
         if ours == theirs:
             continue
-        different = _different(ours, theirs)
+        different = _different(tape, ours, theirs)
         differing += len(different)
         if different and first is None:
             first = _difference(tape, tick, different[0], theirs)
@@ -124,19 +133,14 @@ def compare(tape: Tape, flags: Sequence[str] = FLAGS) -> Verdict:
     )
 
 
-def _different(ours: bytes, theirs: bytes) -> list[int]:
+def _different(tape: Tape, ours: bytes, theirs: bytes) -> list[int]:
     """Return the positions that differ; all NaNs are one (codegen rule R10)."""
-    found = []
-    for position in range(len(ours) // 8):
-        a, b = ours[position * 8 : position * 8 + 8], theirs[position * 8 : position * 8 + 8]
-        if a != b and _canonical(a) != _canonical(b):
-            found.append(position)
-    return found
-
-
-def _canonical(word: bytes) -> bytes:
-    value = struct.unpack("<d", word)[0]
-    return CANONICAL_NAN if value != value else word
+    pairs = zip(tape.unpack(ours), tape.unpack(theirs), strict=True)
+    return [
+        position
+        for position, (a, b) in enumerate(pairs)
+        if tape.word(ours, position) != tape.word(theirs, position) and (a == a or b == b)
+    ]
 
 
 def _difference(tape: Tape, tick: int, position: int, theirs: bytes) -> Difference:
@@ -149,11 +153,12 @@ def _difference(tape: Tape, tick: int, position: int, theirs: bytes) -> Differen
         time=tape.start + tick * period,
         mode=tape.program.mode_name(int(mode)),
         signal=short(tape.names[position]),
-        engine=_shown(values[position], ours, position),
-        compiled=_shown(other[position], theirs, position),
+        engine=_shown(tape, values[position], ours, position),
+        compiled=_shown(tape, other[position], theirs, position),
     )
 
 
-def _shown(value: float | int, record: bytes, position: int) -> str:
-    bits = record[position * 8 : position * 8 + 8][::-1].hex()
-    return f"{value!r} (0x{bits})"
+def _shown(tape: Tape, value: float | int, record: bytes, position: int) -> str:
+    bits = tape.word(record, position)[::-1].hex()
+    text = decimal(value, tape.program.number) if isinstance(value, float) else repr(value)
+    return f"{text} (0x{bits})"

@@ -9,7 +9,7 @@ from language.load import automaton_of, program_of
 from language.project import Project, expanded, read_document
 from modewright.checking import spec_files
 
-LIBRARY = ("ha_math.h", "ha_math.c")
+LIBRARY = ("ha_math.h", "ha_math.c", "ha_mathf.h", "ha_mathf.c")
 
 
 def generated_files(root: Path) -> dict[Path, bytes]:

@@ -1,21 +1,23 @@
-"""Literals: one rounding from the text of a spec to a double, and no bit lost on the way to C."""
+"""Literals: one rounding from the text of a spec to a number type, and no bit lost towards C."""
 
 from __future__ import annotations
 
 import math
 import random
+import re
 import struct
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import example, given, strategies as st
 
 import modewright as mw
 from codegen.build import compile_program, run_executable
 from codegen.expression import literal
-from language.lower import rounded
+from language.number import NUMBERS, NumberType, rounded
 from language.units import parse_unit
 from modewright.api import program
 
@@ -30,8 +32,10 @@ READER = """\
 #include <stdio.h>
 #include <stdlib.h>
 
-static const double compiled[] = {
-%s
+typedef REAL real;
+
+static const real compiled[] = {
+VALUES
 };
 
 int main(void)
@@ -39,13 +43,13 @@ int main(void)
     static char line[64];
 
     for (size_t k = 0U; k < (sizeof compiled / sizeof compiled[0]); k++) {
-        const double *const value = &compiled[k];
-        double pair[2] = {*value, 0.0};
+        const real *const value = &compiled[k];
+        real pair[2] = {*value, 0};
 
         if (fgets(line, (int)sizeof line, stdin) == NULL) {
             return EXIT_FAILURE;
         }
-        pair[1] = strtod(line, NULL);
+        pair[1] = READ(line, NULL);
         if (fwrite(pair, sizeof pair, 1U, stdout) != 1U) {
             return EXIT_FAILURE;
         }
@@ -55,26 +59,56 @@ int main(void)
 """
 
 
-def random_doubles(count: int) -> list[float]:
-    """Return finite doubles of random bits: every exponent is as likely as any other."""
+SPECIALS_SINGLE = (
+    *(0.0, 1.0, 2.0**-149, 2.0**-126, 2.0**-126 - 2.0**-149, (2.0 - 2.0**-23) * 2.0**127),
+    *(16777216.0, 33554432.0, 2.0**-24, 2.0**30, 8589973504.0, 1.1754943508222875e-38),
+)
+FORMATS: dict[NumberType, str] = {"float64": "d", "float32": "f"}
+
+
+def random_reals(number: NumberType, count: int) -> list[float]:
+    """Return finite reals of random bits: every exponent is as likely as any other."""
     draw = random.Random("literals")
-    patterns = (struct.pack("<Q", draw.getrandbits(64)) for _ in range(2 * count))
-    values = [struct.unpack("<d", pattern)[0] for pattern in patterns]
+    form = FORMATS[number]
+    size = struct.calcsize(form)
+    values = [struct.unpack(form, draw.randbytes(size))[0] for _ in range(2 * count)]
     return [value for value in values if math.isfinite(value)][:count]
 
 
-def bits(value: float) -> bytes:
-    return struct.pack("<d", value)
+def bits(value: float, number: NumberType = "float64") -> bytes:
+    return struct.pack(f"<{FORMATS[number]}", value)
 
 
-def test_compiler_and_strtod_read_back_the_same_bits(tmp_path: Path) -> None:
-    values = random_doubles(COUNT) + [sign * x for x in SPECIALS for sign in (1.0, -1.0)]
-    texts = [literal(value) for value in values]
+@pytest.mark.parametrize("number", NUMBERS)
+def test_compiler_and_library_read_back_the_same_bits(number: NumberType, tmp_path: Path) -> None:
+    specials = SPECIALS if number == "float64" else SPECIALS_SINGLE
+    values = random_reals(number, COUNT) + [sign * x for x in specials for sign in (1.0, -1.0)]
+    texts = [literal(value, number) for value in values]
     source = tmp_path / "reader.c"
-    source.write_text(READER % ",\n".join(texts))
+    real, read = {"float64": ("double", "strtod"), "float32": ("float", "strtof")}[number]
+    text = READER.replace("REAL", real).replace("READ", read)
+    source.write_text(text.replace("VALUES", ",\n".join(texts)))
     compile_program([source], tmp_path / "reader")
-    read = run_executable(tmp_path / "reader", "\n".join([*texts, ""]).encode())
-    assert read == b"".join(2 * bits(value) for value in values)
+    lines = "\n".join([*(text.removesuffix("F") for text in texts), ""])
+    found = run_executable(tmp_path / "reader", lines.encode())
+    assert found == b"".join(2 * bits(value, number) for value in values)
+
+
+@pytest.mark.parametrize("name", ["estimator_float32", "ha_mathf"])
+def test_every_literal_of_generated_float32_code_is_read_back(name: str, tmp_path: Path) -> None:
+    """Of all literals in the code: the float that the compiler reads has that shortest decimal."""
+    code = mw.generate("estimator_float32")[f"{name}.c"]
+    texts = list(dict.fromkeys(re.findall(r"(?<![\w.])\d[\d.]*(?:e[-+]?\d+)?F\b", code)))
+    assert len(texts) > 10
+    source = tmp_path / "reader.c"
+    text = READER.replace("REAL", "float").replace("READ", "strtof")
+    source.write_text(text.replace("VALUES", ",\n".join(texts)))
+    compile_program([source], tmp_path / "reader")
+    lines = "\n".join([*(text.removesuffix("F") for text in texts), ""])
+    found = run_executable(tmp_path / "reader", lines.encode())
+    values = [struct.unpack_from("<f", found, 8 * k)[0] for k in range(len(texts))]
+    assert [literal(value, "float32") for value in values] == texts
+    assert found == b"".join(2 * bits(value, "float32") for value in values)
 
 
 @given(st.floats(allow_nan=False, allow_infinity=False))
@@ -82,14 +116,27 @@ def test_compiler_and_strtod_read_back_the_same_bits(tmp_path: Path) -> None:
 @example(1e16)
 @example(-0.0)
 def test_a_literal_is_a_double_in_c_and_the_shortest_one(value: float) -> None:
-    text = literal(value)
+    text = literal(value, "float64")
     assert bits(float(text)) == bits(value)
     assert "." in text or "e" in text
     assert len(text) <= len("-2.2250738585072014e-308")
 
 
+@given(st.floats(allow_nan=False, allow_infinity=False, width=32))
+@example(2.0**-149)
+@example(16777216.0)
+@example(-0.0)
+def test_a_literal_is_a_float_in_c_and_the_shortest_one(value: float) -> None:
+    text = literal(value, "float32")
+    assert text.endswith("F") and ("." in text or "e" in text)
+    assert bits(rounded(Fraction(text[:-1]), "float32"), "float32") == bits(value + 0.0, "float32")
+    shortest = np.format_float_scientific(np.float32(value), unique=True)
+    assert Fraction(text[:-1]) == Fraction(shortest)
+    assert text.startswith("-") == (math.copysign(1.0, value) < 0.0)
+
+
 def test_truth_and_whole_numbers_have_literals_of_their_own() -> None:
-    assert [literal(value) for value in (True, False, 0, 7, -3)] == [
+    assert [literal(value, "float64") for value in (True, False, 0, 7, -3)] == [
         "true",
         "false",
         "0",

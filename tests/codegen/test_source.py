@@ -149,7 +149,22 @@ def test_two_generations_are_equal_and_math_is_the_same_for_all() -> None:
     for name in AUTOMATA:
         files = files_of(name)
         if "ha_math.c" in files:
-            assert math_files().items() <= files.items()
+            assert math_files("float64").items() <= files.items()
+
+
+def test_float32_has_mathematics_of_its_own_without_a_double() -> None:
+    files = files_of("estimator_float32")
+    assert sorted(files) == [
+        "estimator_float32.c",
+        "estimator_float32.h",
+        "ha_mathf.c",
+        "ha_mathf.h",
+    ]
+    assert math_files("float32").items() <= files.items()
+    for text in files.values():
+        code = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
+        assert not re.search(r"\bdouble\b|\bint64_t\b", code)
+        assert not re.search(r"(?<![\w.])\d+\.\d*(e[-+]?\d+)?(?![\deF.+-])", code)
 
 
 def test_a_continuous_automaton_has_no_c() -> None:

@@ -1,0 +1,57 @@
+"""Arithmetic: how the interpreter holds a real of each number type, and operates on it (rule R14).
+
+A float64 is a Python float. A float32 is a numpy.float32, whose `+ - * /` and comparisons are the
+processor's own; the two are never mixed, and no numpy scalar leaves the interpreter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from language.evaluate import EXACT, divide
+from language.number import NumberType
+
+
+@dataclass(frozen=True)
+class Arithmetic:
+    """One number type: `real` rounds to it, once; `plain` gives a value of a frame to Python.
+
+    `quiet` is the context in which blocks run.
+    """
+
+    real: Callable[[Any], Any]
+    divide: Callable[[Any, Any], Any]
+    elementary: Mapping[str, Callable[..., Any]]
+    quiet: Callable[[], AbstractContextManager[None]]
+    plain: Callable[[Any], Any]
+
+    def value(self, value: float | int | bool) -> Any:
+        """Return a value as it stands in a frame: reals in the type, the others as they are."""
+        return self.real(value) if isinstance(value, float) else value
+
+
+def _rounded(function: Callable[..., Any]) -> Callable[..., Any]:
+    """An operation of doubles whose result is exact or rounded once, as one of float32."""
+    return lambda *arguments: np.float32(function(*arguments))
+
+
+def _ieee() -> AbstractContextManager[None]:
+    """Overflow, division by zero and NaN are values, not warnings."""
+    return np.errstate(all="ignore")
+
+
+ARITHMETIC: Mapping[NumberType, Arithmetic] = {
+    "float64": Arithmetic(float, divide, EXACT["float64"], nullcontext, lambda value: value),
+    "float32": Arithmetic(
+        np.float32,
+        lambda a, b: a / b,
+        {name: _rounded(function) for name, function in EXACT["float32"].items()},
+        _ieee,
+        lambda value: value.item() if isinstance(value, np.generic) else value,
+    ),
+}

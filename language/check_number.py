@@ -1,0 +1,57 @@
+"""Check of numbers: every number of a spec has a value near it in the automaton's number type."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterator, Mapping
+from fractions import Fraction
+
+from language.model import Automaton, Input, Parameter
+from language.number import rounded
+from language.problem import Problems, Span
+from language.syntax import Number
+
+
+def check_numbers(automaton: Automaton, problems: Problems) -> None:
+    """Report numbers that the type turns into an infinity or into 0. Raises SpecError."""
+    number = automaton.numbers
+    if number == "float64":
+        return
+    for value, span in dict.fromkeys(_numbers(automaton)):
+        near = rounded(value, number)
+        if math.isinf(near):
+            label = f"{_short(value)} is beyond the largest {number}, {_largest():.4g}"
+            problems.error("value", span, label, "`numbers: float64` has room for it")
+        elif near == 0.0 and value != 0:
+            label = f"{_short(value)} is 0 in {number}"
+            problems.error("value", span, label, "`numbers: float64` tells it from 0")
+    problems.stop_if_any()
+
+
+def _numbers(part: object) -> Iterator[tuple[Fraction, Span]]:
+    """Yield every number below a part of a model, with its place."""
+    match part:
+        case Number(value, _, span):
+            yield value, span
+        case Parameter(value=Fraction() as value, span=span):
+            yield value, span
+        case Input(default=Fraction() as default, span=span):
+            yield default, span
+        case Mapping():
+            for item in part.values():
+                yield from _numbers(item)
+        case tuple():
+            for item in part:
+                yield from _numbers(item)
+        case _ if dataclasses.is_dataclass(part) and not isinstance(part, type | Span):
+            for field in dataclasses.fields(part):
+                yield from _numbers(getattr(part, field.name))
+
+
+def _largest() -> float:
+    return (2.0 - 2.0**-23) * 2.0**127
+
+
+def _short(value: Fraction) -> str:
+    return f"{float(value):.4g}"

@@ -1,0 +1,217 @@
+"""Elementary functions in float32 as operations: those of elementary.py with fewer terms.
+
+The same methods, clamps and symmetries; every number here is a float32. sin and cos are reduced by
+four parts of pi/2, for 24 bits leave less room for exact products. The errors that `about` states,
+in ULP of the exact result, were measured at every float32 of the domain (tests/language).
+"""
+
+from __future__ import annotations
+
+from language.elementary import Body, X, by_quadrant, horner, within
+from language.operation import (
+    Call,
+    Compare,
+    Expr,
+    Ref,
+    Select,
+    Unary,
+    add,
+    divide,
+    multiply,
+    real,
+    subtract,
+)
+from language.program import Function
+from language.tangent import ArcNumbers
+
+ROUND = real(1.5 * 2.0**23)
+"""Adding and subtracting it rounds |x| < 2^22 to the nearest whole number, ties to even (R6)."""
+TINY = real(2.0**-13)
+"""Below it sin x and tanh x are x to 2^-26 / 3 relative; keeps -0.0 and the subnormals."""
+
+EXP_LOWEST, EXP_HIGHEST = real(-87.0), real(88.0)
+"""Within them e^x is finite and normal, and its power of two is within -126 and 127."""
+PER_LN_2 = real(1.4426950216293335)
+LN_2 = real(0.693145751953125), real(1.428606765330187e-06)
+"""ln 2 in two parts; the first is a multiple of 2^-15, so its multiples up to 2^8 are exact."""
+EXP_SERIES = (
+    0.4999999403953552,
+    0.16666509211063385,
+    0.041668009012937546,
+    0.008369989693164825,
+    0.0013847037917003036,
+)
+"""(e^r - 1 - r) / r^2, degree 4 in r, |r| <= ln 2 / 2; error of e^r 2^-28.1 relative.
+
+This and the next two: minimax by mpmath at 40 digits (Remez exchange), the lowest coefficient
+rounded to float32 and fixed, the rest fitted anew, and so on upwards.
+"""
+
+ANGLE = 1000.0
+"""Bound of the argument of sin and cos [rad]: 637 quarter turns, fewer than 2^10."""
+PER_QUARTER = real(0.6366197466850281)
+QUARTER = (
+    real(1.57080078125),
+    real(-4.455447196960449e-06),
+    real(9.922587196342647e-10),
+    real(-1.6513995574653217e-13),
+)
+"""pi/2 in four parts, together within 2^-68; the first three are multiples of 2^-13, 2^-27 and
+2^-41 with at most 14 bits, so their products with a number of quarters are exact."""
+SIN_SERIES = (-0.16666653752326965, 0.00833209604024887, -0.00019505627278704196)
+"""(sin r / r - 1) / r^2, degree 2 in r^2, |r| <= pi/4; error of sin r / r 2^-27.7."""
+COS_SERIES = (0.04166664555668831, -0.0013887288514524698, 2.4428207325399853e-05)
+"""(cos r - 1 + r^2 / 2) / r^4, degree 2 in r^2, |r| <= pi/4; error of cos r 2^-32.8."""
+
+TANH_FULL = real(10.0)
+"""tanh x rounds to 1 from x = 9.02 on."""
+TANH_SPLIT = real(0.625)
+LAMBERT_ABOVE = (315.0, 14.0)
+LAMBERT_BELOW = (945.0, 420.0, 15.0)
+"""x - tanh x = x z above(z) / below(z), z = x^2, within 2^-30 of x up to 0.625: Lambert's
+continued fraction x/(1 + z/(3 + z/(5 + z/(7 + z/9))))."""
+
+
+def nearest(x: Expr) -> Expr:
+    """Return the whole number nearest to x, ties to even."""
+    return subtract(add(x, ROUND), ROUND)
+
+
+def exponential() -> Function:
+    """e^x = 2^k e^r, k whole, |r| <= ln 2 / 2, as in elementary.py; x is clamped to [-87, 88]."""
+    body = Body()
+    bounded = body.let("bounded", within(X, EXP_LOWEST, EXP_HIGHEST))
+    power = nearest(multiply(bounded, PER_LN_2))
+    # The comparison is for NaN: pow2 gets a whole number always.
+    exponent = body.let("exponent", Select(Compare(">", bounded, EXP_LOWEST), power, real(-126.0)))
+    head = body.let("head", subtract(bounded, multiply(exponent, LN_2[0])))
+    tail = body.let("tail", multiply(exponent, LN_2[1]))
+    r = body.let("r", subtract(head, tail))
+    series = body.let("series", horner(EXP_SERIES, r))
+    curved = subtract(multiply(multiply(r, r), series), tail)
+    scaled = body.let("scaled", add(real(1.0), add(head, curved)))
+    body.let("y", multiply(Call("pow2", (exponent,)), scaled))
+    return body.function("exp", "e^x; -87 <= x <= 88, clamped; error < 0.95 ULP")
+
+
+def reduced(body: Body) -> tuple[Ref, Ref, Ref]:
+    """Return (quadrant 0 1 2 3, head, tail): x is head + tail past a multiple of pi/2.
+
+    `coarse`, `fine` and `finer` are exact. Two differences with their rounding errors (Dekker's
+    fast two-sum) leave head + tail within 2^-56 of the rest of x, which is 2^-30 or more.
+    """
+    bounded = body.let("bounded", within(X, real(-ANGLE), real(ANGLE)))
+    quarters = body.let("quarters", nearest(multiply(bounded, PER_QUARTER)))
+    # quarters / 4 - 3/8 is never near a tie: it rounds to the floor of quarters / 4.
+    turns = body.let("turns", nearest(subtract(multiply(real(0.25), quarters), real(0.375))))
+    quadrant = body.let("quadrant", subtract(quarters, multiply(real(4.0), turns)))
+    coarse = body.let("coarse", subtract(bounded, multiply(quarters, QUARTER[0])))
+    fine = body.let("fine", multiply(quarters, QUARTER[1]))
+    finer = body.let("finer", multiply(quarters, QUARTER[2]))
+    first = body.let("first", subtract(coarse, fine))
+    lost = body.let("lost", subtract(subtract(coarse, first), fine))
+    head = body.let("head", subtract(first, finer))
+    rest = body.let("rest", subtract(subtract(first, head), finer))
+    tail = body.let("tail", subtract(add(lost, rest), multiply(quarters, QUARTER[3])))
+    return quadrant, head, tail
+
+
+def kernels(body: Body, head: Ref, tail: Ref) -> tuple[Ref, Ref]:
+    """Return (sin, cos) of head + tail, |head| <= pi/4, as in elementary.py."""
+    square = body.let("square", multiply(head, head))
+    half = body.let("half", multiply(real(0.5), square))
+    crest = body.let("crest", subtract(real(1.0), half))
+    series = body.let("sine_series", horner(SIN_SERIES, square))
+    cubic = multiply(multiply(head, square), series)
+    sine = body.let("sine", add(head, add(multiply(tail, crest), cubic)))
+    series = body.let("cosine_series", horner(COS_SERIES, square))
+    quartic = multiply(multiply(square, square), series)
+    lost = subtract(subtract(real(1.0), crest), half)
+    fringe = add(lost, subtract(quartic, multiply(head, tail)))
+    cosine = body.let("cosine", add(crest, fringe))
+    return sine, cosine
+
+
+def sine() -> Function:
+    """sin x, x clamped to [-1000, 1000] rad; x itself where tiny, so that sin -0.0 is -0.0."""
+    body = Body()
+    quadrant, head, tail = reduced(body)
+    sin, cos = kernels(body, head, tail)
+    turned = by_quadrant(quadrant, sin, cos, Unary("-", sin), Unary("-", cos))
+    body.let("y", Select(Compare("<", Call("abs", (X,)), TINY), X, turned))
+    return body.function("sin", "sine; |x| <= 1000 rad, clamped; error < 0.85 ULP")
+
+
+def cosine() -> Function:
+    """cos x, x clamped to [-1000, 1000] rad."""
+    body = Body()
+    quadrant, head, tail = reduced(body)
+    sin, cos = kernels(body, head, tail)
+    body.let("y", by_quadrant(quadrant, cos, Unary("-", sin), Unary("-", cos), sin))
+    return body.function("cos", "cosine; |x| <= 1000 rad, clamped; error < 0.85 ULP")
+
+
+def hyperbolic_tangent() -> Function:
+    """tanh x as in elementary.py: Lambert's fraction below 0.625, above 1 - 2 / (e^2x + 1)."""
+    body = Body()
+    size = body.let("size", Call("abs", (X,)))
+    bounded = body.let("bounded", Select(Compare(">", size, TANH_FULL), TANH_FULL, size))
+    square = body.let("square", multiply(bounded, bounded))
+    above = body.let("above", horner(LAMBERT_ABOVE, square))
+    below = body.let("below", horner(LAMBERT_BELOW, square))
+    low = subtract(bounded, divide(multiply(multiply(bounded, square), above), below))
+    power = Call("exp", (add(bounded, bounded),))
+    high = subtract(real(1.0), divide(real(2.0), add(power, real(1.0))))
+    split = Compare("<", bounded, TANH_SPLIT)
+    magnitude = body.let("magnitude", Select(split, low, high))
+    signed = Select(Compare("<", X, real(0.0)), Unary("-", magnitude), magnitude)
+    body.let("y", Select(Compare("<", size, TINY), X, signed))
+    return body.function("tanh", "hyperbolic tangent; every x; error < 1.4 ULP")
+
+
+def tangent() -> Function:
+    """tan x as in tangent.py: sin / cos of the reduced argument, -cos / sin in odd quadrants."""
+    body = Body()
+    quadrant, head, tail = reduced(body)
+    sin, cos = kernels(body, head, tail)
+    even, odd = divide(sin, cos), Unary("-", divide(cos, sin))
+    turned = by_quadrant(quadrant, even, odd, even, odd)
+    body.let("y", Select(Compare("<", Call("abs", (X,)), TINY), X, turned))
+    return body.function("tan", "tangent; |x| <= 1000 rad, clamped; error < 2.4 ULP")
+
+
+ARC = ArcNumbers(
+    series=(
+        -0.33333301544189453,
+        0.19997620582580566,
+        -0.14227403700351715,
+        0.1047528013586998,
+        -0.05781654268503189,
+    ),
+    bases={
+        "ahead": (
+            (0.0, 0.0),
+            (0.46364760398864746, 5.01215868808913e-09),
+            (0.7853981852531433, -2.1855694143368964e-08),
+        ),
+        "behind": (
+            (3.1415927410125732, -8.742277657347586e-08),
+            (2.677945137023926, -9.243493792610025e-08),
+            (2.356194496154785, -5.962440319251527e-09),
+        ),
+        "steep": (
+            (1.5707963705062866, -4.371138828673793e-08),
+            (1.1071487665176392, -4.872354963936232e-08),
+            (0.7853981852531433, -2.1855694143368964e-08),
+        ),
+        "steep behind": (
+            (1.5707963705062866, -4.371138828673793e-08),
+            (2.0344438552856445, 8.051005551124035e-08),
+            (2.356194496154785, -5.962440319251527e-09),
+        ),
+    },
+    huge=2.0**120,
+    smaller=2.0**-20,
+    largest=(2.0 - 2.0**-23) * 2.0**127,
+)
+"""As in tangent.py; (atan r / r - 1) / r^2, degree 4 in r^2, error of atan r / r 2^-29.4."""
