@@ -11,10 +11,12 @@ import typer
 from modewright.commands.check import check
 from modewright.commands.compare import compare
 from modewright.commands.demo import demo
+from modewright.commands.doctor import doctor
 from modewright.commands.explain import explain
 from modewright.commands.generate import generate
 from modewright.commands.graph import graph
 from modewright.commands.lockstep import lockstep
+from modewright.commands.new import new
 from modewright.commands.plot import plot
 from modewright.commands.replay import replay
 from modewright.commands.simulate import simulate
@@ -22,7 +24,9 @@ from modewright.console import configure
 from modewright.exits import EXIT_CODES, exit_code
 from modewright.files import require_writable
 
-COMMANDS = (check, simulate, lockstep, replay, plot, compare, graph, generate, explain, demo)
+COMMANDS = (
+    new, check, simulate, lockstep, replay, plot, compare, graph, generate, explain, demo, doctor,
+)  # fmt: skip
 
 app = typer.Typer(
     no_args_is_help=True,

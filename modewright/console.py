@@ -71,6 +71,11 @@ def announce(files: Sequence[Path]) -> None:
         console().print(f"wrote {path}", highlight=False, soft_wrap=True)
 
 
+def counted(number: int, noun: str) -> str:
+    """Return a number with its noun: `1 spec`, `2 specs`."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
 def _plain(handler: logging.Handler, form: str) -> logging.Handler:
     formatter = logging.Formatter(form, "%Y-%m-%dT%H:%M:%SZ")
     formatter.converter = time.gmtime

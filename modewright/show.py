@@ -15,6 +15,7 @@ from engine.difference import ModeSequence, RunDifference
 from engine.trajectory import Event, Trajectory
 from lockstep.compare import Verdict
 from modewright.api import Replayed
+from modewright.doctor import Finding
 
 MOST_EVENTS = 40
 """Longest table of events shown to a person; all of them are in --json."""
@@ -189,3 +190,12 @@ def _finite(values: Mapping[str, Any]) -> dict[str, Any]:
         name: None if isinstance(value, float) and not math.isfinite(value) else value
         for name, value in values.items()
     }
+
+
+def print_finding(console: Console, finding: Finding) -> None:
+    """Print one finding of the doctor, and what would help."""
+    colour = {"ok": "green", "absent": "yellow", "fault": "red"}[finding.verdict]
+    text = f"[{colour}]{finding.verdict:<6}[/] {finding.name:<12} {escape(finding.told)}"
+    console.print(text, highlight=False, soft_wrap=True)
+    if finding.help:
+        console.print(f"       help: {escape(finding.help)}", highlight=False, soft_wrap=True)

@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from modewright.commands.options import Json
-from modewright.console import console
+from modewright.console import console, counted
 from modewright.exits import PROBLEMS
 
 
@@ -41,6 +41,6 @@ def check(
     elif problems:
         print(render_all(problems), file=sys.stderr)
     if not as_json:
-        console().print(f"{len(names)} specs checked, {len(errors)} problems")
+        console().print(f"{counted(len(names), 'spec')} checked, {counted(len(errors), 'problem')}")
     if errors:
         raise typer.Exit(PROBLEMS)

@@ -72,7 +72,7 @@ def test_quiet_tells_nothing_and_the_log_file_tells_what_was_done(
     assert capsys.readouterr().out == ""
     assert "command:" in log.read_text()
     assert run("check", "estimator") == 0
-    assert "1 specs checked" in capsys.readouterr().out
+    assert "1 spec checked, 0 problems" in capsys.readouterr().out
 
 
 def test_a_pipe_gets_no_colour_and_no_bar() -> None:
@@ -142,3 +142,53 @@ def test_a_run_in_an_unknown_format_is_refused_before_any_work(tmp_path: Path) -
     out = str(tmp_path / "run.xlsx")
     assert run("simulate", "ev_driveline", "-s", "tip_out", "--out", out) == 1
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_new_project_has_no_problem_simulates_and_its_tests_pass(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run("new", "warm_room") == 0
+    monkeypatch.chdir(tmp_path / "warm_room")
+    assert run("check", "--all") == 0
+    assert run("simulate", "warm_room", "-s", "cold_day", "--out", "run.csv") == 0
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout
+    assert "3 passed" in done.stdout
+
+
+@pytest.mark.parametrize(("name", "code"), [("1st", 2), ("a-b", 2), ("room", 2), ("there", 1)])
+def test_a_project_that_cannot_be_made_leaves_nothing(
+    name: str, code: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "there").mkdir()
+    assert run("new", name) == code
+    assert [path.name for path in tmp_path.iterdir()] == ["there"]
+    assert list((tmp_path / "there").iterdir()) == []
+
+
+def test_the_doctor_finds_everything_in_order_and_tests_itself(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert run("doctor", "--json") == 0
+    found = {item["name"]: item for item in json.loads(capsys.readouterr().out)["findings"]}
+    assert {item["verdict"] for item in found.values()} == {"ok"}
+    assert found["self-test"]["told"].endswith("values in engine and C, 0 differ")
+    assert {"python", "modewright", "numpy", "pyarrow", "C compiler", "cache"} <= set(found)
+
+
+def test_the_doctor_says_what_is_missing_and_what_helps(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    monkeypatch.setenv("CC", "no-such-compiler")
+    assert run("doctor") == 3
+    assert "apt-get install gcc" in capsys.readouterr().out
+    monkeypatch.delenv("CC")
+    open_to_all = tmp_path / "open"
+    open_to_all.mkdir()
+    open_to_all.chmod(0o777)
+    monkeypatch.setenv("MODEWRIGHT_CACHE", str(open_to_all))
+    assert run("doctor") == 1
+    assert "chmod 700" in capsys.readouterr().out
