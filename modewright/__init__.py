@@ -8,6 +8,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from modewright.neighbours import claim_neighbours
+
 if TYPE_CHECKING:
     from engine.difference import RunDifference
     from engine.plot import Picture
@@ -61,6 +63,8 @@ PLACES = {
     "save": "modewright.runs",
 }
 """Where a name of the public API is defined, if not in `modewright.api`."""
+
+claim_neighbours()
 
 
 def __getattr__(name: str) -> Any:

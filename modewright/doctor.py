@@ -12,8 +12,9 @@ from importlib import import_module, metadata
 from pathlib import Path
 from typing import Literal
 
+from modewright.neighbours import NEIGHBOURS
+
 OLDEST_PYTHON = (3, 11)
-OWN_PACKAGES = ("language", "engine", "codegen", "lockstep", "spec")
 Verdict = Literal["ok", "absent", "fault"]
 
 
@@ -45,7 +46,7 @@ def _own_packages() -> Finding:
     """Tell whether our packages are ours: a folder `engine/` of the user's may hide one."""
     base = Path(__file__).resolve().parent.parent
     hidden = []
-    for name in OWN_PACKAGES:
+    for name in NEIGHBOURS:
         file = import_module(name).__file__
         if file is None or Path(file).resolve().parent.parent != base:
             hidden.append(f"{name} is {file}")
