@@ -14,7 +14,7 @@ from pathlib import Path
 
 from codegen.cache import key_of, stored
 from codegen.expression import literal
-from codegen.names import REAL, CNames
+from codegen.names import REAL, CNames, c_type
 from codegen.source import c_files, render
 from language.missing import ToolMissing as ToolMissing
 from language.program import Program, Variable
@@ -150,7 +150,7 @@ def _first_error(text: str) -> str:
 def _harness(program: Program) -> Mapping[str, object]:
     place, real = CNames(program), REAL[program.number]
     inputs = [
-        {"place": place(v.name).replace("in->", "in."), "truth": v.type == "truth"}
+        {"place": place(v.name).replace("in->", "in."), "type": c_type(v, program.number)}
         for v in fed(program)
     ]
     fields = [
@@ -163,6 +163,7 @@ def _harness(program: Program) -> Mapping[str, object]:
     width = max(1, len(inputs))
     return {
         "name": program.name,
+        "whole": ("uint8_t", "int32_t"),
         "inputs": inputs,
         "fields": fields,
         "width": width,

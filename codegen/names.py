@@ -59,7 +59,13 @@ class CNames:
         for region in self.program.regions:
             if name == region.mode:
                 return mode_constant(self.program, number, region.name)
+        values = self._values(name)
+        if values and 0 <= number < len(values):
+            return value_constant(self.program, values, number)
         return f"{number}U" if name.startswith(UNSIGNED) else str(number)
+
+    def _values(self, name: str) -> tuple[str, ...]:
+        return next((values for known, values in _lists(self.program) if known == name), ())
 
 
 def c_member(name: str) -> str:
@@ -73,6 +79,8 @@ def c_type(variable: Variable, number: NumberType) -> str:
         return REAL[number]
     if variable.type == "truth":
         return "bool"
+    if variable.values:
+        return "uint8_t"
     if variable.name.startswith("timer."):
         return "uint16_t"
     if variable.name == "memory.faults":
@@ -92,3 +100,23 @@ def run_mode_constant(program: Program, number: int) -> str:
     """Return the name of a mode of the run in C."""
     name = next(mode.name for mode in program.run_modes if mode.number == number)
     return f"{program.name}_RUN_{name}"
+
+
+def enumerations(program: Program) -> list[tuple[str, tuple[str, ...]]]:
+    """Return the lists of names that variables have, each with the first that has it."""
+    found: dict[tuple[str, ...], str] = {}
+    for name, values in _lists(program):
+        if values:
+            found.setdefault(values, c_member(name))
+    return [(name, values) for values, name in found.items()]
+
+
+def value_constant(program: Program, values: tuple[str, ...], number: int) -> str:
+    """Return the name of a value of an enumeration in C."""
+    owner = next(name for name, known in enumerations(program) if known == values)
+    return f"{program.name}_{owner}_{values[number]}"
+
+
+def _lists(program: Program) -> list[tuple[str, tuple[str, ...]]]:
+    constants = [(constant.name, constant.values) for constant in program.constants]
+    return constants + [(variable.name, variable.values) for variable in program.variables]

@@ -10,7 +10,16 @@ from typing import Any
 import jinja2
 
 from codegen.expression import SUFFIX, c_expression, literal
-from codegen.names import REAL, CNames, c_member, c_type, mode_constant, run_mode_constant
+from codegen.names import (
+    REAL,
+    CNames,
+    c_member,
+    c_type,
+    enumerations,
+    mode_constant,
+    run_mode_constant,
+    value_constant,
+)
 from codegen.statement import Writer, wrapped
 from codegen.usage import Usage, locals_of, usages
 from language.functions import FUNCTIONS_OF
@@ -26,10 +35,10 @@ from language.program import (
 )
 from language.wiring import reads, walk
 
-GROUPS = ("state", "equation", "before", "innovation", "timer")
+GROUPS = ("state", "discrete", "equation", "before", "innovation", "timer")
 """Nested structs of the instance, in order."""
 ENTRIES = ("init", "derive", "step")
-INLINE = ("min", "max", "clip", "sign", "pow2")
+INLINE = ("min", "max", "clip", "sign", "pow2", "whole")
 
 
 @dataclass(frozen=True)
@@ -135,6 +144,10 @@ def _context(program: Program) -> dict[str, Any]:
             for info in program.regions
         ],
         "run_modes": [(run_mode_constant(program, m.number), m.number) for m in program.run_modes],
+        "enumerations": [
+            (name, [(value_constant(program, values, n), n) for n in range(len(values))])
+            for name, values in enumerations(program)
+        ],
         "faults": list(enumerate(program.faults)),
         "transitions": program.transitions,
         "real": REAL[number],
@@ -170,7 +183,8 @@ def _constant(constant: Constant, number: NumberType) -> Field:
         low, high = constant.range
         comment += f"; {decimal(low, number)} to {decimal(high, number)}"
     value = literal(constant.value, number)
-    return Field(REAL[number], c_member(constant.name), comment, value)
+    kind = c_type(Variable(constant.name, constant.type, values=constant.values), number)
+    return Field(kind, c_member(constant.name), comment, value)
 
 
 def _groups(program: Program) -> list[tuple[str, list[Field]]]:
@@ -184,11 +198,11 @@ def _groups(program: Program) -> list[tuple[str, list[Field]]]:
 
 
 def _outputs(program: Program) -> list[dict[str, str]]:
-    types = {"real": REAL[program.number], "truth": "bool", "whole": "int16_t"}
+    types = {v.name: c_type(v, program.number) for v in program.variables}
     place = CNames(program)
     return [
         {
-            "type": types[wire.type],
+            "type": types[wire.source],
             "name": wire.name,
             "unit": wire.unit,
             "source": place(wire.source),

@@ -25,6 +25,7 @@ GROUP_OF = {
     "calibration": "cal",
     "work": "work",
     "state": "self",
+    "discrete": "self",
     "equation": "self",
     "before": "self",
     "innovation": "self",

@@ -50,7 +50,10 @@ ARITHMETIC: Mapping[NumberType, Arithmetic] = {
     "float32": Arithmetic(
         np.float32,
         lambda a, b: a / b,
-        {name: _rounded(function) for name, function in EXACT["float32"].items()},
+        {
+            name: function if name == "whole" else _rounded(function)
+            for name, function in EXACT["float32"].items()
+        },
         _ieee,
         lambda value: value.item() if isinstance(value, np.generic) else value,
     ),

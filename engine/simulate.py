@@ -22,6 +22,8 @@ from language.program import Program
 
 Build = Callable[[Program], Stepper]
 Ticked = Callable[[str, Program, Stepper], None]
+CONVERT: Mapping[str, Callable[[Any], Any]] = {"real": float, "truth": bool, "whole": int}
+"""What an input of a type makes of a number."""
 
 
 def simulate(
@@ -98,7 +100,7 @@ class _Simulation:
         for name, program in self.programs.items():
             stepper = self.steppers[name]
             for variable in program.inputs:
-                stepper.set(variable.name, False if variable.type == "truth" else 0.0)
+                stepper.set(variable.name, CONVERT[variable.type](0.0))
             for key, default in program.defaults.items():
                 stepper.set(f"input.{key}", default)
             for variable in program.variables:
@@ -176,8 +178,9 @@ class _Simulation:
         for connection in self.wires[name]:
             thing = connection.target[1]
             value = self.signals.connected(connection)
-            if self.system.instances[name].automaton.inputs[thing].truth:
-                value = bool(value)
+            kind = self.system.instances[name].automaton.inputs[thing].type
+            if kind != "real":
+                value = bool(value) if kind == "bool" else int(value)
             before = stepper.get(f"input.{thing}")
             stepper.set(f"input.{thing}", value)
             now = stepper.get(f"input.{thing}")

@@ -26,10 +26,10 @@ from language.project import Project, expanded, read_document
 from language.reader import FILE_WORDS, Reader, check_name
 from language.region import with_regions
 from language.syntax import Broken
-from language.units import SECOND, Unit, fits, parse_unit
+from language.units import NO_UNIT, SECOND, Unit, fits, parse_unit
 from language.values import with_value
 
-COMMON_KEYS = ("language", "automaton", "parameters", "inputs", "states", "equations")
+COMMON_KEYS = ("language", "automaton", "parameters", "inputs", "states", "discrete", "equations")
 LOGIC_KEYS = ("flow", "terms", "initial", "modes", "regions", "templates", "outputs")
 LAID_KEYS = ("elements", "places")
 CLOCK_KEYS = ("period", "step", "numbers", "model")
@@ -140,6 +140,7 @@ class _AutomatonReader(Reader):
             parameters={**(model.parameters if model else {}), **own},
             inputs={e.key: self._input(e) for e in self.named(tree.get("inputs"), "inputs")},
             states=self._states(tree),
+            discrete=self._discrete(tree),
             modes=with_regions(chart.modes, tuple(beside)),
             initial=chart.initial,
             outputs=outputs.spans,
@@ -181,8 +182,9 @@ class _AutomatonReader(Reader):
         return Fraction(1, 1000)
 
     def _parameter(self, entry: Entry) -> Parameter:
-        keys = ("value", "unit", "range", "tunable", "derived", *FITTING_KEYS)
+        keys = ("value", "unit", "range", "tunable", "derived", "type", "values", *FITTING_KEYS)
         table = self.table(entry.node, f"parameters.{entry.key}", keys)
+        type_, values = self.typing(table, entry.key)
         key = f"parameters.{entry.key}"
         unit_node = table.get("unit")
         unit: Unit | None = self.unit(unit_node) if unit_node else None
@@ -192,10 +194,13 @@ class _AutomatonReader(Reader):
         if "derived" in table.entries:
             kind = "derived"
             derived = self.expression(table.get("derived"), f"{key}.derived", entry.span)
-            for other in ("value", "tunable", "range"):
+            for other in ("value", "tunable", "range", "type"):
                 if other in table.entries:
                     label = f"a derived parameter has no `{other}`"
                     self.problems.error("form", table.entries[other].span, label)
+        elif type_ != "real":
+            node, what = table.get("value"), f"{key}.value"
+            value = self.value(node, what, entry.span, NO_UNIT, type_, values)
         else:
             value, own = self.quantity(table.get("value"), f"{key}.value", entry.span, unit)
             unit = unit or own
@@ -204,8 +209,13 @@ class _AutomatonReader(Reader):
         if limits and value is not None and not limits[0] <= value <= limits[1]:
             place = cast(Scalar, table.get("value")).span
             self.problems.error("range", place, f"the value of `{entry.key}` is outside its range")
+        if type_ == "int":
+            limits = self.whole_range(limits, table.get("range"))
         fitting = self._fitting(table, unit, limits)
-        return Parameter(entry.key, kind, unit, value, derived, limits, key, entry.span, fitting)
+        at = entry.span
+        return Parameter(
+            entry.key, kind, unit, value, derived, limits, key, at, fitting, type_, values
+        )
 
     def _fitting(self, table: Table, unit: Unit, limits: Range | None) -> Fitting:
         node = table.get("neutral")
@@ -227,18 +237,37 @@ class _AutomatonReader(Reader):
         return Fitting(neutral, tuple(starts), cast(Per, per), cast(Form, form))
 
     def _input(self, entry: Entry) -> Input:
-        keys = ("unit", "range", "default", "type")
+        keys = ("unit", "range", "default", "type", "values")
         table = self.table(entry.node, f"inputs.{entry.key}", keys)
-        truth = self.choice(table.get("type"), "type", ("real", "bool"), "real") == "bool"
+        kind, values = self.typing(table, entry.key)
         unit = self.unit(table.get("unit"))
         default: Fraction | None = None
         node = table.get("default")
-        if node is not None and truth:
-            default = Fraction(self.choice(node, "default", ("true", "false"), "false") == "true")
-        elif node is not None:
-            default, _ = self.quantity(node, f"inputs.{entry.key}.default", node.span, unit)
+        if node is not None:
+            what = f"inputs.{entry.key}.default"
+            default = self.value(node, what, node.span, unit, kind, values)
         limits = self.range(table.get("range"), unit)
-        return Input(entry.key, unit, truth, default, limits, f"inputs.{entry.key}", entry.span)
+        if kind == "int":
+            limits = self.whole_range(limits, table.get("range"))
+        key = f"inputs.{entry.key}"
+        return Input(entry.key, unit, kind, default, limits, key, entry.span, values)
+
+    def _discrete(self, tree: Table) -> dict[str, State]:
+        found = {}
+        for entry in self.named(tree.get("discrete"), "discrete"):
+            key = f"discrete.{entry.key}"
+            table = self.table(entry.node, key, ("type", "values", "unit", "initial", "range"))
+            kind, values = self.typing(table, entry.key)
+            unit = self.unit(table.get("unit"))
+            initial = self.expression(table.get("initial"), f"{key}.initial", entry.span)
+            limits = self.range(table.get("range"), unit)
+            if kind == "int":
+                limits = self.whole_range(limits, table.get("range"))
+            if initial:
+                found[entry.key] = State(
+                    entry.key, unit, initial, limits, key, entry.span, kind, values
+                )
+        return found
 
     def _states(self, tree: Table) -> dict[str, State]:
         found = {}

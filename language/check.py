@@ -10,18 +10,20 @@ from language.check_element import check_laid_on
 from language.check_memory import check_memory
 from language.check_observer import check_observer
 from language.check_region import check_regions
-from language.dimension import DimensionCheck, Kind, Scope
+from language.dimension import DimensionCheck, Scope
 from language.guards import report_overlaps
+from language.kind import Enumeration, Kind, Whole
 from language.lower import parameter_kinds
-from language.model import Automaton, Formula, Mode
+from language.model import Automaton, Formula, Input, Mode, Parameter, State, SystemInput
 from language.order import equation_order, report_circle, unreached
 from language.problem import Problems, Span, SpecError, nearest
-from language.region import sources
-from language.syntax import KEPT, MEMORY, Broken, Tree, names
+from language.region import sources, with_regions
+from language.syntax import KEPT, MEMORY, Broken, Tree, names, whole_literal
 from language.units import SECOND, Dimension, Unit, common, fits, product
 from language.witness import report_refiring
 
 RESERVED_OUTPUTS = ("mode", "faults")
+WHOLES = (Whole, Enumeration)
 
 
 def check_automaton(automaton: Automaton, problems: Problems) -> Automaton:
@@ -62,6 +64,7 @@ class _Check:
         self.names: dict[str, Kind] = {}
         self.first: dict[str, Span] = {}
         self.bare: dict[str, bool] = {}
+        self.literals: dict[str, Kind] = {}
 
     def run(self) -> Automaton:
         automaton = self.automaton
@@ -80,14 +83,39 @@ class _Check:
         check_laid_on(automaton, self.names, self.problems)
         self._sampled_ranges()
         known = {name: kind for name, kind in self.names.items() if isinstance(kind, Dimension)}
-        return dataclasses.replace(automaton, dimensions=known)
+        regions = tuple(
+            dataclasses.replace(region, modes=self._all_with_wholes(region.modes))
+            for region in automaton.regions
+        )
+        return dataclasses.replace(
+            automaton,
+            modes=with_regions(self._all_with_wholes(automaton.modes), regions),
+            regions=regions,
+            dimensions=known,
+            kinds=self.names,
+        )
+
+    def _all_with_wholes(self, modes: Mapping[str, Mode]) -> dict[str, Mode]:
+        return {name: self._with_wholes(mode) for name, mode in modes.items()}
+
+    def _with_wholes(self, mode: Mode) -> Mode:
+        """Mark the equations whose value is a whole number, in whatever mode it is given so."""
+        marked = {
+            name: dataclasses.replace(formula, whole=isinstance(self.names.get(name), WHOLES))
+            for name, formula in mode.equations.items()
+        }
+        return dataclasses.replace(mode, equations=marked)
 
     def _declare(self) -> None:
         automaton = self.automaton
-        for group in (automaton.parameters, automaton.inputs, automaton.states):
+        groups = (automaton.parameters, automaton.inputs, automaton.carried)
+        for group in groups:
             for name, thing in group.items():
-                truth = getattr(thing, "truth", False)
-                self._new(name, "truth" if truth else thing.unit.dimension, thing.span)
+                self._new(name, declared_kind(thing), thing.span)
+        for group in groups:
+            for thing in group.values():
+                if thing.values:
+                    self._literals(thing)
         for name in _equation_names(automaton.all_modes):
             for mode in automaton.all_modes:
                 if name in mode.equations:
@@ -101,6 +129,18 @@ class _Check:
         self.names[name] = kind
         self.first.setdefault(name, span)
 
+    def _literals(self, thing: Parameter | Input | State) -> None:
+        """The names of an enumeration are known; two that share a name have the same list."""
+        kind = Enumeration(thing.values)
+        for value in thing.values:
+            known = self.names.get(value)
+            if known is None:
+                self.names[value] = kind
+                self.first[value] = thing.span
+                self.literals[value] = kind
+            elif known != kind or value not in self.literals:
+                self._clash(value, thing.span)
+
     def _clash(self, name: str, span: Span) -> None:
         if name in self.first:
             hint = f"it is given first at {self.first[name]}"
@@ -112,7 +152,7 @@ class _Check:
 
     def _scope(self, groups: Iterable[Iterable[str]], place: str) -> Scope:
         known = {name: self.names[name] for group in groups for name in group}
-        return Scope(known, frozenset(), place, self._angles())
+        return Scope({**self.literals, **known}, frozenset(), place, self._angles())
 
     def _kept(self) -> frozenset[str]:
         """Return the functions with memory that are for every expression of a mode."""
@@ -138,17 +178,17 @@ class _Check:
 
     def _initials(self) -> None:
         automaton = self.automaton
-        groups = [automaton.parameters, automaton.inputs, automaton.states]
+        groups = [automaton.parameters, automaton.inputs, automaton.carried]
         check = DimensionCheck(self._scope(groups, "where a state starts"), self.problems)
-        for state in automaton.states.values():
-            check.quantity(state.initial.tree, state.unit.dimension, state.name)
-        trees = {name: state.initial.tree for name, state in automaton.states.items()}
-        spans = {name: state.span for name, state in automaton.states.items()}
+        for state in automaton.carried.values():
+            check.assigned(state.initial.tree, self.names[state.name], state.name)
+        trees = {name: state.initial.tree for name, state in automaton.carried.items()}
+        spans = {name: state.span for name, state in automaton.carried.items()}
         report_circle(trees, spans, "initial", self.problems)
 
     def _mode(self, mode: Mode) -> None:
         automaton = self.automaton
-        groups = [automaton.parameters, automaton.inputs, automaton.states]
+        groups = [automaton.parameters, automaton.inputs, automaton.carried]
         known = dict(self._scope(groups, "").names)
         place = "here"
         run = mode.run
@@ -161,11 +201,14 @@ class _Check:
             scope = Scope({**known}, modes, place, self._angles(), self._kept())
             check = DimensionCheck(scope, self.problems)
             for formula in formulas[name]:
-                known[name] = self._agreed(name, check.kind(formula.tree), formula)
+                kind = check.kind(formula.tree)
+                agreed = self._agreed(name, kind, formula)
+                known[name] = kind if isinstance(kind, Whole) else agreed
         scope = Scope(known, modes, place, self._angles(), self._kept())
         check = DimensionCheck(scope, self.problems)
         self._flow(mode, check)
-        self._assignments(mode.update, check)
+        for assignments in (mode.update, mode.entry, mode.exit):
+            self._assignments(assignments, check)
         self._transitions(mode, check)
         if mode.observer:
             plain = DimensionCheck(dataclasses.replace(scope, memory=frozenset()), self.problems)
@@ -206,6 +249,13 @@ class _Check:
                 return self.names[name]
         elif before == kind:
             return before
+        if isinstance(before, Whole) and isinstance(kind, Whole):
+            self.names[name] = before.joined(kind)
+            return self.names[name]
+        number = whole_literal(formula.tree)
+        if isinstance(before, Whole) and number is not None:
+            self.names[name] = before.joined(Whole(number, number))
+            return self.names[name]
         label = f"`{name}` is in `{kind}` here and in `{before}` in another mode"
         self.problems.error("dimension", formula.span, label)
         return before
@@ -249,12 +299,12 @@ class _Check:
 
     def _assignments(self, formulas: Mapping[str, Formula], check: DimensionCheck) -> None:
         for name, formula in formulas.items():
-            state = self.automaton.states.get(name)
-            if state is None:
-                hint = nearest(name, self.automaton.states)
-                self.problems.error("name", formula.span, f"`{name}` is not a state", hint)
+            if name not in self.automaton.carried:
+                hint = nearest(name, self.automaton.carried)
+                label = f"`{name}` is not a state or discrete variable"
+                self.problems.error("name", formula.span, label, hint)
             else:
-                check.quantity(formula.tree, state.unit.dimension, name)
+                check.assigned(formula.tree, self.names[name], name)
 
     def _transitions(self, mode: Mode, check: DimensionCheck) -> None:
         automaton = self.automaton
@@ -317,10 +367,10 @@ class _Check:
         equations = _equation_names(automaton.all_modes)
         for output, span in automaton.outputs.items():
             name = automaton.source_of(output)
-            if name == "mode" or name in automaton.states:
+            if name == "mode" or name in automaton.carried:
                 continue
             if name not in equations:
-                hint = nearest(name, [*equations, *automaton.states, "mode"])
+                hint = nearest(name, [*equations, *automaton.carried, "mode"])
                 label = f"output `{name}` is not a state, an equation or `mode`"
                 self.problems.error("name", span, label, hint)
                 continue
@@ -337,6 +387,20 @@ class _Check:
             if exponential and state.range is None:
                 label = f"state `{state.name}` needs a `range`: method `exponential` scales with it"
                 self.problems.error("missing", state.span, label)
+
+
+def declared_kind(thing: Parameter | Input | State | SystemInput) -> Kind:
+    """Return the kind that a declaration says; a whole number lies in its range."""
+    if thing.type == "bool":
+        return "truth"
+    if thing.type == "enum":
+        return Enumeration(thing.values)
+    if thing.type == "int":
+        if isinstance(thing, Parameter) and thing.kind == "fixed" and thing.value is not None:
+            return Whole(int(thing.value), int(thing.value))
+        limits = getattr(thing, "range", None)
+        return Whole(int(limits[0]), int(limits[1])) if limits else Whole()
+    return thing.unit.dimension
 
 
 def _of_model(automaton: Automaton) -> Mapping[str, object]:

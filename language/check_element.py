@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from language.dimension import DimensionCheck, Kind, Scope
+from language.dimension import DimensionCheck, Scope
+from language.kind import Kind
 from language.model import Automaton
 from language.problem import Problems, nearest
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from language.dimension import DimensionCheck, Kind
+from language.dimension import DimensionCheck
+from language.kind import Kind
 from language.model import Automaton, Formula, Observer
 from language.problem import nearest
 from language.syntax import names as names_of

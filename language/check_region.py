@@ -20,6 +20,11 @@ def check_regions(automaton: Automaton, problems: Problems) -> None:
     for region in automaton.regions:
         for mode in region.modes.values():
             _check_mode(region, mode, problems)
+    for mode in automaton.all_modes if automaton.regions else ():
+        for what, formulas in (("entry", mode.entry), ("exit", mode.exit)):
+            if formulas:
+                label = f"`{what}` stands in an automaton without `regions` only"
+                problems.error("form", mode.span, label, "write a `reset` of the transitions")
     _check_writers(automaton, problems)
 
 

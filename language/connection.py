@@ -6,8 +6,10 @@ import dataclasses
 from collections.abc import Mapping
 from fractions import Fraction
 
-from language.dimension import DimensionCheck, Kind, Scope
+from language.check import declared_kind
+from language.dimension import DimensionCheck, Scope
 from language.document import Entry, Node, Scalar, Table
+from language.kind import Kind, Whole
 from language.model import Connection, Formula, Instance, SystemInput
 from language.problem import Problems, Span, nearest
 from language.reader import Reader
@@ -34,9 +36,7 @@ class ConnectionReader(Reader):
         self.sensors: dict[str, Sensor] = {}
         self.lines: dict[str, Line] = {}
         self.dimensions: dict[str, Dimension] = {}
-        self.known: dict[str, Kind] = {
-            name: "truth" if thing.truth else thing.unit.dimension for name, thing in inputs.items()
-        }
+        self.known: dict[str, Kind] = {n: declared_kind(thing) for n, thing in inputs.items()}
         self.parts: dict[str, Kind] = {}
         for instance in instances.values():
             self.parts.update(output_kinds(instance))
@@ -161,29 +161,25 @@ class ConnectionReader(Reader):
         tree = formula.tree if formula else Broken(source.span)
         if isinstance(tree, Truth) and wanted.truth:
             return Connection(to, Fraction(tree.value), source.span)
-        if not names(tree) and not wanted.truth:
-            value, _ = self.quantity(source, source.text, source.span, wanted.unit)
+        if source.text in wanted.values or (not names(tree) and not wanted.truth):
+            unit, values = wanted.unit, wanted.values
+            value = self.value(source, source.text, source.span, unit, wanted.type, values)
             return Connection(to, value, source.span)
         tree = self._without_delays(tree)
         if isinstance(tree, Name):
-            self._plain(tree, wanted.truth, wanted.unit.dimension)
+            self._plain(tree, declared_kind(wanted))
             return Connection(to, tree.path, source.span)
         check = DimensionCheck(self._scope(), self.problems)
-        if wanted.truth:
-            check.truth(tree, f"the input `{name}`")
-        else:
-            check.quantity(tree, wanted.unit.dimension, f"the input `{name}`")
+        check.assigned(tree, declared_kind(wanted), f"the input {name}")
         return Connection(to, Formula(tree, f"connections.{target.name}.{name}"), source.span)
 
-    def _plain(self, tree: Name, truth: bool, wanted: Dimension) -> None:
+    def _plain(self, tree: Name, wanted: Kind) -> None:
         kind = self.known.get(tree.path)
         if kind is None:
             label = f"`{tree.path}` is not an input of the system or an output of an instance"
             self.problems.error("name", tree.span, label, nearest(tree.path, self._visible()))
-        elif truth != (kind == "truth") or (isinstance(kind, Dimension) and not fits(kind, wanted)):
-            have = "true or false" if kind == "truth" else f"in `{kind}`"
-            want = "true or false" if truth else f"in `{wanted}`"
-            label = f"`{tree.path}` is {have}, the input is {want}"
+        elif not _joins(kind, wanted):
+            label = f"`{tree.path}` is {_said(kind)}, the input is {_said(wanted)}"
             self.problems.error("dimension", tree.span, label)
 
     def _visible(self) -> list[str]:
@@ -270,7 +266,23 @@ def output_kinds(instance: Instance) -> dict[str, Kind]:
     """Return what the outputs of an instance are; its mode, a number, is not among them."""
     automaton = instance.automaton
     return {
-        f"{instance.name}.{name}": automaton.dimensions.get(automaton.source_of(name), "truth")
+        f"{instance.name}.{name}": automaton.kinds[automaton.source_of(name)]
         for name in automaton.outputs
-        if automaton.source_of(name) != "mode"
+        if automaton.source_of(name) in automaton.kinds
     }
+
+
+def _joins(source: Kind, target: Kind) -> bool:
+    """A connection joins equal kinds; a whole number may be read as a real number."""
+    if isinstance(target, Dimension):
+        real = NUMBER if isinstance(source, Whole) else source
+        return isinstance(real, Dimension) and fits(real, target)
+    if isinstance(target, Whole):
+        return isinstance(source, Whole)
+    return source == target
+
+
+def _said(kind: Kind) -> str:
+    if kind == "truth":
+        return "true or false"
+    return f"in `{kind}`" if isinstance(kind, Dimension) else f"`{kind}`"

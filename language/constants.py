@@ -8,9 +8,9 @@ from fractions import Fraction
 
 from language.evaluate import Scalar, evaluate
 from language.lower import (
+    assigned,
     constant_names,
     constant_of,
-    expression,
     parameter_kinds,
     parameter_order,
 )
@@ -31,7 +31,7 @@ def parameter_constants(automaton: Automaton, problems: Problems) -> dict[str, C
     for name in parameter_order(automaton):
         parameter = automaton.parameters[name]
         if parameter.derived:
-            formula = expression(parameter.derived.tree, known)
+            formula = assigned(parameter.derived.tree, known, False)
             value = float(evaluate(formula, values, automaton.numbers))
         else:
             value = rounded(parameter.value or Fraction(0), automaton.numbers)
@@ -44,7 +44,7 @@ def parameter_constants(automaton: Automaton, problems: Problems) -> dict[str, C
             )
             value = 0.0
         found[name] = constant_of(automaton, name, kinds[name], value)
-        values[found[name].name] = value
+        values[found[name].name] = found[name].value
     return found
 
 
@@ -57,7 +57,7 @@ def derive_block(automaton: Automaton) -> Block:
         derived = automaton.parameters[name].derived
         if derived and kinds[name] == "derived":
             key = f"{automaton.name} {derived.key}"
-            ops.append(Assign(f"derived.{name}", expression(derived.tree, known), key))
+            ops.append(Assign(f"derived.{name}", assigned(derived.tree, known, False), key))
     return tuple(ops)
 
 
@@ -72,7 +72,7 @@ def constant_value(
     """Return a formula of parameters, computed in double. Raises SpecError where it is not one."""
     problems = Problems()
     try:
-        value = float(evaluate(expression(formula.tree, constant_names(automaton)), values))
+        value = float(evaluate(assigned(formula.tree, constant_names(automaton), False), values))
     except KeyError as error:
         label = f"`{error.args[0]}` is not a parameter: {what} is made of parameters"
         problems.error("constant", formula.span, label)

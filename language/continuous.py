@@ -13,9 +13,19 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
+from language.action import discrete_variables
 from language.constants import derive_block, parameter_constants
-from language.field import Field, at_state, at_time, by_mode, field_blocks, field_variables, switch
-from language.lower import constant_names, equations
+from language.field import (
+    Field,
+    at_state,
+    at_time,
+    by_mode,
+    entered,
+    field_blocks,
+    field_variables,
+    switch,
+)
+from language.lower import constant_names, equations, variable_names
 from language.model import Automaton, Mode, Transition
 from language.motion import FLOW_HALVINGS, motion_blocks, motion_variables
 from language.operation import (
@@ -62,12 +72,11 @@ def continuous_program(
     """
     parameters = parameter_constants(automaton, problems)
     transitions = transition_infos(automaton, problems)
-    inputs: dict[str, Expr] = {name: Ref(f"input.{name}") for name in automaton.inputs}
-    states: dict[str, Expr] = {name: Ref(f"state.{name}") for name in automaton.states}
+    variables_known = variable_names(automaton, "input")
+    inputs = {name: variables_known[name] for name in automaton.inputs}
     known = {
         **constant_names(automaton),
-        **inputs,
-        **states,
+        **variables_known,
         **in_modes(automaton, "memory.mode"),
     }
     moving = {**inputs, **{name: _parabola(name) for name in varying}}
@@ -113,6 +122,7 @@ def _variables(automaton: Automaton, field: Field) -> list[Variable]:
         *mode_and_fired(automaton, "micro-step"),
         *(Variable(f"memory.armed_{slot}", "truth") for slot in field.slots),
         *(Variable(f"memory.due_{slot}", "truth") for slot in field.slots),
+        *discrete_variables(automaton),
         *field_variables(field),
         Variable("work.merge", "real", "s", about="what crosses within it is one instant"),
     ]
@@ -157,6 +167,7 @@ def _entries(automaton: Automaton, field: Field, known: dict[str, Expr]) -> dict
         "init": (
             *initial_ops(automaton, known, field.prefix),
             *enter_initial(automaton, "memory.mode"),
+            *entered(field, automaton.modes[automaton.initial]),
         ),
         "equations": (by_mode(field, "equations"),),
         "watch": (*now, Choose("memory.mode", watch)),

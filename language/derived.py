@@ -71,7 +71,7 @@ def _absent_inputs(automaton: Automaton, observer: Observer) -> dict[str, Tree]:
         if name not in automaton.inputs and thing.default is not None:
             default = thing.default
             truth = Truth(bool(default), observer.span)
-            found[name] = truth if thing.truth else number(default, observer.span)
+            found[name] = truth if thing.type == "bool" else number(default, observer.span)
     return found
 
 
@@ -123,7 +123,7 @@ def _inputs(automaton: Automaton, balances: Mapping[str, Tree], point: Point) ->
     """The columns of B: of the inputs that enter linearly; any other stays in f by its value."""
     found: Rows = {}
     for name, thing in automaton.inputs.items():
-        if thing.truth:
+        if thing.type != "real":
             continue
         try:
             column = matrix(balances, (name,), point)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
 
+from language.kind import LARGEST_WHOLE, Enumeration, Kind, Truthful, Whole, combined
 from language.problem import Problems, Span, nearest
 from language.syntax import (
     EDGES,
@@ -25,12 +25,9 @@ from language.syntax import (
     Relation,
     Tree,
     Truth,
+    whole_literal,
 )
 from language.units import NUMBER, SECOND, Dimension, Unit, common, fits, power, product, root
-
-Truthful = Literal["truth"]
-Kind = Dimension | Truthful
-"""What an expression is: a quantity with a dimension, or a truth value."""
 
 ANGLE = Dimension(angle=1)
 SAME = {"abs": 1, "min": 2, "max": 2, "clip": 3}
@@ -73,19 +70,44 @@ class DimensionCheck:
 
     def quantity(self, tree: Tree, want: Dimension, what: str) -> None:
         """Check that an expression is a quantity that fits `want`."""
-        kind = self.kind(tree)
-        if kind == "truth":
-            self._report("type", tree.span, f"`{what}` is a quantity, this is true or false")
-        elif kind is not None and not _zero(tree) and not fits(kind, want):
+        kind = _as_real(self.kind(tree))
+        if isinstance(kind, str | Enumeration):
+            label = f"`{what}` is a quantity, this is {_said(kind)}"
+            self._report("type", tree.span, label)
+        elif isinstance(kind, Dimension) and not _zero(tree) and not fits(kind, want):
             label = f"this is in `{kind}`, `{what}` is in `{want}`"
             self._report("dimension", tree.span, label, _angle_hint(kind, want))
+
+    def assigned(self, tree: Tree, want: Kind, what: str) -> None:
+        """Check that an expression may be assigned to something of a kind."""
+        if isinstance(want, Dimension):
+            self.quantity(tree, want, what)
+        elif want == "truth":
+            self._same(tree, "truth", what)
+        elif isinstance(want, Enumeration):
+            self._same(tree, want, what)
+        elif whole_literal(tree) is None:
+            kind = self.kind(tree)
+            is_floor = isinstance(tree, Application) and tree.function == "floor"
+            if kind is not None and not isinstance(kind, Whole) and not is_floor:
+                hint = "`floor(...)` makes a whole number of a real"
+                label = f"`{what}` is a whole number, this is {_said(kind)}"
+                self._report("type", tree.span, label, hint if isinstance(kind, Dimension) else "")
+
+    def _same(self, tree: Tree, want: Kind, what: str) -> None:
+        kind = self.kind(tree)
+        if kind is not None and kind != want:
+            label = f"`{what}` is {_said(want)}, this is {_said(kind)}"
+            hint = "compare it: `x > 0`" if want == "truth" else ""
+            self._report("type", tree.span, label, hint)
 
     def truth(self, tree: Tree, what: str) -> None:
         """Check that an expression is true or false."""
         kind = self.kind(tree)
         if kind is not None and kind != "truth":
             hint = "compare it: `x > 0`"
-            self._report("type", tree.span, f"`{what}` is a condition, this is a quantity", hint)
+            label = f"`{what}` is a condition, this is {_said(kind)}"
+            self._report("type", tree.span, label, hint)
 
     def kind(self, tree: Tree) -> Kind | None:
         """Return what the expression is, None where a problem was reported inside it."""
@@ -99,7 +121,10 @@ class DimensionCheck:
             case Name():
                 return self._name(tree)
             case Negative(operand, _):
-                return self._real(operand)
+                kind = self.kind(operand)
+                if isinstance(kind, Whole):
+                    return Whole(-kind.high, -kind.low)
+                return self._number(kind, operand)
             case Not(operand, _):
                 self.truth(operand, "not")
                 return "truth"
@@ -123,11 +148,16 @@ class DimensionCheck:
         self.problems.error(kind, span, label, help)
 
     def _real(self, tree: Tree) -> Dimension | None:
-        kind = self.kind(tree)
-        if kind == "truth":
-            self._report("type", tree.span, "this is true or false, a quantity is needed")
-            return None
-        return kind
+        return self._number(self.kind(tree), tree)
+
+    def _number(self, kind: Kind | None, tree: Tree) -> Dimension | None:
+        """What a whole number is in arithmetic of reals: a number without a unit."""
+        kind = _as_real(kind)
+        if isinstance(kind, Dimension):
+            return kind
+        if kind is not None:
+            self._report("type", tree.span, f"this is {_said(kind)}, a quantity is needed")
+        return None
 
     def _name(self, tree: Name) -> Kind | None:
         if tree.path in self.scope.names:
@@ -136,8 +166,12 @@ class DimensionCheck:
         self._report("name", tree.span, f"`{tree.path}` is not known {self.scope.place}", hint)
         return None
 
-    def _arithmetic(self, tree: Arithmetic) -> Dimension | None:
-        left, right = self._real(tree.left), self._real(tree.right)
+    def _arithmetic(self, tree: Arithmetic) -> Dimension | Whole | None:
+        first, second = self.kind(tree.left), self.kind(tree.right)
+        wholes = _wholes(tree.left, first, tree.right, second)
+        if wholes and tree.operator != "/":
+            return self._safe(combined(tree.operator, *wholes), tree)
+        left, right = self._number(first, tree.left), self._number(second, tree.right)
         if left is None or right is None:
             return None
         if tree.operator in "*/":
@@ -160,6 +194,15 @@ class DimensionCheck:
             label = f"`{tree.operator}` joins `{first.text}` and `{second.text}`"
             self._report("dimension", tree.span, label, "declare both in one unit of angle")
 
+    def _safe(self, kind: Whole, tree: Arithmetic) -> Whole:
+        """Whole numbers are held in 32 bits: what may not fit is a problem."""
+        if kind.is_safe:
+            return kind
+        label = f"this may lie from {kind.low} to {kind.high}: past {LARGEST_WHOLE}"
+        hint = "give the whole numbers in it a narrower `range`"
+        self._report("overflow", tree.span, label, hint)
+        return Whole()
+
     def _together(
         self, a: Tree, left: Dimension, b: Tree, right: Dimension, span: Span, operator: str
     ) -> Dimension | None:
@@ -174,30 +217,45 @@ class DimensionCheck:
         return None
 
     def _relation(self, tree: Relation) -> Truthful:
+        first, second = self.kind(tree.left), self.kind(tree.right)
         equality = tree.operator in ("==", "!=")
-        if equality and self._are_truths(tree):
+        if _wholes(tree.left, first, tree.right, second):
             return "truth"
-        left, right = self._real(tree.left), self._real(tree.right)
+        if equality and (first is None or second is None):
+            return "truth"
+        if equality and first == second and isinstance(first, str | Enumeration):
+            return "truth"
+        named = [kind for kind in (first, second) if isinstance(kind, str | Enumeration)]
+        if equality and len(named) == 2:
+            label = f"`{tree.operator}` compares {_said(named[0])} and {_said(named[1])}"
+            self._report("type", tree.span, label)
+            return "truth"
+        left, right = self._number(first, tree.left), self._number(second, tree.right)
+        if left is None or right is None:
+            return "truth"
         if equality:
             label = f"`{tree.operator}` is not for real numbers"
             self._report("type", tree.span, label, "use `<=` or `>=`")
-        elif left is not None and right is not None:
+        else:
             self._together(tree.left, left, tree.right, right, tree.span, tree.operator)
         return "truth"
 
-    def _are_truths(self, tree: Relation) -> bool:
-        quiet = DimensionCheck(self.scope, Problems())
-        return all(quiet.kind(part) == "truth" for part in (tree.left, tree.right))
-
     def _choice(self, tree: Choice) -> Kind | None:
         self.truth(tree.condition, "if")
-        left, right = self.kind(tree.then), self.kind(tree.other)
-        if left is None or right is None:
+        first, second = self.kind(tree.then), self.kind(tree.other)
+        if first is None or second is None:
             return None
+        wholes = _wholes(tree.then, first, tree.other, second)
+        if wholes:
+            return wholes[0].joined(wholes[1])
+        left, right = _as_real(first), _as_real(second)
         if isinstance(left, Dimension) and isinstance(right, Dimension):
             return self._together(tree.then, left, tree.other, right, tree.span, "if")
         if left != right:
-            self._report("type", tree.span, "one arm is a condition, the other a quantity")
+            label = f"one arm is {_said(first)}, the other {_said(second)}"
+            if "truth" in (left, right) and Dimension in (type(left), type(right)):
+                label = "one arm is a condition, the other a quantity"
+            self._report("type", tree.span, label)
             return None
         return left
 
@@ -281,6 +339,31 @@ class DimensionCheck:
 def _zero(tree: Tree) -> bool:
     """A bare 0 goes with any dimension."""
     return isinstance(tree, Number) and tree.is_bare_zero
+
+
+def _as_real(kind: Kind | None) -> Kind | None:
+    return NUMBER if isinstance(kind, Whole) else kind
+
+
+def _wholes(
+    a: Tree, first: Kind | None, b: Tree, second: Kind | None
+) -> tuple[Whole, Whole] | None:
+    """Return both as whole numbers where one is, and the other is too or is a literal like `2`."""
+    if isinstance(first, Whole) and isinstance(second, Whole):
+        return first, second
+    if isinstance(first, Whole) and (value := whole_literal(b)) is not None:
+        return first, Whole(value, value)
+    if isinstance(second, Whole) and (value := whole_literal(a)) is not None:
+        return Whole(value, value), second
+    return None
+
+
+def _said(kind: Kind) -> str:
+    if kind == "truth":
+        return "true or false"
+    if isinstance(kind, Enumeration):
+        return f"one of {', '.join(kind.values)}"
+    return "a whole number" if isinstance(kind, Whole) else "a quantity"
 
 
 def _angle_hint(left: Dimension, right: Dimension) -> str:

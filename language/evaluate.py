@@ -68,6 +68,19 @@ def power_of_two(k: float) -> float:
     return math.ldexp(1.0, int(k)) if -1022.0 <= k <= 1023.0 else k
 
 
+LARGEST = 2147483520
+"""Largest whole number made of a real: it is one in 32-bit floats too, with 24 bits."""
+NO_NUMBER = -(2**31)
+"""What a NaN becomes: outside every range, so that the clip of the target sees it."""
+
+
+def whole(x: float) -> int:
+    """Return a whole-valued real as a whole number, the nearest of 32 bits (rule R11)."""
+    if -LARGEST <= x <= LARGEST:
+        return int(x)
+    return LARGEST if x > 0.0 else (-LARGEST if x < 0.0 else NO_NUMBER)
+
+
 def power_of_two_single(k: float) -> float:
     """Return 2^k exactly for a whole-valued k from -126 to 127, anything else as it is."""
     return math.ldexp(1.0, int(k)) if -126.0 <= k <= 127.0 else k
@@ -81,9 +94,10 @@ ELEMENTARY: Elementary = {
     "max": maximum,
     "clip": clip,
     "sign": sign,
-    "floor": floor,
     "pow2": power_of_two,
     "real": float,
+    "floor": floor,
+    "whole": whole,
 }
 """In double: exact or rounded once, so that rounding once more gives the result of float32."""
 EXACT: Mapping[NumberType, Elementary] = {

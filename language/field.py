@@ -5,7 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from language.lower import Names, choice, equations, expression, rate, reads_of
+from language.action import action_variables, committing, place_of, reading, stage
+from language.lower import (
+    Names,
+    choice,
+    equation_names,
+    equations,
+    expression,
+    rate,
+    reads_of,
+)
 from language.model import Automaton, Balance, Mode, Transition
 from language.operation import (
     Assign,
@@ -33,6 +42,7 @@ from language.region import (
     slots,
     transitions,
 )
+from language.wiring import equation_variables
 
 
 @dataclass(frozen=True)
@@ -79,21 +89,14 @@ def field_blocks(field: Field) -> dict[str, Block]:
 
 def field_variables(field: Field) -> list[Variable]:
     """Return the work variables that the blocks of a field use."""
-    dimensions = field.automaton.dimensions
     found = []
     for state, thing in field.automaton.states.items():
         unit = str(thing.unit.dimension)
         found.append(Variable(f"work.at_{state}", "real", unit))
         found.append(Variable(f"work.rate_{state}", "real", f"({unit})/s"))
-    modes = field.automaton.all_modes
-    for name in dict.fromkeys(name for mode in modes for name in mode.equations):
-        kind = dimensions.get(name)
-        found.append(Variable(f"work.at_{name}", "real" if kind else "truth", str(kind or "1")))
+    found += equation_variables(field.automaton, "work.at_")
     found += [Variable(f"work.guard_{slot}", "truth") for slot in field.slots]
-    for mode in modes:
-        for name in (name for transition in mode.transitions for name in transition.reset):
-            unit = str(field.automaton.states[name].unit.dimension)
-            found.append(Variable(f"work.reset_{name}", "real", unit))
+    found += action_variables(field.automaton)
     return found
 
 
@@ -109,8 +112,7 @@ def known_at(field: Field) -> dict[str, Expr]:
 def all_known_at(field: Field) -> dict[str, Expr]:
     """Return what the names of the automaton are at the point, all equations among them."""
     known = known_at(field)
-    modes = field.automaton.all_modes
-    known.update({name: Ref(f"work.at_{name}") for mode in modes for name in mode.equations})
+    known.update(equation_names(field.automaton.all_modes, "work.at_"))
     return known
 
 
@@ -151,14 +153,8 @@ def jump(mode: Mode, enabled: Mapping[int, Expr], fire: Mapping[int, Block]) -> 
 
 def resets(field: Field, transition: Transition) -> tuple[list[Op], list[Op]]:
     """Return a transition's resets: what reads the values before, then what commits."""
-    known = all_known_at(field)
-    first: list[Op] = []
-    second: list[Op] = []
-    for name, formula in transition.reset.items():
-        value = expression(formula.tree, known)
-        first.append(Assign(f"work.reset_{name}", value, field.prefix + formula.key))
-        second.append(Assign(f"state.{name}", Ref(f"work.reset_{name}")))
-    return first, second
+    automaton, known = field.automaton, all_known_at(field)
+    return reading(automaton, transition.reset, known), committing(automaton, transition.reset)
 
 
 def switch(
@@ -173,14 +169,30 @@ def switch(
 
 
 def reset_at_once(field: Field, transition: Transition) -> list[Op]:
-    """Return the resets of a transition that nothing else fires beside."""
+    """Return exit, reset and entry (rule 6) of a transition that nothing else fires beside."""
+    source, target = field.automaton.source(transition), field.automaton.target(transition)
+    if source.exit or target.entry:
+        ops = stage(field.automaton, source.exit, all_known_at(field))
+        ops += [op for op in at_state(field) if transition.reset]
+        ops += stage(field.automaton, transition.reset, all_known_at(field))
+        return [*ops, *entered(field, target)]
     first, second = resets(field, transition)
     if len(first) == 1:
         (name,) = transition.reset
         (only,) = first
         assert isinstance(only, Assign)
-        return [Assign(f"state.{name}", only.value, only.key)]
+        return [Assign(place_of(field.automaton, name), only.value, only.key)]
     return first + second
+
+
+def entered(field: Field, target: Mode) -> list[Op]:
+    """Return the entry of a mode: it reads its mode's equations at the point after the reset."""
+    if not target.entry:
+        return []
+    known = known_at(field)
+    wanted = reads_of(formula.tree for formula in target.entry.values())
+    ops = equations(target, known, "work.at_", field.prefix, wanted)
+    return [*at_state(field), *ops, *stage(field.automaton, target.entry, known)]
 
 
 def enter(field: Field, transition: Transition) -> Assign:
@@ -213,6 +225,7 @@ def _guards(field: Field, mode: Mode) -> Block:
     """The guards of a mode of the chart, then those of the modes beside it, on its equations."""
     known = known_at(field)
     trees = [transition.when.tree for transition in transitions(mode)]
+    trees += [formula.tree for formula in mode.exit.values()]
     for transition in transitions(mode):
         trees += [formula.tree for formula in transition.reset.values()]
     ops = equations(mode, known, "work.at_", field.prefix, reads_of(trees))

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from language.dimension import DimensionCheck, Kind, Scope
-from language.document import Scalar, Table
+from language.dimension import DimensionCheck, Scope
+from language.document import Items, Scalar, Table
+from language.kind import Enumeration, Kind, Whole
 from language.parse import parse_balance, parse_expression
 from language.problem import Problems, SpecError
 from language.rewrite import reads
@@ -87,6 +88,11 @@ class Known:
         kind = table.get("type")
         if isinstance(kind, Scalar) and kind.text == "bool":
             return "truth"
+        if isinstance(kind, Scalar) and kind.text == "int":
+            return Whole()
+        names = table.get("values")
+        if isinstance(kind, Scalar) and kind.text == "enum" and isinstance(names, Items):
+            return Enumeration(tuple(n.text for n in names.nodes if isinstance(n, Scalar)))
         unit, value = table.get("unit"), table.get("value")
         if isinstance(unit, Scalar):
             return unit_dimension(unit.text)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from typing import Literal
 
 from language.balance import coefficient_of
+from language.kind import Type
 from language.model import Automaton, Balance, Formula, Mode, Region
 from language.number import rounded
 from language.operation import (
@@ -15,6 +17,7 @@ from language.operation import (
     Choose,
     Compare,
     Expr,
+    Item,
     Op,
     Ref,
     Select,
@@ -26,7 +29,7 @@ from language.operation import (
 )
 from language.order import equation_order
 from language.problem import SpecError
-from language.program import Constant
+from language.program import Constant, value_type
 from language.region import region_of_equation, sources
 from language.syntax import (
     MEMORY,
@@ -45,9 +48,11 @@ from language.syntax import (
     Truth,
     memory_key,
     names,
+    whole_literal,
 )
 from language.units import Unit
 
+WHOLE_TYPES = ("int", "enum")
 Names = Mapping[str, Expr]
 """What each name of the model is at one place; `in(x.y)` is looked up as `in x.y`,
 what functions with memory are under their `memory_key`."""
@@ -64,26 +69,78 @@ def expression(tree: Tree, known: Names) -> Expr:
             return Value(value)
         case Name(path, _):
             return known[path]
-        case Negative(operand, _):
-            return Unary("-", expression(operand, known))
-        case Not(operand, _):
-            return Unary("not", expression(operand, known))
+        case Negative(operand, _) | Not(operand, _):
+            sign: Literal["-", "not"] = "-" if isinstance(tree, Negative) else "not"
+            return Unary(sign, expression(operand, known))
+        case Arithmetic("/", left, right, _):
+            return Binary("/", _real(left, known), _real(right, known))
         case Arithmetic(operator, left, right, _):
-            return Binary(operator, expression(left, known), expression(right, known))  # type: ignore[arg-type]
+            return Binary(operator, *_matched(left, right, known))  # type: ignore[arg-type]
         case Logic(operator, left, right, _):
             return Binary(operator, expression(left, known), expression(right, known))  # type: ignore[arg-type]
         case Relation(operator, left, right, _):
-            return Compare(operator, expression(left, known), expression(right, known))  # type: ignore[arg-type]
+            return Compare(operator, *_matched(left, right, known))  # type: ignore[arg-type]
         case Power(base, exponent, _):
-            return _power(expression(base, known), exponent)
+            return _power(_real(base, known), exponent)
         case Choice(condition, then, other, _):
-            return Select(*(expression(part, known) for part in (condition, then, other)))
+            return Select(expression(condition, known), *_matched(then, other, known))
         case Application("in", (Name(path, _),), _):
             return known[f"in {path}"]
         case Application(function, _, _) if function in MEMORY:
             return known[memory_key(tree)]
         case Application(function, arguments, _):
-            return Call(function, tuple(expression(part, known) for part in arguments))
+            return Call(function, tuple(_real(part, known) for part in arguments))
+
+
+def assigned(tree: Tree, known: Names, whole: bool) -> Expr:
+    """Return the expression of a tree for a target that is whole, or not."""
+    number = whole_literal(tree)
+    if whole and number is not None:
+        return Value(number)
+    value = expression(tree, known)
+    if whole:
+        return value if is_whole(value) else Call("whole", (value,))
+    return as_real(value)
+
+
+def as_real(expr: Expr) -> Expr:
+    """Return an expression that is whole as a real."""
+    return Call("real", (expr,)) if is_whole(expr) else expr
+
+
+def is_whole(expr: Expr) -> bool:
+    """Tell whether the value of an expression is a whole number (an enumeration's too)."""
+    match expr:
+        case Value(value):
+            return type(value) is int
+        case Ref(_, whole) | Item(_, _, whole):
+            return whole
+        case Unary("-", operand):
+            return is_whole(operand)
+        case Binary(operator, left, _):
+            return operator in "+-*" and is_whole(left)
+        case Select(_, then, _):
+            return is_whole(then)
+        case Call(function, _):
+            return function == "whole"
+        case _:
+            return False
+
+
+def _real(tree: Tree, known: Names) -> Expr:
+    return as_real(expression(tree, known))
+
+
+def _matched(left: Tree, right: Tree, known: Names) -> tuple[Expr, Expr]:
+    """Two operands of one type: a literal like `2` beside a whole number is one, else reals."""
+    first, second = expression(left, known), expression(right, known)
+    if is_whole(first) == is_whole(second):
+        return first, second
+    if is_whole(first) and (number := whole_literal(right)) is not None:
+        return first, Value(number)
+    if is_whole(second) and (number := whole_literal(left)) is not None:
+        return Value(number), second
+    return as_real(first), as_real(second)
 
 
 def _power(base: Expr, exponent: int) -> Expr:
@@ -101,8 +158,8 @@ def rate(balance: Balance, known: Names) -> Expr:
     factor = coefficient_of(balance.left, balance.state)
     if isinstance(factor, SpecError):
         raise factor
-    right = expression(balance.right, known)
-    return right if factor is None else divide(right, expression(factor, known))
+    right = _real(balance.right, known)
+    return right if factor is None else divide(right, _real(factor, known))
 
 
 def equations(
@@ -118,7 +175,8 @@ def equations(
     for name in order:
         if name in needed:
             ops.append(_equation(mode, name, known, group, prefix))
-            known[name] = Ref(f"{group}{name}")
+            whole = any(formula.whole for formula in sources(mode)[name])
+            known[name] = Ref(f"{group}{name}", whole)
     return ops
 
 
@@ -126,7 +184,7 @@ def _equation(mode: Mode, name: str, known: Names, group: str, prefix: str) -> O
     """Return what sets an equation: one formula, or that of the active mode of a region beside."""
 
     def set_to(formula: Formula) -> Assign:
-        value = expression(formula.tree, known)
+        value = assigned(formula.tree, known, formula.whole)
         return Assign(f"{group}{name}", value, prefix + formula.key)
 
     region = region_of_equation(mode, name)
@@ -145,6 +203,23 @@ def choice(region: Region, known: Names, blocks: Mapping[str, Block]) -> Choose:
     assert isinstance(selector, Ref)
     cases = tuple((region.modes[name].number, block) for name, block in blocks.items())
     return Choose(selector.name, cases)
+
+
+def equation_names(modes: Iterable[Mode], group: str) -> dict[str, Expr]:
+    """Return the equations of some modes as what a Program reads."""
+    formulas = [pair for mode in modes for pair in mode.equations.items()]
+    return {name: Ref(f"{group}{name}", formula.whole) for name, formula in formulas}
+
+
+def variable_names(automaton: Automaton, inputs: str) -> dict[str, Expr]:
+    """Return inputs (of a group), states and discrete variables as what a Program reads."""
+    found: dict[str, Expr] = {}
+    for name, thing in automaton.inputs.items():
+        found[name] = Ref(f"{inputs}.{name}", thing.type in WHOLE_TYPES)
+    found.update({name: Ref(f"state.{name}") for name in automaton.states})
+    for name, variable in automaton.discrete.items():
+        found[name] = Ref(f"discrete.{name}", variable.type in WHOLE_TYPES)
+    return found
 
 
 def closure(mode: Mode, wanted: Iterable[str]) -> set[str]:
@@ -167,10 +242,13 @@ def reads_of(trees: Iterable[Tree]) -> list[str]:
 
 
 def constant_names(automaton: Automaton) -> dict[str, Expr]:
-    """Return the parameters as what a Program reads."""
+    """Return the parameters, and the names of enumerations, as what a Program reads."""
     groups = {"fixed": "constant", "tunable": "calibration", "derived": "derived"}
-    kinds = parameter_kinds(automaton)
-    return {name: Ref(f"{groups[kind]}.{name}") for name, kind in kinds.items()}
+    found: dict[str, Expr] = {name: Value(n) for name, n in automaton.literals.items()}
+    for name, kind in parameter_kinds(automaton).items():
+        is_whole = automaton.parameters[name].type in WHOLE_TYPES
+        found[name] = Ref(f"{groups[kind]}.{name}", is_whole)
+    return found
 
 
 def parameter_kinds(automaton: Automaton) -> dict[str, str]:
@@ -233,11 +311,20 @@ def constant_of(automaton: Automaton, name: str, kind: str, value: float) -> Con
     return Constant(
         name=f"{groups[kind]}.{name}",
         kind=kind,  # type: ignore[arg-type]
-        value=value,
+        value=typed(value, parameter.type),
         unit=si_text(automaton, name),
         key=f"{_owner(automaton, name)} {parameter.key}",
         range=(rounded(limits[0]), rounded(limits[1])) if limits else None,
+        type=value_type(parameter.type),
+        values=parameter.values,
     )
+
+
+def typed(value: float, kind: Type) -> float | int | bool:
+    """Return a number as a value of a type."""
+    if kind == "real":
+        return value
+    return bool(value) if kind == "bool" else int(value)
 
 
 def _owner(automaton: Automaton, name: str) -> str:
@@ -260,4 +347,4 @@ def _unit_of(automaton: Automaton, name: str) -> Unit | None:
         return automaton.parameters[name].unit
     if name in automaton.inputs:
         return automaton.inputs[name].unit
-    return automaton.states[name].unit if name in automaton.states else None
+    return automaton.carried[name].unit if name in automaton.carried else None

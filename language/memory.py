@@ -13,6 +13,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from language.constants import exact_value
+from language.dimension import DimensionCheck, Scope
+from language.kind import Enumeration, Whole
 from language.lower import Names, expression
 from language.model import Automaton, Formula, Mode
 from language.operation import (
@@ -34,19 +36,15 @@ from language.operation import (
     add,
     whole,
 )
+from language.problem import Problems
 from language.program import ValueType, Variable
 from language.region import mode_variable
 from language.syntax import (
     EDGES,
     KEPT,
+    MEMORY,
     Application,
-    Choice,
-    Logic,
-    Name,
-    Not,
-    Relation,
     Tree,
-    Truth,
     memory_key,
     walk,
 )
@@ -123,27 +121,18 @@ def delays_of(automaton: Automaton) -> tuple[Delay, ...]:
     found: list[Delay] = []
     for tree in applications(automaton, KEPT).values():
         ticks = ticks_of(automaton, tree.arguments[1]) if tree.function == "delay" else 1
-        kind: ValueType = "truth" if is_truth(automaton, tree.arguments[0]) else "real"
+        kind = type_of(automaton, tree.arguments[0])
         found.append(Delay(len(found) + 1, tree, ticks, kind))
     return tuple(found)
 
 
-def is_truth(automaton: Automaton, tree: Tree) -> bool:
-    """Tell whether a checked expression is true or false, not a quantity."""
-    match tree:
-        case Truth() | Not() | Logic() | Relation():
-            return True
-        case Name(path, _) if path in automaton.inputs:
-            return automaton.inputs[path].truth
-        case Name(path, _):
-            declared = path in automaton.parameters or path in automaton.states
-            return not declared and path not in automaton.dimensions
-        case Choice(_, then, _, _):
-            return is_truth(automaton, then)
-        case Application(function, arguments, _):
-            return function == "in" or (function in KEPT and is_truth(automaton, arguments[0]))
-        case _:
-            return False
+def type_of(automaton: Automaton, tree: Tree) -> ValueType:
+    """Return the type of a checked expression: as the check of dimensions sees it."""
+    scope = Scope(automaton.kinds, memory=frozenset(MEMORY))
+    kind = DimensionCheck(scope, Problems()).kind(tree)
+    if kind == "truth":
+        return "truth"
+    return "whole" if isinstance(kind, Whole | Enumeration) else "real"
 
 
 def with_delays(delays: tuple[Delay, ...], known: Names) -> dict[str, Expr]:
@@ -151,9 +140,10 @@ def with_delays(delays: tuple[Delay, ...], known: Names) -> dict[str, Expr]:
     found = dict(known)
     for delay in delays:
         now = expression(delay.tree.arguments[0], found)
-        old: Expr = Ref(delay.name)
+        whole = delay.type == "whole"
+        old: Expr = Ref(delay.name, whole)
         if delay.ticks > 1:
-            old = Item(delay.name, Ref(delay.oldest))
+            old = Item(delay.name, Ref(delay.oldest), whole)
         key = memory_key(delay.tree)
         found[key] = Select(KEPT_ONCE, old, now) if delay.ticks else now
     return found

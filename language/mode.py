@@ -17,6 +17,7 @@ MODE_KEYS = ("number", "equations", "flow", "terms", "update", "observer", "runs
 REGION_KEYS = ("initial", "modes")
 ALWAYS = "always"
 """The mode of an automaton that has none of its own."""
+ACTION_KEYS = ("entry", "exit")
 TRANSITION_KEYS = ("to", "when", "wait", "priority", "reset")
 
 
@@ -91,7 +92,7 @@ class ModeReader(Reader):
 
     def _mode(self, entry: Entry, body: Table, root: Table, position: int, region: str) -> Mode:
         key = f"modes.{entry.key}" if region == CHART else f"regions.{region}.modes.{entry.key}"
-        table = self.table(body, key, MODE_KEYS)
+        table = self.table(body, key, (*MODE_KEYS, *ACTION_KEYS))
         shared = root if region == CHART else Table({}, root.span)
         equations = self._formulas(shared.get("equations"), "equations")
         for name, formula in self._formulas(table.get("equations"), f"{key}.equations").items():
@@ -119,6 +120,8 @@ class ModeReader(Reader):
             key=key,
             span=entry.span,
             region=region,
+            entry=self._formulas(table.get("entry"), f"{key}.entry"),
+            exit=self._formulas(table.get("exit"), f"{key}.exit"),
         )
 
     def _formulas(self, node: Node | None, key: str) -> dict[str, Formula]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Literal
 
+from language.kind import Kind as ValueKind, Type
 from language.number import NumberType
 from language.problem import Span
 from language.signal import Line, RecordingUse, Sensor, Stimulus
@@ -21,10 +22,11 @@ CHART = "chart"
 
 @dataclass(frozen=True)
 class Formula:
-    """An expression and the key path that it stands under."""
+    """An expression and the key path that it stands under; `whole`: its value is whole."""
 
     tree: Tree
     key: str
+    whole: bool = False
 
     @property
     def span(self) -> Span:
@@ -48,7 +50,10 @@ class Fitting:
 
 @dataclass(frozen=True)
 class Parameter:
-    """A value in SI (exact) or, if derived, an expression of other parameters."""
+    """A value in SI (exact) or, if derived, an expression of other parameters.
+
+    The value of a `bool` is 0 or 1, that of an `enum` the place in `values`.
+    """
 
     name: str
     kind: Kind
@@ -59,19 +64,27 @@ class Parameter:
     key: str
     span: Span
     fitting: Fitting = Fitting()
+    type: Type = "real"
+    values: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class Input:
-    """A value from outside; `truth` inputs are true or false, the others are real."""
+    """A value from outside; `values` are those of an `enum`."""
 
     name: str
     unit: Unit
-    truth: bool
+    type: Type
     default: Fraction | None
     range: Range | None
     key: str
     span: Span
+    values: tuple[str, ...] = ()
+
+    @property
+    def truth(self) -> bool:
+        """Tell whether it is true or false."""
+        return self.type == "bool"
 
 
 @dataclass(frozen=True)
@@ -84,6 +97,8 @@ class State:
     range: Range | None
     key: str
     span: Span
+    type: Type = "real"
+    values: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -169,6 +184,8 @@ class Mode:
     span: Span
     region: str = CHART
     beside: tuple[Region, ...] = ()
+    entry: Mapping[str, Formula] = field(default_factory=dict)
+    exit: Mapping[str, Formula] = field(default_factory=dict)
 
     @property
     def label(self) -> str:
@@ -222,6 +239,8 @@ class Automaton:
     outputs: Mapping[str, Span]
     span: Span
     dimensions: Mapping[str, Dimension] = field(default_factory=dict, repr=False)
+    discrete: Mapping[str, State] = field(default_factory=dict)
+    kinds: Mapping[str, ValueKind] = field(default_factory=dict, repr=False)
     sources: Mapping[str, str] = field(default_factory=dict)
     elements: Mapping[str, Element] = field(default_factory=dict)
     places: Mapping[str, Mapping[str, Formula]] = field(default_factory=dict)
@@ -264,6 +283,20 @@ class Automaton:
         """Return the mode that a transition enters."""
         return self.region(transition.region).modes[transition.target]
 
+    @property
+    def carried(self) -> Mapping[str, State]:
+        """The states and discrete variables: all that assignments may write."""
+        return {**self.states, **self.discrete}
+
+    @property
+    def literals(self) -> Mapping[str, int]:
+        """The names of enumerations with their numbers, those of the model too."""
+        lists = [thing.values for thing in self.parameters.values()]
+        lists += [thing.values for thing in self.inputs.values()]
+        lists += [thing.values for thing in self.discrete.values()]
+        own = {name: place for values in lists for place, name in enumerate(values)}
+        return {**(self.model.literals if self.model else {}), **own}
+
 
 @dataclass(frozen=True)
 class Instance:
@@ -284,7 +317,13 @@ class SystemInput:
     unit: Unit
     default: Fraction | None
     span: Span
-    truth: bool = False
+    type: Type = "real"
+    values: tuple[str, ...] = ()
+
+    @property
+    def truth(self) -> bool:
+        """Tell whether it is true or false."""
+        return self.type == "bool"
 
 
 @dataclass(frozen=True)

@@ -25,17 +25,19 @@ class Value:
 
 @dataclass(frozen=True, slots=True)
 class Ref:
-    """The value of a variable or constant."""
+    """The value of a variable or constant; `whole` if that is a whole number."""
 
     name: str
+    whole: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class Item:
-    """One element of an array variable."""
+    """One element of an array variable; `whole` if that is a whole number."""
 
     name: str
     index: Expr
+    whole: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +77,7 @@ class Select:
 
 @dataclass(frozen=True, slots=True)
 class Call:
-    """An elementary operation (abs sqrt min max clip sign pow2 real) or a function."""
+    """An elementary operation (abs sqrt min max clip sign pow2 floor real whole) or a function."""
 
     function: str
     arguments: tuple[Expr, ...]

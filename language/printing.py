@@ -120,7 +120,8 @@ def _program_lines(program: Program) -> Iterator[str]:
         yield f"{constant.name} = {constant.value!r} {constant.unit}{limits}{stamps}"
     for variable in program.variables:
         size = f"[{variable.size}]" if variable.size else ""
-        yield f"{variable.name}{size}: {variable.type} {variable.unit}"
+        values = f" of {', '.join(variable.values)}" if variable.values else ""
+        yield f"{variable.name}{size}: {variable.type} {variable.unit}{values}"
     for name, value in program.defaults.items():
         yield f"default input.{name} = {value!r}"
     for wire in program.outputs:

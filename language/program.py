@@ -6,6 +6,7 @@ Names are `group.name`; the group says what a variable is and where a back end k
     derived   follows from calibrations  solved       computed at check time, carries stamps
     input     of this tick               before       the inputs of the tick before
     state     carried over               equation     evaluated each tick
+    discrete  carried over, frozen while the states flow
     memory    mode, fired, counters ...  work         lives within one call only
 """
 
@@ -25,13 +26,17 @@ ValueType = Literal["real", "truth", "whole"]
 
 @dataclass(frozen=True)
 class Variable:
-    """A variable with its type; `size` is the length of an array, 0 for a scalar."""
+    """A variable with its type; `size` is the length of an array, 0 for a scalar.
+
+    `values` are the names of the numbers 0, 1, ... of a whole one that is an enumeration.
+    """
 
     name: str
     type: ValueType
     unit: str = "1"
     size: int = 0
     about: str = ""
+    values: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -45,6 +50,8 @@ class Constant:
     key: str = ""
     depends_on: tuple[str, ...] = ()
     range: tuple[float, float] | None = None
+    type: ValueType = "real"
+    values: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -182,6 +189,12 @@ class Program:
     def fired_variables(self) -> tuple[str, ...]:
         """Return the variables that hold the transition of each region, the chart first."""
         return ("memory.fired", *(region.fired for region in self.regions))
+
+
+def value_type(kind: str) -> ValueType:
+    """Return what a declared type (real, int, bool, enum) is in a Program."""
+    types: dict[str, ValueType] = {"real": "real", "bool": "truth"}
+    return types.get(kind, "whole")
 
 
 def short(name: str) -> str:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from fractions import Fraction
+from typing import cast
 
 from language.document import Entry, Items, Node, Scalar, Table
+from language.kind import LARGEST_WHOLE, TYPES, Type
 from language.model import Formula, Range
 from language.parse import COMMA_HINT, parse_expression
 from language.problem import Problems, Source, Span, SpecError, nearest
@@ -206,7 +208,7 @@ class Reader:
         text = self.text(node, what, node.span)
         if not isinstance(node, Scalar):
             return default
-        if not re.fullmatch(r"-?(0|[1-9]\d{0,8})", text) or not low <= int(text) <= high:
+        if not re.fullmatch(r"-?(0|[1-9]\d{0,9})", text) or not low <= int(text) <= high:
             label = f"`{what}` is a whole number from {low} to {high}"
             self.problems.error("number", node.span, label)
             return default
@@ -252,6 +254,56 @@ class Reader:
             label = f"`{own.text}` does not fit the unit `{unit.text}`"
             self.problems.error("dimension", formula.span if formula else span, label)
         return value, own
+
+    def typing(self, table: Table, what: str) -> tuple[Type, tuple[str, ...]]:
+        """Return the `type` of a declaration, and the `values` of an enumeration."""
+        kind = cast(Type, self.choice(table.get("type"), "type", TYPES, "real"))
+        node = table.get("values")
+        items = self.items(node, "values")
+        for item in items:
+            check_name(item.text, item.span, self.problems)
+        if kind != "real" and "unit" in table.entries:
+            label = f"`{what}` is {kind}: only a real has a unit"
+            self.problems.error("form", table.entries["unit"].span, label)
+        if kind in ("bool", "enum") and "range" in table.entries:
+            label = f"`{what}` is {kind}: it has no range"
+            self.problems.error("form", table.entries["range"].span, label)
+        if kind == "enum" and len(items) < 2:
+            place = node.span if node else table.span
+            label = f"`{what}` is an enum: `values` lists its names, at least two"
+            self.problems.error("missing", place, label, "like `values: [parked, ready]`")
+        elif kind != "enum" and node is not None:
+            label = "`values` belongs to `type: enum`"
+            self.problems.error("form", table.entries["values"].span, label)
+        names = tuple(item.text for item in items)
+        if len(set(names)) < len(names):
+            self.problems.error("duplicate", node.span if node else table.span, "a name twice")
+        return kind, names if kind == "enum" else ()
+
+    def value(
+        self, node: Node | None, what: str, span: Span, unit: Unit, kind: Type, names: Sequence[str]
+    ) -> Fraction:
+        """Return a literal of some type as a number: a quantity in SI, 0 or 1, or a place."""
+        if kind == "real":
+            return self.quantity(node, what, span, unit)[0]
+        scalar = self.scalar(node, what, span)
+        if scalar is None:
+            return Fraction(0)
+        if kind == "int":
+            return Fraction(self.whole(scalar, what, 0, -LARGEST_WHOLE, LARGEST_WHOLE))
+        known = ("false", "true") if kind == "bool" else tuple(names)
+        text = self.choice(scalar, what, known, known[0] if known else "")
+        return Fraction(known.index(text) if text in known else 0)
+
+    def whole_range(self, limits: Range | None, node: Node | None) -> Range | None:
+        """Return the range of whole numbers; one with a fraction or past 32 bits is reported."""
+        if limits is None or node is None:
+            return None
+        if any(bound.denominator != 1 or abs(bound) > LARGEST_WHOLE for bound in limits):
+            label = f"whole numbers lie from {-LARGEST_WHOLE} to {LARGEST_WHOLE}"
+            self.problems.error("range", node.span, label)
+            return None
+        return limits
 
     def range(self, node: Node | None, unit: Unit) -> Range | None:
         """Return `[low, high]` in SI."""

@@ -19,7 +19,7 @@ from language.field import (
     field_variables,
     switch,
 )
-from language.lower import constant_names, tunables_of
+from language.lower import constant_names, tunables_of, typed, variable_names
 from language.model import CHART, Automaton, Formula, Mode, Run as ModelRun
 from language.motion import (
     RUN_HALVINGS,
@@ -28,6 +28,7 @@ from language.motion import (
     motion_blocks,
     motion_variables,
 )
+from language.number import rounded
 from language.operation import (
     Assign,
     Block,
@@ -80,6 +81,7 @@ def run_motion(
         label = "a run inside a tick follows what has no memory"
         problems.error("run", remembering.span, label)
         problems.stop_if_any()
+    _refuse_actions(automaton, model, problems)
     field = Field(model, constant_names(automaton), inputs, MODE, f"{model.name} ")
     blocks = field_blocks(field)
     method = _method(automaton, field, runs[0], blocks, values, problems)
@@ -124,6 +126,15 @@ def run_block(automaton: Automaton, run: ModelRun) -> Block:
     return body if run.substeps == 1 else (Loop(run.substeps, "work.substep", body),)
 
 
+def _refuse_actions(automaton: Automaton, model: Automaton, problems: Problems) -> None:
+    """A run starts with our states: what its model would do at its own start has no place."""
+    acting = any(mode.entry or mode.exit for mode in model.modes.values())
+    if model.discrete or acting:
+        what = "discrete variables" if model.discrete else "entry or exit actions"
+        label = f"a run inside a tick carries states alone: `{model.name}` has {what}"
+        problems.error("run", automaton.span, label)
+
+
 def _inputs(automaton: Automaton, problems: Problems) -> dict[str, Expr]:
     """A run reads the inputs of the tick before; what is no input here has its default."""
     model = automaton.model
@@ -132,10 +143,9 @@ def _inputs(automaton: Automaton, problems: Problems) -> dict[str, Expr]:
     for name, thing in model.inputs.items():
         found[name] = real(0.0)
         if name in automaton.inputs:
-            found[name] = Ref(f"before.{name}")
+            found[name] = variable_names(automaton, "before")[name]
         elif thing.default is not None:
-            default = thing.default
-            found[name] = Value(bool(default)) if thing.truth else real(default)
+            found[name] = Value(typed(rounded(thing.default), thing.type))
         else:
             label = f"the run needs an input `{name}`: `{model.name}` has no default for it"
             problems.error("run", automaton.span, label)

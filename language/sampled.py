@@ -10,10 +10,11 @@ from __future__ import annotations
 
 import dataclasses
 
+from language.action import action_variables, committing, discrete_variables, entry, reading
 from language.constants import derive_block, parameter_constants, values_of
 from language.evaluate import Scalar
 from language.kalman import Kalman, kalman, observer_variables
-from language.lower import constant_names, equations, expression
+from language.lower import constant_names, equation_names, equations, variable_names
 from language.memory import delays_of, keep_block, memory_variables, with_delays
 from language.model import CHART, Automaton, Mode, Region
 from language.operation import (
@@ -86,8 +87,7 @@ class _Sampled:
     def _names(self, group: str) -> dict[str, Expr]:
         automaton = self.automaton
         known = dict(constant_names(automaton))
-        known.update({name: Ref(f"{group}.{name}") for name in automaton.inputs})
-        known.update({name: Ref(f"state.{name}") for name in automaton.states})
+        known.update(variable_names(automaton, group))
         known.update(in_modes(automaton, "memory.mode"))
         if automaton.model:
             known.update(in_modes(automaton.model, "memory.run_mode", f"{automaton.model.name}."))
@@ -158,6 +158,7 @@ class _Sampled:
             about = f"{name} is a new value in this tick"
             found.append(Variable(f"is_new.{name}", "truth", about=about))
         found += state_variables(automaton)
+        found += discrete_variables(automaton)
         found += input_variables(automaton, "before")
         for info in self.transitions:
             if info.timer:
@@ -168,14 +169,7 @@ class _Sampled:
         found += mode_and_fired(automaton, "tick")
         found.append(Variable("memory.started", "truth", about="the first tick is done"))
         found.append(Variable("memory.faults", "whole", about="latched fault bits"))
-        for mode in automaton.all_modes:
-            resets = {name for transition in mode.transitions for name in transition.reset}
-            for name in sorted(resets):
-                unit = str(automaton.states[name].unit.dimension)
-                found.append(Variable(f"work.reset_{name}", "real", unit))
-            for name in mode.update:
-                unit = str(automaton.states[name].unit.dimension)
-                found.append(Variable(f"work.next_{name}", "real", unit))
+        found += action_variables(automaton)
         return list({variable.name: variable for variable in found}.values())
 
     def _run_modes(self) -> tuple[ModeInfo, ...]:
@@ -199,18 +193,13 @@ class _Sampled:
 
     def _update(self, mode: Mode) -> Block:
         """The assignments of an update read the values of before this tick's updates."""
-        known = dict(self.now)
-        modes = self.automaton.all_modes
-        known.update({name: Ref(f"equation.{name}") for m in modes for name in m.equations})
-        ops: list[Op] = []
-        for name, formula in mode.update.items():
-            key = self.prefix + formula.key
-            ops.append(Assign(f"work.next_{name}", expression(formula.tree, known), key))
+        known = {**self.now, **equation_names(self.automaton.all_modes, "equation.")}
+        ops = reading(self.automaton, mode.update, known, "next")
         return (*ops, *(() if self.automaton.regions else self._store(mode)))
 
     def _store(self, mode: Mode) -> Block:
         """What an update computed, committed together."""
-        return tuple(Assign(f"state.{name}", Ref(f"work.next_{name}")) for name in mode.update)
+        return tuple(committing(self.automaton, mode.update, "next"))
 
     def _start(self) -> Block:
         """The first tick: start values, the initial mode, no advance, only the correction."""
@@ -221,6 +210,7 @@ class _Sampled:
             ops += start_regions(self.automaton.model)
         ops.append(Assign("memory.started", Value(True)))
         ops += enter_run(self.automaton, initial)
+        ops += entry(self.automaton, initial, self.now)
         if initial.name in self.observers:
             ops.append(Run(f"correct_{initial.name}"))
         return tuple(ops)

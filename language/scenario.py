@@ -180,7 +180,7 @@ class _ScenarioReader(StimulusReader):
                 label = f"input `{entry.key}` is given by the recording, too"
                 self.problems.error("duplicate", entry.span, label)
             thing = known[entry.key]
-            found[entry.key] = self.stimulus(entry, thing.unit, thing.truth)
+            found[entry.key] = self.stimulus(entry, thing)
         for name, thing in known.items():
             if name not in found and thing.default is not None:
                 found[name] = Stimulus((Piece(Fraction(0), thing.default),), truth=thing.truth)

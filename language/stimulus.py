@@ -9,7 +9,7 @@ from fractions import Fraction
 
 from language.dimension import DimensionCheck, Scope
 from language.document import Entry, Node, Scalar, Table
-from language.model import Formula
+from language.model import Formula, SystemInput
 from language.problem import Span
 from language.reader import Reader
 from language.signal import Piece, Stimulus
@@ -54,34 +54,36 @@ def held(points: Sequence[Point]) -> tuple[Piece, ...]:
 class StimulusReader(Reader):
     """The forms of an input in a scenario, one method each."""
 
-    def stimulus(self, entry: Entry, unit: Unit, truth: bool) -> Stimulus:
-        """Return the stimulus of an input with a unit, or one that is true or false."""
+    def stimulus(self, entry: Entry, of: SystemInput) -> Stimulus:
+        """Return the stimulus of an input of a system."""
+        unit, truth = of.unit, of.truth
         if isinstance(entry.node, Scalar):
-            return Stimulus((self._piece(entry.key, entry.node, unit, truth),), truth=truth)
+            return Stimulus((self._piece(entry.key, entry.node, of),), truth=truth)
         table = self.table(entry.node, f"inputs.{entry.key}", INPUT_KEYS)
         forms = [key for key in FORMS if table.get(key) is not None]
-        if len(forms) > 1 or (truth and forms not in ([], ["steps"])):
+        if len(forms) > 1 or (of.type != "real" and forms not in ([], ["steps"])):
             other = table.entries[forms[-1]]
             label = f"`{forms[0]}` and `{forms[-1]}` exclude each other"
-            if truth:
-                label = "an input that is true or false has a value or `steps`"
+            if of.type != "real":
+                what = "true or false" if truth else "a whole number or a name"
+                label = f"an input that is {what} has a value or `steps`"
             self.problems.error("form", other.span, label)
             return Stimulus((Piece(Fraction(0), Fraction(0)),), truth=truth)
         if forms == ["table"]:
             return Stimulus(self._table(entry, table, unit))
-        start = self._value(table.get("start"), "start", entry.span, unit, truth)
+        start = self._value(table.get("start"), "start", entry.span, of)
         first = Piece(Fraction(0), start)
         if forms == ["ramp"]:
             return Stimulus(self._ramp(table, first, unit))
         if forms == ["chirp"]:
             return Stimulus(self._chirp(table, first, unit))
-        return Stimulus((first, *self._steps(entry, table, unit, truth)), truth=truth)
+        return Stimulus((first, *self._steps(entry, table, of)), truth=truth)
 
-    def _piece(self, name: str, node: Scalar, unit: Unit, truth: bool) -> Piece:
+    def _piece(self, name: str, node: Scalar, of: SystemInput) -> Piece:
         formula = self.expression(node, "input", node.span)
-        if formula and not truth and names(formula.tree):
-            return Piece(Fraction(0), Fraction(0), formula=self._formula(formula, unit))
-        return Piece(Fraction(0), self._value(node, name, node.span, unit, truth))
+        if formula and of.type == "real" and names(formula.tree):
+            return Piece(Fraction(0), Fraction(0), formula=self._formula(formula, of.unit))
+        return Piece(Fraction(0), self._value(node, name, node.span, of))
 
     def _formula(self, formula: Formula, unit: Unit) -> Formula:
         check = DimensionCheck(Scope({"time": SECOND}, place="in an input"), self.problems)
@@ -95,9 +97,9 @@ class StimulusReader(Reader):
                 break
         return formula
 
-    def _value(self, node: Node | None, what: str, span: Span, unit: Unit, truth: bool) -> Fraction:
-        if not truth:
-            return self.quantity(node, what, span, unit)[0]
+    def _value(self, node: Node | None, what: str, span: Span, of: SystemInput) -> Fraction:
+        if not of.truth:
+            return self.value(node, what, span, of.unit, of.type, of.values)
         scalar = self.scalar(node, what, span)
         if scalar and scalar.text not in ("true", "false"):
             label = f"`{what}` is true or false"
@@ -116,11 +118,11 @@ class StimulusReader(Reader):
             return Fraction(1)
         return value
 
-    def _steps(self, entry: Entry, table: Table, unit: Unit, truth: bool) -> list[Piece]:
+    def _steps(self, entry: Entry, table: Table, of: SystemInput) -> list[Piece]:
         found: list[Piece] = []
         for step in self.table(table.get("steps"), f"inputs.{entry.key}.steps"):
             time = self.time(Scalar(step.key, step.span), "the time of a step", step.span)
-            value = self._value(step.node, "step", step.span, unit, truth)
+            value = self._value(step.node, "step", step.span, of)
             if found and time <= found[-1].start:
                 self.problems.error("order", step.span, "steps are in the order of time")
             found.append(Piece(time, value))

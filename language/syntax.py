@@ -178,6 +178,18 @@ def children(tree: Tree) -> tuple[Tree, ...]:
             return ()
 
 
+def whole_literal(tree: Tree) -> int | None:
+    """Return the value of a literal like `2` or `-3`: a whole number without a unit, else None."""
+    match tree:
+        case Number(value, unit, _) if unit is NO_UNIT and value.denominator == 1:
+            return int(value)
+        case Negative(Number() as literal, _):
+            number = whole_literal(literal)
+            return None if number is None else -number
+        case _:
+            return None
+
+
 def form(part: object) -> object:
     """Return what a tree says without its places: two trees written alike have equal forms."""
     if isinstance(part, tuple):

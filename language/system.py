@@ -18,7 +18,7 @@ from language.units import SECOND, fits
 SYSTEM_KEYS = tuple(
     "language system inputs instances sensors connections outputs".split()  # noqa: SIM905
 )
-SYSTEM_INPUT_KEYS = ("unit", "default", "range", "type")
+SYSTEM_INPUT_KEYS = ("unit", "default", "range", "type", "values")
 INSTANCE_KEYS = ("of", "values", "offset")
 
 Connections = Mapping[tuple[str, str], Connection]
@@ -51,7 +51,9 @@ def around(automaton: Automaton) -> System:
     return System(
         name=name,
         inputs={
-            thing.name: SystemInput(thing.name, thing.unit, thing.default, thing.span, thing.truth)
+            thing.name: SystemInput(
+                thing.name, thing.unit, thing.default, thing.span, thing.type, thing.values
+            )
             for thing in automaton.inputs.values()
         },
         instances={name: Instance(name, automaton, Fraction(0), name, at)},
@@ -104,16 +106,14 @@ class _SystemReader(Reader):
 
     def _input(self, entry: Entry) -> SystemInput:
         table = self.table(entry.node, f"inputs.{entry.key}", SYSTEM_INPUT_KEYS)
+        kind, values = self.typing(table, entry.key)
         unit = self.unit(table.get("unit"))
-        truth = self.choice(table.get("type"), "type", ("real", "bool"), "real") == "bool"
         default: Fraction | None = None
         node = table.get("default")
-        if node is not None and truth:
-            word = self.choice(node, "default", ("true", "false"), "false")
-            default = Fraction(word == "true")
-        elif node is not None:
-            default, _ = self.quantity(node, f"inputs.{entry.key}.default", node.span, unit)
-        return SystemInput(entry.key, unit, default, entry.span, truth)
+        if node is not None:
+            what = f"inputs.{entry.key}.default"
+            default = self.value(node, what, node.span, unit, kind, values)
+        return SystemInput(entry.key, unit, default, entry.span, kind, values)
 
     def _instance(self, entry: Entry) -> Instance:
         key = f"instances.{entry.key}"

@@ -6,8 +6,9 @@ import math
 from collections.abc import Mapping
 from fractions import Fraction
 
+from language.action import committing, entry, reading, stage
 from language.constants import exact_value
-from language.lower import expression
+from language.lower import equation_names, expression
 from language.memory import guard_names, leave, watch_edges
 from language.model import Automaton, Mode, Region, Transition
 from language.operation import (
@@ -79,8 +80,7 @@ def sampled_jump(
     The guard's first true tick counts 1 here, so a wait of N ticks is over above N. Where regions
     run in parallel, what commits is left to `sampled_commit`: all read one snapshot (rule 14).
     """
-    modes = automaton.all_modes
-    known = {**now, **{name: Ref(f"equation.{name}") for m in modes for name in m.equations}}
+    known = {**now, **equation_names(automaton.all_modes, "equation.")}
     edges = watch_edges(automaton, mode, known)
     known.update(guard_names(automaton, mode))
     own = infos_of(mode, infos)
@@ -93,12 +93,15 @@ def sampled_jump(
             key = f"{automaton.name} {transition.when.key}"
             counters.insert(0, Count(info.timer, enabled, info.ticks + 1, key))
             enabled = Compare(">", Ref(info.timer), whole(info.ticks))
-        fire = _read(automaton, transition, known)
-        if not automaton.regions:
-            fire += _commit(automaton, transition, own)
+        if automaton.regions:
+            fire = reading(automaton, transition.reset, known)
+        else:
+            fire = _at_once(automaton, mode, transition, known)
+            fire += _taken(automaton, transition, own)
         fire.append(Assign(fired_variable(mode.region), whole(info.number), info.key))
         if not automaton.regions:
-            fire += enter_run(automaton, automaton.target(transition))
+            target = automaton.target(transition)
+            fire += [*enter_run(automaton, target), *entry(automaton, target, now)]
         chain = (Branch(enabled, tuple(fire), chain),)
     return (*edges, *counters, *chain)
 
@@ -109,7 +112,8 @@ def sampled_commit(automaton: Automaton, region: Region, infos: tuple[Transition
     for mode in region.modes.values():
         own = infos_of(mode, infos)
         for transition, info in zip(mode.transitions, own, strict=True):
-            ops = _commit(automaton, transition, own)
+            ops = committing(automaton, transition.reset)
+            ops += _taken(automaton, transition, own)
             ops += enter_run(automaton, automaton.target(transition))
             cases.append((info.number, tuple(ops)))
     return Choose(fired_variable(region.name), tuple(cases))
@@ -123,21 +127,16 @@ def enter_run(automaton: Automaton, target: Mode) -> list[Op]:
     return [Assign("memory.run_mode", whole(number), f"{automaton.name} {target.run.key}")]
 
 
-def _read(automaton: Automaton, transition: Transition, known: Mapping[str, Expr]) -> list[Op]:
-    """Return what resets read: the values before."""
-    ops: list[Op] = []
-    for name, formula in transition.reset.items():
-        key = f"{automaton.name} {formula.key}"
-        ops.append(Assign(f"work.reset_{name}", expression(formula.tree, known), key))
-    return ops
+def _at_once(
+    automaton: Automaton, mode: Mode, transition: Transition, known: Mapping[str, Expr]
+) -> list[Op]:
+    """Exit, then reset (rule 6), each committed before the next reads."""
+    return [*stage(automaton, mode.exit, known), *stage(automaton, transition.reset, known)]
 
 
-def _commit(automaton: Automaton, transition: Transition, own: list[TransitionInfo]) -> list[Op]:
-    """Resets commit together; the counters of the source end; the target is entered."""
-    ops: list[Op] = [
-        Assign(f"state.{name}", Ref(f"work.reset_{name}")) for name in transition.reset
-    ]
-    ops += [Assign(info.timer, whole(0)) for info in own if info.timer]
+def _taken(automaton: Automaton, transition: Transition, own: list[TransitionInfo]) -> list[Op]:
+    """The counters of the source end; the target is entered."""
+    ops: list[Op] = [Assign(info.timer, whole(0)) for info in own if info.timer]
     ops += leave(automaton, automaton.source(transition), automaton.target(transition))
     mode = mode_variable("memory.mode", transition.region)
     ops.append(Assign(mode, whole(automaton.target(transition).number)))

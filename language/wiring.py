@@ -6,7 +6,8 @@ import dataclasses
 from collections.abc import Iterable, Iterator, Mapping
 
 from language.functions import FUNCTIONS_OF
-from language.lower import expression
+from language.kind import Enumeration, Whole
+from language.lower import WHOLE_TYPES, assigned, typed
 from language.model import CHART, Automaton, Region
 from language.number import NumberType, rounded
 from language.operation import (
@@ -39,9 +40,11 @@ from language.program import (
     ValueType,
     Variable,
     Wire,
+    value_type,
 )
 from language.region import fired_variable, mode_variable
 from language.syntax import names
+from language.units import Dimension
 from language.working import in_working_type
 
 
@@ -50,9 +53,10 @@ def input_variables(automaton: Automaton, group: str) -> list[Variable]:
     return [
         Variable(
             f"{group}.{name}",
-            "truth" if thing.truth else "real",
+            value_type(thing.type),
             str(thing.unit.dimension),
             about=thing.key if group == "input" else "",
+            values=thing.values,
         )
         for name, thing in automaton.inputs.items()
     ]
@@ -64,12 +68,25 @@ def state_variables(automaton: Automaton) -> list[Variable]:
         Variable(f"state.{name}", "real", str(thing.unit.dimension))
         for name, thing in automaton.states.items()
     ]
-    equations = dict.fromkeys(name for mode in automaton.all_modes for name in mode.equations)
-    for name in equations:
-        dimension = automaton.dimensions.get(name)
-        kind: ValueType = "real" if dimension else "truth"
-        found.append(Variable(f"equation.{name}", kind, str(dimension or "1")))
+    return [*found, *equation_variables(automaton, "equation.")]
+
+
+def equation_variables(automaton: Automaton, group: str) -> list[Variable]:
+    """Return the equations of an automaton as variables of a group."""
+    found = []
+    for name in dict.fromkeys(n for mode in automaton.all_modes for n in mode.equations):
+        kind, unit, values = _sort(automaton, name)
+        found.append(Variable(f"{group}{name}", kind, unit, values=values))
     return found
+
+
+def _sort(automaton: Automaton, name: str) -> tuple[ValueType, str, tuple[str, ...]]:
+    """Return type, unit and names of an equation."""
+    kind = automaton.kinds.get(name)
+    if isinstance(kind, Dimension):
+        return "real", str(kind), ()
+    values = kind.values if isinstance(kind, Enumeration) else ()
+    return ("whole" if isinstance(kind, Whole | Enumeration) else "truth"), "1", values
 
 
 def output_wires(automaton: Automaton) -> tuple[Wire, ...]:
@@ -83,13 +100,14 @@ def output_wires(automaton: Automaton) -> tuple[Wire, ...]:
                 wire = output if region.name == CHART else region.name
                 found.append(Wire(wire, variable, "whole", "1"))
             continue
-        if name in automaton.states:
-            unit = str(automaton.states[name].unit.dimension)
-            found.append(Wire(output, f"state.{name}", "real", unit))
+        thing = automaton.carried.get(name)
+        if thing:
+            group = "discrete" if name in automaton.discrete else "state"
+            unit = str(thing.unit.dimension)
+            found.append(Wire(output, f"{group}.{name}", value_type(thing.type), unit))
             continue
-        dimension = automaton.dimensions.get(name)
-        kind: ValueType = "real" if dimension else "truth"
-        found.append(Wire(output, f"equation.{name}", kind, str(dimension or "1")))
+        kind, unit, _ = _sort(automaton, name)
+        found.append(Wire(output, f"equation.{name}", kind, unit))
     return tuple(found)
 
 
@@ -125,14 +143,15 @@ def initial_ops(automaton: Automaton, known: Mapping[str, Expr], prefix: str) ->
     def visit(name: str) -> None:
         if name in done:
             return
-        state = automaton.states[name]
+        state = automaton.carried[name]
         for read in names(state.initial.tree):
-            if read.path in automaton.states:
+            if read.path in automaton.carried:
                 visit(read.path)
-        value = expression(state.initial.tree, known)
-        done[name] = Assign(f"state.{name}", value, prefix + state.initial.key)
+        value = assigned(state.initial.tree, known, state.type in WHOLE_TYPES)
+        group = "discrete" if name in automaton.discrete else "state"
+        done[name] = Assign(f"{group}.{name}", value, prefix + state.initial.key)
 
-    for name in automaton.states:
+    for name in automaton.carried:
         visit(name)
     return list(done.values())
 
@@ -142,8 +161,7 @@ def defaults_of(automaton: Automaton) -> dict[str, float | bool]:
     found: dict[str, float | bool] = {}
     for name, thing in automaton.inputs.items():
         if thing.default is not None:
-            value = rounded(thing.default, automaton.numbers)
-            found[name] = bool(thing.default) if thing.truth else value
+            found[name] = typed(rounded(thing.default, automaton.numbers), thing.type)
     return found
 
 

@@ -6,15 +6,17 @@ guards are evaluated at the very values shown; that it finds nothing proves noth
 
 from __future__ import annotations
 
+import math
 from collections import ChainMap
 from collections.abc import Callable, Iterator, Mapping, MutableMapping
 from dataclasses import dataclass
 
+from language.action import place_of
 from language.constants import parameter_constants, values_of
 from language.evaluate import Scalar, evaluate
-from language.lower import constant_names, equations, expression
+from language.lower import constant_names, equations, expression, variable_names
 from language.model import Automaton, Mode, Range, Transition
-from language.operation import Assign, Expr, Ref
+from language.operation import Assign, Expr
 from language.problem import Problems
 from language.region import one_configuration
 from language.syntax import Name, Relation, Tree, names, walk
@@ -48,8 +50,7 @@ class WitnessSearch:
         self.automaton = automaton
         self.known: dict[str, Expr] = {
             **constant_names(automaton),
-            **{name: Ref(f"input.{name}") for name in automaton.inputs},
-            **{name: Ref(f"state.{name}") for name in automaton.states},
+            **variable_names(automaton, "input"),
         }
         self.constants = values_of(parameter_constants(automaton, Problems()))
         self.lowered: dict[tuple[str, int], Lowered | None] = {}
@@ -133,15 +134,25 @@ class WitnessSearch:
             ranges[f"input.{name}"] = thing.range
         for name, state in self.automaton.states.items():
             ranges[f"state.{name}"] = state.range
+        for name, state in self.automaton.discrete.items():
+            ranges[f"discrete.{name}"] = state.range
         for position, (name, limits) in enumerate(ranges.items()):
             low, high = (float(limits[0]), float(limits[1])) if limits else DEFAULT_RANGE
             fraction = _radical_inverse(index, PRIMES[position % len(PRIMES)])
             point[name] = low + fraction * (high - low)
-        for position, (name, thing) in enumerate(self.automaton.inputs.items()):
-            if thing.truth:
-                point[f"input.{name}"] = bool(index >> position % 6 & 1)
-            elif thing.default is not None:
+        for name, thing in self.automaton.inputs.items():
+            if thing.default is not None:
                 point[f"input.{name}"] = float(thing.default)
+        types = {f"input.{n}": (v.type, v.values) for n, v in self.automaton.inputs.items()}
+        for name, variable in self.automaton.discrete.items():
+            types[f"discrete.{name}"] = variable.type, variable.values
+        for position, (name, (kind, values)) in enumerate(types.items()):
+            if kind == "bool":
+                point[name] = bool(index >> position % 6 & 1)
+            elif kind == "enum":
+                point[name] = index % len(values)
+            elif kind == "int":
+                point[name] = math.floor(point[name])
         return point
 
     def _on_boundary(self, relation: Relation, point: Point, mode: Mode) -> Point | None:
@@ -161,7 +172,7 @@ class WitnessSearch:
             value = self._value(formula.tree, mode, point)
             if value is None:
                 return None
-            after[f"state.{name}"] = value
+            after[place_of(self.automaton, name)] = value
         return ChainMap(after, point)
 
     def _value(self, tree: Tree, mode: Mode, point: Point) -> Scalar | None:

@@ -37,7 +37,7 @@ def _constant(constant: Constant, number: NumberType) -> Constant:
     limits = constant.range
     return dataclasses.replace(
         constant,
-        value=rounded(constant.value, number),
+        value=rounded(constant.value, number) if constant.type == "real" else constant.value,
         range=(rounded(limits[0], number), rounded(limits[1], number)) if limits else None,
     )
 

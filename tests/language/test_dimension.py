@@ -7,8 +7,9 @@ import math
 import pytest
 from hypothesis import assume, given, strategies as st
 
-from language.dimension import LATER, DimensionCheck, Kind, Scope
+from language.dimension import LATER, DimensionCheck, Scope
 from language.evaluate import evaluate
+from language.kind import Kind
 from language.lower import expression
 from language.operation import Expr, Value
 from language.problem import Problems

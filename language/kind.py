@@ -1,0 +1,60 @@
+"""Kind: what a value is - a quantity, a truth value, a whole number, one name of a list."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from language.units import Dimension
+
+Type = Literal["real", "int", "bool", "enum"]
+"""What a declaration says after `type:`."""
+TYPES = ("real", "int", "bool", "enum")
+LARGEST_WHOLE = 2**31 - 1
+"""Whole numbers are held in 32 bits; -2^31 itself stands for what `floor` makes of no number."""
+
+
+@dataclass(frozen=True)
+class Whole:
+    """A whole number that lies from `low` to `high`, both included."""
+
+    low: int = -LARGEST_WHOLE
+    high: int = LARGEST_WHOLE
+
+    def __str__(self) -> str:
+        """Return the word of the language."""
+        return "int"
+
+    @property
+    def is_safe(self) -> bool:
+        """Tell whether it fits 32 bits."""
+        return self.low >= -LARGEST_WHOLE and self.high <= LARGEST_WHOLE
+
+    def joined(self, other: Whole) -> Whole:
+        """Return what holds both."""
+        return Whole(min(self.low, other.low), max(self.high, other.high))
+
+
+@dataclass(frozen=True)
+class Enumeration:
+    """One of some names; its number is its place in the list."""
+
+    values: tuple[str, ...]
+
+    def __str__(self) -> str:
+        """Return the names."""
+        return f"enum of {', '.join(self.values)}"
+
+
+Truthful = Literal["truth"]
+Kind = Dimension | Truthful | Whole | Enumeration
+
+
+def combined(operator: str, left: Whole, right: Whole) -> Whole:
+    """Return the range of `left operator right` (`+ - *`): the outermost of its corners."""
+    if operator == "+":
+        return Whole(left.low + right.low, left.high + right.high)
+    if operator == "-":
+        return Whole(left.low - right.high, left.high - right.low)
+    corners = [a * b for a in (left.low, left.high) for b in (right.low, right.high)]
+    return Whole(min(corners), max(corners))
