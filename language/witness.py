@@ -218,6 +218,11 @@ def report_refiring(automaton: Automaton, problems: Problems) -> None:
                 pair = frozenset({out.key, back.key})
                 if back.target != mode.name or out.wait or back.wait or pair in seen:
                     continue
+                if any(
+                    automaton.modes[m].entry or automaton.modes[m].exit
+                    for m in (out.source, out.target)
+                ):
+                    continue  # their assignments are not searched
                 point = search.refires(out, back)
                 if point is not None:
                     seen.add(pair)
