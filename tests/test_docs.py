@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import shlex
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -10,6 +12,7 @@ from typer.testing import CliRunner
 
 import modewright as mw
 from modewright.cli import app
+from modewright.exits import exit_code
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text()
@@ -30,7 +33,9 @@ def test_every_command_in_the_readme_exists() -> None:
         assert CliRunner().invoke(app, [name, "--help"]).exit_code == 0
 
 
-@pytest.mark.parametrize("page", ["README.md", "docs/ARCHITECTURE.md", "docs/recordings.md"])
+@pytest.mark.parametrize(
+    "page", ["README.md", "docs/ARCHITECTURE.md", "docs/guide.md", "docs/recordings.md"]
+)
 def test_every_file_that_a_page_names_exists(page: str) -> None:
     text = (ROOT / page).read_text()
     named = re.findall(r"`((?:spec|tests|docs|engine|language|codegen)/[\w./-]+)`", text)
@@ -42,3 +47,30 @@ def test_every_file_that_a_page_names_exists(page: str) -> None:
 
 def test_the_architecture_page_is_short_enough_to_be_read() -> None:
     assert len((ROOT / "docs" / "ARCHITECTURE.md").read_text().splitlines()) <= 120
+
+
+def test_the_commands_and_the_python_of_the_guide_work_as_it_says(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    guide = (ROOT / "docs" / "guide.md").read_text()
+    lines = [
+        line
+        for block in re.findall(r"```sh\n(.*?)```", guide, re.DOTALL)
+        for line in block.splitlines()
+    ]
+    assert len(lines) > 12
+    for line in lines:
+        words = shlex.split(line, comments=True)
+        if words[0] == "cd":
+            monkeypatch.chdir(words[1])
+            continue
+        assert words[0] == "modewright"
+        told = re.search(r"# exit code (\d+)$", line)
+        expected = int(told[1]) if told else 0
+        command = partial(app, words[1:], standalone_mode=False)
+        assert exit_code(command) == expected, line
+    for block in re.findall(r"```python\n(.*?)```", guide, re.DOTALL):
+        exec(compile(block, "guide.md", "exec"), {})
+    for name in re.findall(r"--(?:out|plot) ([\w./]+)", guide):
+        assert Path(name).exists(), name
