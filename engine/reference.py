@@ -1,68 +1,52 @@
 """Reference: the same system through scipy and filterpy instead of our own numerics.
 
-Of a continuous Program only its field (`rates_<mode>`, `guards_<mode>`) and its instants (`init`,
-`equations`, `watch`, `jump`) are kept; scipy integrates, and crossings are halved on its dense
-output. Of a sampled Program the numbers of its observers are computed anew; what a mode `runs`
-inside a tick stays ours. The loop over instants is the engine's, through the Stepper protocol.
+Of a continuous Program only its field and its instants are kept, scipy integrates: see
+engine/library_stepper.py. Of a sampled Program the numbers of its observers are computed anew; what
+a mode `runs` inside a tick stays ours. The loop over instants is the engine's, through the Stepper protocol.
 """
 
 from __future__ import annotations
 
 import dataclasses
-import math
-from collections.abc import Callable
-from typing import Any
+from functools import partial
 
 import numpy as np
 from filterpy.common import van_loan_discretization
 from numpy.typing import NDArray
 from scipy import linalg
-from scipy.integrate import solve_ivp
 
-from engine.continuous import Stopped
 from engine.interpreter import Interpreter, Stepper
+from engine.library_stepper import LibraryStepper, Method
 from engine.simulate import simulate
 from engine.trajectory import Trajectory
 from language.model import Scenario, System
-from language.program import ObserverInfo, Program, short
+from language.program import ObserverInfo, Program
 
-Point = list[float]
-Path = Callable[[float], Point]
-"""The states in SI at a time [s] since the start of a flow."""
 Reals = NDArray[np.float64]
 
-OWN_MOTION = ("flow", "peek", "point", "move_", "step_", "series_", "locate_")
-"""What the blocks that integrate or locate are named, or how their names begin."""
-RTOL = 1e-11
-"""Local error per step over the largest value so far: 2^-53 with five digits for sums of steps."""
-SMALLEST_SCALE = 1e-9
-"""Size in SI [unit of the state] below which a state counts as 0: keeps rounding out of steps."""
-EVALUATIONS = 100_000
-"""Rates evaluated in one flow: 6000 steps of DOP853 within a major step are no progress."""
-LOOKS = 4
-"""Looks at the guards per flow, evenly spread: shorter pulses than a quarter step may be missed."""
-HALVINGS = 52
-"""Halvings of the bracket of a crossing: 1 ms / 4 / 2^52 = 6e-20 s, below one ULP of any time."""
 NEGLIGIBLE = 1e-9
 """Most that a number taken as 0 may be of its matrix: the agreement promised (semantics 17)."""
 
 
-def reference(system: System, scenario: Scenario) -> Trajectory:
+def reference(system: System, scenario: Scenario, method: Method = "DOP853") -> Trajectory:
     """Return the trajectory of a system through a scenario, by independent libraries."""
-    return simulate(system, scenario, reference_stepper)
+    return simulate(system, scenario, partial(reference_stepper, method=method))
 
 
-def reference_stepper(program: Program) -> Stepper:
+def by_method(system: System, scenario: Scenario, method: Method) -> Trajectory:
+    """Return a trajectory for which scipy integrates; sampled automata keep our numbers."""
+    return simulate(system, scenario, partial(_integrated, method=method))
+
+
+def reference_stepper(program: Program, method: Method = "DOP853") -> Stepper:
     """Return what runs a Program with the numerics of scipy and filterpy."""
     if program.period is None:
-        return LibraryStepper(program)
+        return LibraryStepper(program, method)
     return Interpreter(with_library_numbers(program))
 
 
-def without_motion(program: Program) -> Program:
-    """Return a continuous Program without its blocks that integrate or locate."""
-    blocks = {n: block for n, block in program.blocks.items() if not n.startswith(OWN_MOTION)}
-    return dataclasses.replace(program, blocks=blocks)
+def _integrated(program: Program, method: Method) -> Stepper:
+    return LibraryStepper(program, method) if program.period is None else Interpreter(program)
 
 
 def with_library_numbers(program: Program) -> Program:
@@ -124,154 +108,3 @@ def _matrices(info: ObserverInfo) -> dict[str, Reals]:
     p = linalg.solve_discrete_are(phi.T, c.T, noise, r)
     gain = linalg.solve(c @ p @ c.T + r, c @ p).T
     return {"Phi": phi, "Gamma": held @ b, "G": held, "L": gain, "C": c}
-
-
-class LibraryStepper:
-    """A continuous Program whose `flow` is scipy's; every other block is interpreted."""
-
-    def __init__(self, program: Program) -> None:
-        """Take the Program; its own motion is left out, so it cannot be run by mistake."""
-        self.program = program
-        self._inner = Interpreter(without_motion(program))
-        names = [v.name for v in program.variables if v.name.startswith("state.")]
-        self._names = tuple(short(name) for name in names)
-        self._states = self._inner.reader(tuple(names))
-        self._rates = self._inner.reader(tuple(f"work.rate_{name}" for name in self._names))
-        self._sizes = np.full(len(names), SMALLEST_SCALE)
-        self._time = 0.0
-        self._is_timed = any(v.name == "work.s" for v in self._inner.program.variables) and any(
-            v.name.startswith("work.rise_") for v in program.variables
-        )
-        self._guards = {}
-        for mode in program.modes:
-            count = sum(1 for t in program.transitions if t.source == mode.number)
-            now = self._inner.reader(tuple(f"work.guard_{k}" for k in range(count)))
-            armed = self._inner.reader(tuple(f"memory.armed_{k}" for k in range(count)))
-            self._guards[mode.name] = (now, armed)
-
-    def get(self, name: str) -> Any:
-        """Return the value of a variable or constant, `group.name`."""
-        return self._inner.get(name)
-
-    def set(self, name: str, value: float | int | bool) -> None:
-        """Set a variable."""
-        self._inner.set(name, value)
-
-    def reader(self, names: tuple[str, ...]) -> Callable[[], tuple[Any, ...]]:
-        """Return a function that returns the values of some variables."""
-        return self._inner.reader(names)
-
-    def run(self, block: str) -> None:
-        """Run a block, `flow` by scipy."""
-        if block == "flow":
-            self._flow(self.get("work.h"))
-        elif block == "peek":
-            self._peek(self.get("work.h"))
-        else:
-            self._inner.run(block)
-
-    def _flow(self, h: float) -> None:
-        """Move the states over h [s], or to the first change of a guard before that."""
-        mode = self.program.mode_name(self.get("memory.mode"))
-        path = self._path(mode, h)
-        change = self._first_change(mode, path, h)
-        elapsed = h if change is None else change
-        for name, value in zip(self._names, path(elapsed), strict=True):
-            self.set(f"state.{name}", value)
-        self.set("work.elapsed", elapsed)
-        self.set("work.crossed", change is not None)
-        self._time += elapsed
-
-    def _peek(self, h: float) -> None:
-        """Move the states over h [s], whatever the guards do."""
-        mode = self.program.mode_name(self.get("memory.mode"))
-        for name, value in zip(self._names, self._path(mode, h)(h), strict=True):
-            self.set(f"state.{name}", value)
-
-    def _path(self, mode: str, h: float) -> Path:
-        """Return the solution from the states over h [s]. Raises Stopped where there is none."""
-        start: Point = list(self._states())
-        first = self._rates_at(mode, start, 0.0)
-        for name, value, rate in zip(self._names, start, first, strict=True):
-            if not (math.isfinite(value) and math.isfinite(rate)):
-                raise Stopped(f"{self._here(mode)}: state `{name}` is {value}, its rate {rate}")
-        if not start:
-            return lambda time: []
-        moved = np.maximum(np.abs(start), h * np.abs(first))
-        self._sizes = np.maximum(self._sizes, moved)
-        solution = self._solved(mode, start, h)
-        end: Point = solution.y[:, -1].tolist()
-
-        def path(time: float) -> Point:
-            if time == h:
-                return end
-            point: Point = solution.sol(time).tolist()
-            return point
-
-        return path
-
-    def _solved(self, mode: str, start: Point, h: float) -> Any:
-        """Return scipy's solution over h [s], with its polynomial.
-
-        DOP853: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.5 and II.6.
-        The first step tried is all of h, and no step is longer than a major step.
-        """
-        evaluations = 0
-
-        def rates(time: float, point: Reals) -> Point:
-            nonlocal evaluations
-            evaluations += 1
-            if evaluations > EVALUATIONS:
-                raise Stopped(f"{self._here(mode)}: more than {EVALUATIONS} rates in one flow")
-            return self._rates_at(mode, point.tolist(), float(time))
-
-        tolerances = {"rtol": RTOL, "atol": RTOL * self._sizes}
-        with np.errstate(over="ignore", invalid="ignore"):  # such a step is rejected by its error
-            solution = solve_ivp(
-                rates, (0.0, h), start, "DOP853", dense_output=True, first_step=h, **tolerances
-            )
-        if not solution.success:
-            raise Stopped(f"{self._here(mode)}: scipy: {solution.message}")
-        return solution
-
-    def _first_change(self, mode: str, path: Path, h: float) -> float | None:
-        """Return when [s] the first guard changes, on the far side; None if none does."""
-        if not self._guards[mode][0]():
-            return None
-        low = 0.0
-        for look in range(1, LOOKS + 1):
-            high = h * (look / LOOKS)
-            if self._changed(mode, path(high), high):
-                return self._halved(mode, path, low, high)
-            low = high
-        return None
-
-    def _halved(self, mode: str, path: Path, low: float, high: float) -> float:
-        """Return the upper end of the bracket (low, high] [s]: a guard has changed there."""
-        for _ in range(HALVINGS):
-            middle = 0.5 * (low + high)
-            if self._changed(mode, path(middle), middle):
-                high = middle
-            else:
-                low = middle
-        return high
-
-    def _changed(self, mode: str, point: Point, time: float) -> bool:
-        now, armed = self._guards[mode]
-        self._put(point, time)
-        self._inner.run(f"guards_{mode}")
-        return now() != armed()
-
-    def _rates_at(self, mode: str, point: Point, time: float) -> Point:
-        self._put(point, time)
-        self._inner.run(f"rates_{mode}")
-        return list(self._rates())
-
-    def _put(self, point: Point, time: float) -> None:
-        if self._is_timed:
-            self._inner.set("work.s", time)
-        for name, value in zip(self._names, point, strict=True):
-            self._inner.set(f"work.at_{name}", value)
-
-    def _here(self, mode: str) -> str:
-        return f"t = {self._time:.9g} s, `{self.program.name}` in mode `{mode}`"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from codegen.source import c_files
 from engine.recording import Recording, read_recording
@@ -25,6 +26,10 @@ from modewright.checking import check as check
 
 Values = Mapping[str, str]
 """Parameter values as text with units, by `parameter` or `instance.parameter`."""
+
+
+METHODS = ("RK4", "DOP853", "Radau", "LSODA")
+"""How continuous automata can be integrated: our own method, or one of scipy's."""
 
 
 @dataclass(frozen=True)
@@ -62,13 +67,22 @@ def simulate(
     root: Path | None = None,
     *,
     reference: bool = False,
+    method: str = "RK4",
 ) -> Trajectory:
-    """Return the trajectory of a system through a scenario; by scipy and filterpy if asked."""
-    loaded = load(system, scenario, values, root)
-    if reference:
-        from engine.reference import reference as simulate_reference  # scipy only where asked for
+    """Return the trajectory of a system, or of an automaton alone, through a scenario.
 
-        return simulate_reference(loaded.system, loaded.scenario)
+    `method` integrates continuous automata: RK4 of the Program, or DOP853, Radau or LSODA of
+    scipy; `reference` takes scipy (DOP853) and the numbers of filterpy. Raises ValueError.
+    """
+    if method not in METHODS:
+        raise ValueError(f"`{method}` is no method of integration: {', '.join(METHODS)}")
+    loaded = load(system, scenario, values, root)
+    if reference or method != "RK4":
+        from engine import reference as independent  # scipy only where asked for
+
+        run = independent.reference if reference else independent.by_method
+        scipys: Any = "DOP853" if method == "RK4" else method
+        return run(loaded.system, loaded.scenario, scipys)
     return simulate_system(loaded.system, loaded.scenario)
 
 

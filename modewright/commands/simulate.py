@@ -17,6 +17,7 @@ from modewright.commands.options import (
     graphic_format,
     require_run,
     stop_where,
+    usage_errors,
     values_of,
 )
 from modewright.console import announce, console, working
@@ -32,9 +33,12 @@ def simulate(
     reference: Annotated[
         bool, typer.Option("--reference", help="integrate with scipy, observe with filterpy")
     ] = False,
+    method: Annotated[
+        str, typer.Option("--method", help="RK4, or scipy's DOP853, Radau or LSODA")
+    ] = "RK4",
     as_json: Json = False,
 ) -> None:
-    """Simulate a system through a scenario.
+    """Simulate a system, or an automaton alone, through a scenario.
 
     \b
     modewright simulate ev_driveline -s tip_out --plot tip_out.png
@@ -45,8 +49,10 @@ def simulate(
 
     require_run(out)
     require_writable(out, plot)
-    with working(f"simulating {system}, {scenario}"):
-        trajectory = api.simulate(system, scenario, values_of(sets), reference=reference)
+    with working(f"simulating {system}, {scenario}"), usage_errors():
+        trajectory = api.simulate(
+            system, scenario, values_of(sets), reference=reference, method=method
+        )
     files: dict[Path, bytes] = {}
     if out:
         files |= run_files(trajectory, out)

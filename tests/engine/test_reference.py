@@ -14,14 +14,8 @@ import pytest
 
 from engine import starting
 from engine.continuous import Stopped
-from engine.reference import (
-    OWN_MOTION,
-    LibraryStepper,
-    library_numbers,
-    reference,
-    with_library_numbers,
-    without_motion,
-)
+from engine.library_stepper import OWN_MOTION, LibraryStepper, without_motion
+from engine.reference import library_numbers, reference, with_library_numbers
 from engine.simulate import simulate
 from engine.starting import programs_of
 from engine.trajectory import Event, Trajectory

@@ -79,6 +79,7 @@ def figures(recordings: Path | None) -> dict[str, Callable[[], Figure]]:
     found: dict[str, Callable[[], Figure]] = {"tip_out": tip_out, "lockstep": lockstep}
     for suffix in ("", "_noisy"):
         found[f"replay_1kHz{suffix}"] = partial(reference_replay, suffix)
+    found["table_1"] = table_1
     found["refused"] = refused
     found["check_cold"] = check_cold
     if recordings:
@@ -155,6 +156,16 @@ def reference_replay(suffix: str) -> Figure:
         "mode_changes_s": events[0].time,
         "differing_bits": found.verdict.differing,
     }
+
+
+def table_1() -> Figure:
+    """Delays until the loss of contact is seen, Table 1: 14, 2 and 0.8 ms."""
+    run = mw.simulate("table_1", "nominal", root=ROOT / "tests" / "data" / "specs" / "table_1")
+    lost = run.events_of("plant")[0].time
+    published = {"at_100Hz": 14e-3, "at_1kHz": 2e-3, "at_10kHz": 0.8e-3}
+    delays = {rate: run.events_of(rate)[0].time - lost for rate in published}
+    met = all(abs(delays[rate] - published[rate]) <= 1e-4 for rate in published)
+    return {"met": met, "delays_s": delays, "published_s": published}
 
 
 def leaf(estimator: str, path: Path) -> Figure:
