@@ -5,6 +5,8 @@
 #ifndef HA_MATHF_H
 #define HA_MATHF_H
 
+#include <stdint.h>
+
 float ha_sinf(float x); /* sine; |x| <= 1000 rad, clamped; error < 0.85 ULP */
 float ha_cosf(float x); /* cosine; |x| <= 1000 rad, clamped; error < 0.85 ULP */
 float ha_expf(float x); /* e^x; -87 <= x <= 88, clamped; error < 0.95 ULP */
@@ -31,6 +33,17 @@ static inline float ha_clipf(float x, float low, float high)
 static inline float ha_signf(float x)
 {
     return (x > 0.0F) ? 1.0F : ((x < 0.0F) ? -1.0F : 0.0F);
+}
+
+/* A whole-valued x as a whole number, the nearest of 32 bits; a NaN is INT32_MIN */
+static inline int32_t ha_wholef(float x)
+{
+    const float largest = (float)2147483520;
+
+    if ((x >= -largest) && (x <= largest)) {
+        return (int32_t)x;
+    }
+    return (x > 0.0F) ? 2147483520 : ((x < 0.0F) ? -2147483520 : INT32_MIN);
 }
 
 #endif

@@ -5,6 +5,8 @@
 #ifndef HA_MATH_H
 #define HA_MATH_H
 
+#include <stdint.h>
+
 double ha_sin(double x); /* sine; |x| <= 1e5 rad, clamped; error < 0.85 ULP */
 double ha_cos(double x); /* cosine; |x| <= 1e5 rad, clamped; error < 0.85 ULP */
 double ha_exp(double x); /* e^x; -708 <= x <= 709, clamped; error < 0.95 ULP */
@@ -31,6 +33,17 @@ static inline double ha_clip(double x, double low, double high)
 static inline double ha_sign(double x)
 {
     return (x > 0.0) ? 1.0 : ((x < 0.0) ? -1.0 : 0.0);
+}
+
+/* A whole-valued x as a whole number, the nearest of 32 bits; a NaN is INT32_MIN */
+static inline int32_t ha_whole(double x)
+{
+    const double largest = (double)2147483520;
+
+    if ((x >= -largest) && (x <= largest)) {
+        return (int32_t)x;
+    }
+    return (x > 0.0) ? 2147483520 : ((x < 0.0) ? -2147483520 : INT32_MIN);
 }
 
 #endif
