@@ -218,10 +218,7 @@ def report_refiring(automaton: Automaton, problems: Problems) -> None:
                 pair = frozenset({out.key, back.key})
                 if back.target != mode.name or out.wait or back.wait or pair in seen:
                     continue
-                if any(
-                    automaton.modes[m].entry or automaton.modes[m].exit
-                    for m in (out.source, out.target)
-                ):
+                if any(each.entry or each.exit for each in (mode, automaton.target(out))):
                     continue  # their assignments are not searched
                 point = search.refires(out, back)
                 if point is not None:

@@ -11,7 +11,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from language.document import Document, Node, Scalar, Table
+from language.document import Document, Entry, Node, Scalar, Table
+from language.overlay import lay, without
+from language.problem import Problems
 
 LABEL_WIDTH = 36
 """Longest line of a label [characters]."""
@@ -82,13 +84,31 @@ def diagram_of(document: Document) -> Diagram:
 
     The automaton must have been checked: targets are there.
     """
-    regions = _regions(document.root, ())
+    templates = document.root.get("templates")
+    root = _filled(document.root, templates) if isinstance(templates, Table) else document.root
+    regions = _regions(root, ())
     known = set(_paths(regions))
-    arrows = [
-        arrow for path, table in _modes(document.root, ()) for arrow in _arrows(path, table, known)
-    ]
+    arrows = [arrow for path, table in _modes(root, ()) for arrow in _arrows(path, table, known)]
     about = document.root.get("about")
     return Diagram(document.name, _text(about), tuple(regions), tuple(arrows))
+
+
+def _filled(owner: Table, templates: Table) -> Table:
+    """Return a table whose modes, inner ones too, are laid over the templates that they name."""
+    template = templates.get(_text(owner.get("like")))
+    if isinstance(template, Table):
+        owner = lay(template, without(owner, "like"), Problems(), template=True)
+    entries = dict(owner.entries)
+    for key in ("modes", "regions"):
+        node = owner.get(key)
+        if isinstance(node, Table):
+            inner = {
+                e.key: Entry(e.key, e.span, _filled(e.node, templates))
+                for e in node
+                if isinstance(e.node, Table)
+            }
+            entries[key] = Entry(key, owner.entries[key].span, Table(inner, node.span))
+    return Table(entries, owner.span)
 
 
 def lifted(arrow: Arrow) -> Arrow:

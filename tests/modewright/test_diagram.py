@@ -82,6 +82,21 @@ def test_a_transition_that_leaves_an_outer_mode_starts_there_and_names_its_sourc
     assert "from slow" in shown(nested().svg())
 
 
+def test_what_a_mode_takes_from_a_template_is_shown() -> None:
+    text = """\
+language: 1
+automaton: templated
+templates: {contact: {equations: {w: 0 rad/s}, transitions: {gap: {when: "T < 0 N*m"}}}}
+initial: drive
+modes:
+  drive: {like: contact}
+  gap: {transitions: {drive: {when: "T > 0 N*m"}}}
+"""
+    lines = diagram_of(document_of(Source("x"), text)).mermaid().splitlines()
+    assert '    state "drive<br/>w = 0 rad/s" as drive' in lines
+    assert "    drive --> gap : T < 0 N*m" in lines
+
+
 def test_the_same_spec_gives_the_same_bytes() -> None:
     assert nested().svg() == nested().svg()
 
