@@ -228,8 +228,9 @@ def _routes(
             start = lefts[item.column] + (widths[item.column] - item.size[0]) / 2
             if item is label:
                 corner = (start, item.y - item.size[1] / 2)
-                pieces.append((*piece, (start, item.y)))
-                piece = [(start + item.size[0], item.y)]
+                pieces.append((*piece, (lefts[item.column], item.y), (start, item.y)))
+                end = lefts[item.column] + widths[item.column]
+                piece = [(start + item.size[0], item.y), (end, item.y)]
             else:
                 piece += [(lefts[item.column], item.y)]
                 piece += [(lefts[item.column] + widths[item.column], item.y)]
