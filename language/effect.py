@@ -25,13 +25,16 @@ FIT_KEYS = {
     "output": ("unit", "has"),
     "element": ("kind", "unit", "has"),
 }
-ELEMENT_PARTS = ("twist", "rate", "torque", "stiffness", "damping", "gap", "speed", "inertia")
+ELEMENT_PARTS = (
+    *("twist", "rate", "torque", "stiffness", "damping", "gap", "angle_rate"),
+    *("speed", "inertia"),
+)
 HOLES = {
-    "balance": ("x", "unit", "force", "inertia", "inertia_unit"),
-    "input": ("u", "unit"),
-    "output": ("y", "unit"),
+    "balance": ("x", "unit", "force", "inertia", "inertia_unit", "damping_unit", "drag_unit"),
+    "input": ("u", "unit", "unit_rate"),
+    "output": ("y", "unit", "unit_rate"),
     "element": (
-        *("unit", "force", "angle", "far", *ELEMENT_PARTS),
+        *("unit", "force", "angle", "far", "stretch", "gap_rate", *ELEMENT_PARTS),
         *(f"{part}_unit" for part in ELEMENT_PARTS),
     ),
 }

@@ -12,12 +12,12 @@ from language.problem import Problems, Span
 from language.reader import Reader
 
 ELEMENT_KEYS = {
-    "elastic": ("twist", "rate", "torque", "stiffness", "damping", "gap"),
+    "elastic": ("twist", "rate", "torque", "stiffness", "damping", "gap", "angle_rate"),
     "inertia": ("speed", "inertia", "far"),
 }
 """Keys of an element by its kind; the first ones of each have to be there."""
 REQUIRED = {"elastic": ("twist", "rate", "torque", "stiffness"), "inertia": ("speed", "inertia")}
-PLACE_KEYS = ("weight", "angle_rate", "inertia", "speed")
+PLACE_KEYS = ("weight", "load", "brake", "angle_rate")
 """What a balance, input or output may say about itself for effects."""
 
 

@@ -74,6 +74,8 @@ def _balance(tree: Table, known: Known, fit: Fit, name: str) -> Place | Misfit:
         holes["force"] = unit_text(force)
         inertia = _times(_times(force, kind, -1), SECOND)
         holes["inertia_unit"] = unit_text(Dimension(inertia.powers))
+        holes["damping_unit"] = unit_text(_times(force, kind, -1))
+        holes["drag_unit"] = unit_text(_times(_times(force, kind, -1), kind, -1))
         factors = {_coefficient(scalar.text, name) for scalar in found}
         if len(factors) == 1:
             holes["inertia"] = factors.pop()
@@ -103,7 +105,8 @@ def _signal(tree: Table, known: Known, fit: Fit, name: str, hole: str, read: str
         return Misfit(f"`{name}` is no quantity")
     if fit.unit and not fits(kind, fit.unit):
         return Misfit(f"`{name}` is in `{kind}`, not in `{fit.unit}`")
-    return Place(name, {hole: read, "unit": unit_text(kind), **_declared(tree, name)})
+    units = {"unit": unit_text(kind), "unit_rate": unit_text(_times(kind, SECOND, -1))}
+    return Place(name, {hole: read, **units, **_declared(tree, name)})
 
 
 def _element(tree: Table, known: Known, fit: Fit, name: str) -> Place | Misfit:
@@ -132,6 +135,7 @@ def _element(tree: Table, known: Known, fit: Fit, name: str) -> Place | Misfit:
     if fit.unit and (unit is None or not fits(unit, fit.unit)):
         return Misfit(f"the {measured} of `{name}` is in `{unit}`, not in `{fit.unit}`")
     holes.update(_element_units(fit.of, kinds))
+    holes.update(_gap(tree, holes))
     return Place(name, holes, _text(holes.get("speed")))
 
 
@@ -152,6 +156,20 @@ def _element_units(of: str, kinds: Mapping[str, Dimension]) -> dict[str, Hole]:
         found[part if part in ("angle", "force") else f"{part}_unit"] = unit_text(dimension)
     unit = units.get("force" if of == "elastic" else "speed")
     return {**found, "unit": unit_text(unit)} if unit else found
+
+
+def _gap(tree: Table, holes: Mapping[str, Hole]) -> dict[str, Hole]:
+    """Return the stretch of the spring alone, and the rate of the gap beside it (0 without)."""
+    twist, gap = holes.get("twist"), holes.get("gap")
+    if twist is None or gap is None:
+        return {"stretch": twist, "gap_rate": "0"} if twist else {}
+    found: dict[str, Hole] = {"stretch": f"{twist} - {gap}"}
+    balances = {scalar.text for state, scalar in entries_of(tree, "flow") if state == gap}
+    if len(balances) == 1:
+        left, right = sides(balances.pop())
+        if left == f"der({gap})":
+            found["gap_rate"] = right
+    return found
 
 
 def _declared(tree: Table, name: str) -> dict[str, Hole]:

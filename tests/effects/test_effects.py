@@ -1,0 +1,403 @@
+"""Effects: each that is shipped does what its `about` says - closed forms and balances."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+import modewright as mw
+from tests.effects.rig import ran
+from tests.language.making import ROOT
+
+EXACT = 1e-9
+"""RK4 with a step of 1 ms on polynomials and slow exponentials; absolute, SI."""
+J = 2.0  # kg*m^2, of the rotor
+FILES = sorted((ROOT / "spec" / "effects").glob("*.yaml"))
+Array = np.ndarray
+
+
+def speed(found: mw.Trajectory) -> Array:
+    return np.asarray(found.signals["plant.w"])
+
+
+def torque(found: mw.Trajectory) -> Array:
+    return np.asarray(found.signals["plant.T_s"])
+
+
+def effect_named(value: object) -> str:
+    return value.split("@")[0].strip("{") if isinstance(value, str) and "@" in value else ""
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+def test_an_effect_says_what_it_is_and_what_it_is_confused_with(path: Path) -> None:
+    spec = yaml.safe_load(path.read_text("utf-8"))
+    assert spec["effect"] == path.stem
+    assert spec["about"] and mw.check(str(path)) == []
+    for key in ("signature", "confused_with", "separated_by"):
+        assert key in spec, key
+
+
+def test_dry_friction_decelerates_linearly_and_dissipates_its_torque_times_the_speed(
+    tmp_path: Path,
+) -> None:
+    found = ran(
+        tmp_path,
+        "rotor",
+        "{coulomb_friction@w: {values: {T_c: 4 N*m}}}",
+        {"T": "0 N*m"},
+        horizon="2 s",
+        initial="{plant.w: 10 rad/s}",
+    )
+    w, t = speed(found), found.times
+    assert np.max(np.abs(w - (10 - 4 / J * t))) < EXACT
+    turned = np.asarray(found.signals["plant.x"])[-1]
+    lost = J / 2 * (w[0] ** 2 - w[-1] ** 2)
+    assert lost == pytest.approx(4 * turned, rel=1e-9)
+
+
+RISE: list[tuple[str, str, Callable[[Array], Array]]] = [
+    # effect, a steady torque of 6 N*m applied from the start, speed by hand
+    ("{torque_gain@T: {values: {gain: 1.25}}}", "6 N*m", lambda t: 7.5 / J * t),
+    ("{torque_offset@T: {values: {offset: -2}}}", "6 N*m", lambda t: 4 / J * t),
+    (
+        "{torque_drift@T: {values: {drop: 0.2, tau_d: 2 s}}}",
+        "6 N*m",
+        lambda t: 6 / J * (t - 0.2 * (t - 2 * (1 - np.exp(-t / 2)))),
+    ),
+    (
+        "{torque_derating@T: {values: {P_max: 1 kW}}}",  # at 10 rad/s: 100 N*m
+        "150 N*m",
+        lambda t: 100 / J * t,
+    ),
+    (
+        "{road_grade@w: {values: {grade: 0.1 rad}}}",  # weight 30 N*m
+        "6 N*m",
+        lambda t: (6 - 30 * np.sin(0.1)) / J * t,
+    ),
+    (
+        "{viscous_friction@w: {values: {b: 3}}}",
+        "6 N*m",
+        lambda t: 2 * (1 - np.exp(-3 / J * t)),
+    ),
+    (
+        "{quadratic_drag@w: {values: {c_2: 1.5}}}",
+        "6 N*m",
+        lambda t: 2 * np.tanh(1.5 * t),  # w_end 2 rad/s, J / (c_2 * w_end) = 2/3 s
+    ),
+    (
+        "{torque_ripple@T: {values: {a: 5 N*m, ord: 3, ph: 0.5 rad}}}",  # angle rate 10 rad/s
+        "6 N*m",
+        lambda t: 6 / J * t + 5 / J / 30 * (np.cos(0.5) - np.cos(30 * t + 0.5)),
+    ),
+]
+
+
+@pytest.mark.parametrize(("effects", "given", "wanted"), RISE, ids=effect_named)
+def test_speed_under_a_steady_torque(
+    tmp_path: Path, effects: str, given: str, wanted: Callable[[Array], Array]
+) -> None:
+    found = ran(tmp_path, "rotor", effects, {"T": given})
+    assert np.max(np.abs(speed(found) - wanted(found.times))) < 2e-8
+
+
+def test_a_lag_follows_a_step_exponentially(tmp_path: Path) -> None:
+    found = ran(
+        tmp_path,
+        "rotor",
+        "{actuator_lag@T: {values: {tau: 50 ms}}}",
+        {"T": "{start: 0 N*m, steps: {0.1 s: 6 N*m}}"},
+    )
+    t = np.maximum(found.times - 0.1, 0)
+    wanted = 6 / J * (t - 0.05 * (1 - np.exp(-t / 0.05)))
+    assert np.max(np.abs(speed(found) - wanted)) < 1e-7
+
+
+def test_a_rate_limit_makes_a_ramp_of_a_step(tmp_path: Path) -> None:
+    limit = "{torque_rate_limit@T: {values: {r_max: 100}}}"
+    found = ran(tmp_path, "rotor", limit, {"T": "{start: 0 N*m, steps: {0.1 s: 30 N*m}}"})
+    t = np.clip(found.times - 0.1, 0, 0.3)
+    after = np.maximum(found.times - 0.4, 0)
+    wanted = 100 / J * t**2 / 2 + 30 / J * after
+    # Within tau_f (1 ms) of its end the ramp bends into the request: 30 N*m * 1 ms / J at most.
+    assert np.max(np.abs(speed(found) - wanted)) < 30 * 0.001 / J
+
+
+def test_the_loss_of_gears_follows_the_size_of_the_load(tmp_path: Path) -> None:
+    effects = "{load_dependent_loss@w: {values: {loss: 0.1}}}"
+    for sign in (1, -1):
+        found = ran(
+            tmp_path, "rotor", effects, {"T": f"{6 * sign} N*m"}, initial="{plant.w: 20 rad/s}"
+        )
+        assert np.max(np.abs(speed(found) - (20 + (6 * sign - 0.6) / J * found.times))) < EXACT
+
+
+def test_stribeck_friction_is_larger_at_low_speed(tmp_path: Path) -> None:
+    effects = "{stribeck_friction@w: {values: {T_c: 4 N*m, rise: 0.5, w_k: 2}}}"
+    rates = {}
+    for w in (1, 40):
+        found = ran(tmp_path, "rotor", effects, {"T": "0 N*m"}, initial=f"{{plant.w: {w} rad/s}}")
+        rates[w] = (speed(found)[1] - speed(found)[0]) / found.times[1]
+    assert rates[40] == pytest.approx(-4 / J, rel=1e-9)
+    assert rates[1] == pytest.approx(-4 / J * (1 + 0.5 * np.exp(-((1 / 2) ** 2))), rel=0.01)
+
+
+def test_a_brake_that_lets_go_slowly_is_a_load_that_fades(tmp_path: Path) -> None:
+    found = ran(
+        tmp_path,
+        "rotor",
+        "{brake_drag@w: {values: {share: 0.5, tau_b: 0.2 s}}}",
+        {"T": "0 N*m", "T_b": "{start: 8 N*m, steps: {0.5 s: 0 N*m}}"},
+        initial="{plant.w: 50 rad/s}",
+        horizon="2 s",
+    )
+    top = 4 * (1 - np.exp(-0.5 / 0.2))
+    t = found.times[51:] - 0.5
+    w = speed(found)
+    assert np.max(np.abs(w[51:] - (w[50] - top / J * 0.2 * (1 - np.exp(-t / 0.2))))) < 1e-7
+
+
+def test_a_body_on_a_spring_oscillates_at_the_frequency_of_both_parts(tmp_path: Path) -> None:
+    effects = "{compliance@body: {values: {J_f: 0.5 kg*m^2, k_c: 600 N*m/rad, c_c: 0 N*m*s/rad}}}"
+    found = ran(
+        tmp_path,
+        "rotor",
+        effects,
+        {"T": "0 N*m"},
+        initial="{plant.tw_body: 0.01 rad}",
+        more="outputs: [w, x, T_l, tw_body, w_f_body]",
+    )
+    omega = np.sqrt(600 * (1 / 1.5 + 1 / 0.5))
+    twist = np.asarray(found.signals["plant.tw_body"])
+    assert np.max(np.abs(twist - 0.01 * np.cos(omega * found.times))) < 1e-8
+    momentum = 1.5 * speed(found) + 0.5 * np.asarray(found.signals["plant.w_f_body"])
+    assert np.max(np.abs(momentum)) < EXACT
+
+
+def test_springs_in_series_share_a_torque(tmp_path: Path) -> None:
+    """A load at the far end of the spring twists it by T / k_c; the near end sees all of it."""
+    effects = "{compliance@body: {values: {J_f: 1 kg*m^2, k_c: 600 N*m/rad, c_c: 60 N*m*s/rad}}}"
+    found = ran(
+        tmp_path,
+        "rotor",
+        effects,
+        {"T": "6 N*m"},
+        more="outputs: [w, x, T_l, tw_body]\nequations: {T_l: G * 0.2}",
+        horizon="2 s",
+    )
+    assert np.max(np.abs(speed(found)[-1] - 0.0)) < 1e-6
+    # Both parts stand still: 6 N*m go in, 6 N*m (0.2 * 30) are taken out behind the spring.
+    assert found.signals["plant.tw_body"][-1] == pytest.approx(6 / 600, rel=1e-6)
+
+
+def test_a_tyre_settles_at_the_static_slip(tmp_path: Path) -> None:
+    effects = "{tyre_slip@body: {values: {J_w: 0.5 kg*m^2, C_t: 1000 N*m, l_r: 0.5 rad}}}"
+    found = ran(
+        tmp_path,
+        "rotor",
+        effects,
+        {"T": "6 N*m"},
+        initial="{plant.w: 20 rad/s}",
+        more="outputs: [w, x, T_l, w_v_body, T_t_body]\nequations: {T_l: G * 0.2}",
+        horizon="1 s",
+    )
+    w, v = speed(found)[-1], found.signals["plant.w_v_body"][-1]
+    # No resultant torque: the tyre carries 6 N*m and slips by 6 / C_t of its speed.
+    assert found.signals["plant.T_t_body"][-1] == pytest.approx(6, rel=1e-6)
+    assert (w - v) / v == pytest.approx(6 / 1000, rel=1e-6)
+    before = J * 20.0
+    assert 0.5 * w + 1.5 * v == pytest.approx(before, rel=1e-9)
+
+
+def test_an_unknown_input_keeps_what_it_is(tmp_path: Path) -> None:
+    found = ran(
+        tmp_path, "rotor", "{unknown_input@w: {}}", {"T": "6 N*m"}, initial="{plant.T_u_w: 2 N*m}"
+    )
+    assert np.max(np.abs(speed(found) - 4 / J * found.times)) < EXACT
+
+
+# Springs: twisted at a steady rate.
+
+
+def test_rubber_beside_a_spring_is_stiffer_at_first(tmp_path: Path) -> None:
+    effects = "{stiffness_hysteresis@spring: {values: {k_r: 1000 N*m/rad, F_r: 25 N*m}}}"
+    found = ran(tmp_path, "shaft", effects, {"v": "0.1 rad/s"})
+    x = 0.1 * found.times
+    wanted = 400 * x + 20 * 0.1 + 25 * (1 - np.exp(-1000 * x / 25))
+    assert np.max(np.abs(torque(found) - wanted)) < 1e-8
+
+
+@pytest.mark.parametrize("q", [3, -3])
+def test_a_spring_that_hardens_or_softens(tmp_path: Path, q: int) -> None:
+    effects = f"{{stiffness_nonlinear@spring: {{values: {{q: {q}}}}}}}"
+    found = ran(tmp_path, "shaft", effects, {"v": "0.1 rad/s"})
+    x = 0.1 * found.times
+    root = np.sqrt(1 + 3 * (x / 0.1) ** 2)
+    wanted = 400 * x * (root if q > 0 else 1 / root) + 2
+    assert np.max(np.abs(torque(found) - wanted)) < EXACT
+    assert np.all(np.diff(torque(found)) > 0)
+
+
+def test_a_stiffness_that_varies_over_a_turn(tmp_path: Path) -> None:
+    effects = "{position_dependent_stiffness@spring: {values: {a: 0.2, ph: 1 rad}}}"
+    found = ran(tmp_path, "shaft", effects, {"v": "0.1 rad/s"})
+    t = found.times
+    wanted = 40 * t * (1 + 0.2 * np.sin(30 * t + 1)) + 2
+    assert np.max(np.abs(torque(found) - wanted)) < 1e-8
+
+
+def test_a_mount_gives_way_as_a_spring_in_series(tmp_path: Path) -> None:
+    effects = (
+        "{mount_compliance@spring: {values: {J_h: 1 kg*m^2, k_m: 12 kN*m/rad, c_m: 60 N*m*s/rad}}}"
+    )
+    found = ran(
+        tmp_path,
+        "shaft",
+        effects,
+        {"v": "{start: 0.1 rad/s, steps: {0.5 s: 0 rad/s}}"},
+        horizon="2 s",
+        more="parameters: {k: {value: 48 kN*m/rad}}\noutputs: [x, T_s, rate, phi_spring]",
+    )
+    assert torque(found)[-1] == pytest.approx(0.05 / (1 / 48000 + 1 / 12000), rel=1e-6)
+    assert found.signals["plant.phi_spring"][-1] == pytest.approx(-torque(found)[-1] / 12000)
+
+
+def test_a_gap_carries_no_torque_until_it_is_crossed(tmp_path: Path) -> None:
+    """Nordin's gap: at a steady rate from its middle it is crossed in alpha / rate."""
+    found = ran(
+        tmp_path,
+        "shaft",
+        "{backlash@spring: {values: {alpha: 0.02 rad}}}",
+        {"v": "{start: 0.1 rad/s, steps: {0.6 s: -0.1 rad/s}}"},
+        horizon="1.4 s",
+    )
+    first, second, third = found.events[:3]
+    assert (first.source, first.target) == ("inside", "upper")
+    assert first.time == pytest.approx(0.2, abs=1e-9)
+    # Turned round at x = 0.06, the torque is 0 where 400 (x - 0.02) = 20 * 0.1.
+    assert (second.source, second.target) == ("upper", "inside")
+    assert second.time == pytest.approx(0.6 + (0.06 - 0.025) / 0.1, abs=1e-9)
+    assert third.target == "lower"
+    t, T = found.times, torque(found)
+    inside = (t < 0.2) | ((t > second.time) & (t < third.time))
+    assert np.max(np.abs(T[inside])) < EXACT
+    up = (t > 0.2) & (t < 0.6)
+    assert np.max(np.abs(T[up] - (400 * (0.1 * t[up] - 0.02) + 2))) < 1e-8
+
+
+def test_a_second_gap_in_series_is_as_one_that_is_wider(tmp_path: Path) -> None:
+    request = {"T_em": "{start: 30 N*m, steps: {0.1 s: -20 N*m, 0.5 s: 40 N*m}}"}
+    start = "plant.theta_d: 0.09 rad, plant.theta_b: 0.0256 rad"
+    both = ran(
+        tmp_path,
+        "driveline",
+        "{backlash@half_shaft: {values: {alpha: 0.01 rad}}}",
+        request,
+        initial=f"{{{start}, plant.theta_g_half_shaft: 0.01 rad}}",
+    )
+    wide = ran(
+        tmp_path,
+        "driveline",
+        "{}",
+        request,
+        initial=f"{{{start.replace('0.0256', '0.0356')}}}",
+        more="parameters: {alpha: {value: 0.0356 rad}}",
+    )
+    assert both.stopped is None and len(wide.events) >= 4
+    for name in ("plant.T_hs", "plant.w_em", "plant.w_w"):
+        a, b = np.asarray(both.signals[name]), np.asarray(wide.signals[name])
+        assert np.max(np.abs(a - b)) < 1e-4 * np.max(np.abs(b)), name
+
+
+# Sensors: the dynamics stay, one output is another.
+
+
+SENSED: list[tuple[str, Callable[[Array], Array]]] = [
+    ("{sensor_scale@w: {values: {gain: 1.1}}}", lambda t: 1.1 * 3 * t),
+    ("{sensor_offset@w: {values: {offset: 0.5}}}", lambda t: 3 * t + 0.5),
+    (
+        "{sensor_lag@w: {values: {tau: 100 ms}}}",
+        lambda t: 3 * (t - 0.1 * (1 - np.exp(-t / 0.1))),
+    ),
+    (
+        "{sensor_eccentricity@w: {values: {ecc: 0.05, ph: 0.3 rad}}}",
+        lambda t: 3 * t * (1 + 0.05 * np.sin(1.5 * t**2 + 0.3)),
+    ),
+    (
+        "{sensor_quantisation@w: {values: {lsb: 0.25}}}",
+        lambda t: 0.25 * np.floor(3 * t / 0.25 + 0.5 + 1e-9),
+    ),
+]
+
+
+@pytest.mark.parametrize(("effects", "wanted"), SENSED, ids=effect_named)
+def test_a_sensor_changes_its_output_alone(
+    tmp_path: Path, effects: str, wanted: Callable[[Array], Array]
+) -> None:
+    found = ran(tmp_path, "rotor", effects, {"T": "6 N*m"})
+    t = found.times
+    off_steps = np.abs(np.mod(3 * t / 0.25 + 0.5, 1)) > 1e-6 if "quant" in effects else t >= 0
+    assert np.max(np.abs(speed(found) - wanted(t))[off_steps]) < 1e-7
+    assert np.max(np.abs(np.asarray(found.signals["plant.x"]) - 1.5 * t**2)) < EXACT
+
+
+# Neutral values.
+
+NEUTRAL = [
+    ("coulomb_friction@w_em", "T_c: 0 N*m"),
+    ("stribeck_friction@w_em", "T_c: 0 N*m"),
+    ("road_grade@w_w", "grade: 0 rad"),
+    ("torque_ripple@T_em", "a: 0 N*m"),
+    ("torque_gain@T_em", "gain: 1"),
+    ("torque_offset@T_em", "offset: 0 N*m"),
+    ("torque_drift@T_em", "drop: 0"),
+    ("viscous_friction@w_w", "b: 0 N*m*s/rad"),
+    ("quadratic_drag@w_w", "c_2: 0"),
+    ("load_dependent_loss@w_em", "loss: 0"),
+    ("brake_drag@w_w", "share: 0"),
+    ("stiffness_nonlinear@half_shaft", "q: 0"),
+    ("stiffness_hysteresis@half_shaft", "k_r: 0 N*m/rad"),
+    ("position_dependent_stiffness@half_shaft", "a: 0"),
+    ("sensor_scale@w_w", "gain: 1"),
+    ("sensor_offset@w_w", "offset: 0 rad/s"),
+    ("sensor_eccentricity@w_w", "ecc: 0"),
+    ("unknown_input@w_w", ""),
+]
+
+
+def test_at_their_neutral_values_all_effects_leave_every_bit(tmp_path: Path) -> None:
+    """Laid all together, so that a later one sees those before it as its base."""
+    effects = ", ".join(
+        f"{name}: {{as: e{k}, values: {{{v}}}}}" for k, (name, v) in enumerate(NEUTRAL)
+    )
+    request = {"T_em": "{start: 30 N*m, steps: {0.1 s: -20 N*m}}"}
+    initial = "{plant.theta_d: 0.0740754719736 rad}"
+    plain = ran(tmp_path, "driveline", "{}", request, initial=initial, horizon="0.6 s")
+    laid = ran(tmp_path, "driveline", f"{{{effects}}}", request, initial=initial, horizon="0.6 s")
+    assert len(plain.events) >= 3
+    assert [e.time for e in laid.events] == [e.time for e in plain.events]
+    for name, values in plain.signals.items():
+        assert np.array_equal(np.asarray(values), np.asarray(laid.signals[name])), name
+
+
+def test_every_neutral_value_that_is_declared_is_tried(tmp_path: Path) -> None:
+    declared = set()
+    for path in FILES:
+        parameters = yaml.safe_load(path.read_text("utf-8")).get("parameters", {})
+        if any(p.get("neutral", "absent") != "absent" for p in parameters.values()):
+            declared.add(path.stem)
+    assert declared - {"backlash"} == {name.split("@")[0] for name, _ in NEUTRAL} - {
+        "unknown_input"
+    }
+
+
+def test_a_gap_of_no_width_is_none(tmp_path: Path) -> None:
+    given = {"v": "{start: 0.1 rad/s, steps: {0.6 s: -0.1 rad/s}}"}
+    found = ran(
+        tmp_path, "shaft", "{backlash@spring: {values: {alpha: 0 rad}}}", given, horizon="1.4 s"
+    )
+    plain = ran(tmp_path, "shaft", "{}", given, horizon="1.4 s")
+    assert np.max(np.abs(torque(found) - torque(plain))) < EXACT
