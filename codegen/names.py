@@ -37,6 +37,8 @@ class CNames:
                 return f"constant.{rest}"
             case "solved":
                 return f"solved_{member}"
+            case "axis":
+                return f"axis_{member}"
             case "calibration":
                 return f"cal->{rest}"
             case "input":

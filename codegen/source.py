@@ -38,7 +38,7 @@ from language.wiring import reads, walk
 GROUPS = ("state", "discrete", "equation", "before", "innovation", "timer")
 """Nested structs of the instance, in order."""
 ENTRIES = ("init", "derive", "step")
-INLINE = ("min", "max", "clip", "sign", "pow2", "whole")
+INLINE = ("min", "max", "clip", "sign", "pow2", "whole", "lookup", "lookup2")
 
 
 @dataclass(frozen=True)
@@ -155,6 +155,7 @@ def _context(program: Program) -> dict[str, Any]:
         "calibration": [_constant(c, number) for c in constants if c.kind == "tunable"],
         "derived": [_constant(c, number) for c in constants if c.kind == "derived"],
         "constants": [_constant(c, number) for c in constants if c.name.startswith("constant.")],
+        "axes": [_constant(c, number) for c in constants if c.name.startswith("axis.")],
         "solved": [_constant(c, number) for c in constants if c.kind == "solved"],
         "inputs": [_field(v, number) for v in program.inputs],
         "is_new": [_field(v, number) for v in variables if v.name.startswith("is_new.")],
@@ -183,8 +184,10 @@ def _constant(constant: Constant, number: NumberType) -> Field:
         low, high = constant.range
         comment += f"; {decimal(low, number)} to {decimal(high, number)}"
     value = literal(constant.value, number)
+    if constant.items:
+        value = f"{{{', '.join(literal(item, number) for item in constant.items)}}}"
     kind = c_type(Variable(constant.name, constant.type, values=constant.values), number)
-    return Field(kind, c_member(constant.name), comment, value)
+    return Field(kind, c_member(constant.name), comment, value, len(constant.items))
 
 
 def _groups(program: Program) -> list[tuple[str, list[Field]]]:

@@ -44,7 +44,8 @@ class Compiler:
         fixed = ("constant.", "solved.")
         self.arithmetic = ARITHMETIC[program.number]
         value = self.arithmetic.value
-        self.fixed = {c.name: value(c.value) for c in program.constants if c.name.startswith(fixed)}
+        scalars = [c for c in program.constants if c.name.startswith(fixed) and not c.items]
+        self.fixed = {c.name: value(c.value) for c in scalars}
         self.functions: dict[str, Callable[..., Any]] = {}
         for function in sorted(program.functions, key=lambda f: _depth(f, program.functions)):
             self.functions[function.name] = self._function(function)

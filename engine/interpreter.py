@@ -7,7 +7,7 @@ from typing import Any, Protocol
 
 from engine.arithmetic import ARITHMETIC
 from engine.closures import Compiler, Frame
-from language.program import Program
+from language.program import Constant, Program
 
 INITIAL = {"real": 0.0, "truth": False, "whole": 0}
 
@@ -41,7 +41,7 @@ class Interpreter:
         self._frame: Frame = [
             [initial[v.type]] * v.size if v.size else initial[v.type] for v in program.variables
         ]
-        self._frame += [self._arithmetic.value(constant.value) for constant in program.constants]
+        self._frame += [self._constant(constant) for constant in program.constants]
         self._real = [v.type == "real" for v in program.variables]
         self._real += [True] * len(program.constants)
         compiler = Compiler(program, self._slots)
@@ -51,6 +51,11 @@ class Interpreter:
                 self.run(entry)
         if program.period is None and "derive" in self._blocks:
             self.run("derive")
+
+    def _constant(self, constant: Constant) -> Any:
+        if constant.items:
+            return tuple(self._arithmetic.value(item) for item in constant.items)
+        return self._arithmetic.value(constant.value)
 
     def get(self, name: str) -> Any:
         """Return the value of a variable or constant, `group.name`."""

@@ -26,6 +26,7 @@ from language.project import Project, expanded, read_document
 from language.reader import FILE_WORDS, Reader, check_name
 from language.region import with_regions
 from language.syntax import Broken
+from language.table import TableReader, section
 from language.units import NO_UNIT, SECOND, Unit, fits, parse_unit
 from language.values import with_value
 
@@ -125,6 +126,7 @@ class _AutomatonReader(Reader):
             label = f"an automaton is not called `{document.name}`: generated code has that file"
             self.problems.error("name", document.name_span, label)
         self.model = model
+        self.declared = (section(tree, "inputs"), section(tree, "states"))
         period = self._time(tree.get("period"), "period")
         self.sampled = period is not None
         numbers = self._numbers(tree)
@@ -182,8 +184,11 @@ class _AutomatonReader(Reader):
         return Fraction(1, 1000)
 
     def _parameter(self, entry: Entry) -> Parameter:
-        keys = ("value", "unit", "range", "tunable", "derived", "type", "values", *FITTING_KEYS)
+        own_keys = ("value", "unit", "range", "tunable", "derived", "type", "values", "table")
+        keys = (*own_keys, *FITTING_KEYS)
         table = self.table(entry.node, f"parameters.{entry.key}", keys)
+        if "table" in table.entries:
+            return self._table_parameter(entry, table)
         type_, values = self.typing(table, entry.key)
         key = f"parameters.{entry.key}"
         unit_node = table.get("unit")
@@ -216,6 +221,22 @@ class _AutomatonReader(Reader):
         return Parameter(
             entry.key, kind, unit, value, derived, limits, key, at, fitting, type_, values
         )
+
+    def _table_parameter(self, entry: Entry, table: Table) -> Parameter:
+        key = f"parameters.{entry.key}"
+        for other in ("value", "derived", "unit", "type", "values", *FITTING_KEYS):
+            if other in table.entries:
+                label = f"a table has no `{other}` beside it"
+                self.problems.error("form", table.entries[other].span, label)
+        tunable = self.choice(table.get("tunable"), "tunable", ("true", "false"), "false")
+        kind: Kind = "tunable" if tunable == "true" else "fixed"
+        body = self.table(table.get("table"), f"{key}.table", ("over", "unit", "points"))
+        unit = self.unit(body.get("unit"))
+        limits = self.range(table.get("range"), unit)
+        reader = TableReader(self.problems)
+        reader.declared = self.declared
+        made = reader.lookup_table(body, f"{key}.table.points", limits)
+        return Parameter(entry.key, kind, unit, None, None, limits, key, entry.span, table=made)
 
     def _fitting(self, table: Table, unit: Unit, limits: Range | None) -> Fitting:
         node = table.get("neutral")

@@ -14,7 +14,16 @@ from language.dimension import DimensionCheck, Scope
 from language.guards import report_overlaps
 from language.kind import Enumeration, Kind, Whole
 from language.lower import parameter_kinds
-from language.model import Automaton, Formula, Input, Mode, Parameter, State, SystemInput
+from language.model import (
+    Automaton,
+    Formula,
+    Input,
+    LookupTable,
+    Mode,
+    Parameter,
+    State,
+    SystemInput,
+)
 from language.order import equation_order, report_circle, unreached
 from language.problem import Problems, Span, SpecError, nearest
 from language.region import sources, with_regions
@@ -152,11 +161,16 @@ class _Check:
 
     def _scope(self, groups: Iterable[Iterable[str]], place: str) -> Scope:
         known = {name: self.names[name] for group in groups for name in group}
-        return Scope({**self.literals, **known}, frozenset(), place, self._angles())
+        known = {**self.literals, **known}
+        return Scope(known, frozenset(), place, self._angles(), frozenset(), self._tables())
 
     def _kept(self) -> frozenset[str]:
         """Return the functions with memory that are for every expression of a mode."""
         return frozenset(KEPT if self.automaton.is_sampled else ())
+
+    def _tables(self) -> dict[str, LookupTable]:
+        declared = self.automaton.parameters.items()
+        return {name: thing.table for name, thing in declared if thing.table}
 
     def _angles(self) -> dict[str, Unit]:
         """Return the units of the parameters whose value is declared in a unit of angle."""
@@ -198,13 +212,13 @@ class _Check:
             modes |= {f"{automaton.model.name}.{path}" for path in _mode_paths(automaton.model)}
         formulas = sources(mode)
         for name in equation_order(mode):
-            scope = Scope({**known}, modes, place, self._angles(), self._kept())
+            scope = Scope({**known}, modes, place, self._angles(), self._kept(), self._tables())
             check = DimensionCheck(scope, self.problems)
             for formula in formulas[name]:
                 kind = check.kind(formula.tree)
                 agreed = self._agreed(name, kind, formula)
                 known[name] = kind if isinstance(kind, Whole) else agreed
-        scope = Scope(known, modes, place, self._angles(), self._kept())
+        scope = Scope(known, modes, place, self._angles(), self._kept(), self._tables())
         check = DimensionCheck(scope, self.problems)
         self._flow(mode, check)
         for assignments in (mode.update, mode.entry, mode.exit):
@@ -224,7 +238,9 @@ class _Check:
         everywhere = [name for name in modes[0] if all(name in other for other in modes)]
         known.update({name: self.names.get(name) for name in everywhere})
         place = f"beside every mode of the chart, in region `{mode.region}`"
-        scope = Scope(known, _mode_paths(automaton), place, self._angles(), self._kept())
+        scope = Scope(
+            known, _mode_paths(automaton), place, self._angles(), self._kept(), self._tables()
+        )
         check = DimensionCheck(scope, self.problems)
         self._balances(mode, check)
         self._assignments(mode.update, check)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from collections.abc import Iterator, Mapping
 from fractions import Fraction
@@ -26,6 +27,14 @@ def check_numbers(automaton: Automaton, problems: Problems) -> None:
         elif near == 0.0 and value != 0:
             label = f"{_short(value)} is 0 in {number}"
             problems.error("value", span, label, "`numbers: float64` tells it from 0")
+    for parameter in automaton.parameters.values():
+        for axis in parameter.table.axes if parameter.table else ():
+            points = [rounded(point, number) for point in axis.points]
+            if any(low >= high for low, high in itertools.pairwise(points)):
+                label = f"two points of the axis `{axis.name}` are one in {number}"
+                problems.error(
+                    "table", parameter.span, label, "`numbers: float64` tells them apart"
+                )
     problems.stop_if_any()
 
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from fractions import Fraction
+from typing import Any
 
 from language.evaluate import Scalar, evaluate
 from language.lower import (
     assigned,
     constant_names,
     constant_of,
+    owner,
     parameter_kinds,
     parameter_order,
 )
@@ -27,7 +29,7 @@ def parameter_constants(automaton: Automaton, problems: Problems) -> dict[str, C
     known = constant_names(automaton)
     kinds = parameter_kinds(automaton)
     values: dict[str, Scalar] = {}
-    found = {}
+    found: dict[str, Constant] = {}
     for name in parameter_order(automaton):
         parameter = automaton.parameters[name]
         if parameter.derived:
@@ -44,8 +46,27 @@ def parameter_constants(automaton: Automaton, problems: Problems) -> dict[str, C
             )
             value = 0.0
         found[name] = constant_of(automaton, name, kinds[name], value)
-        values[found[name].name] = found[name].value
+        for axis in axis_constants(automaton, name):
+            found[axis.name] = axis
+        values.update(values_of(found))
     return found
+
+
+def axis_constants(automaton: Automaton, name: str) -> list[Constant]:
+    """Return the axes of a table parameter as constants; axes are fixed, whatever the values."""
+    table = automaton.parameters[name].table
+    key = f"{owner(automaton, name)} {automaton.parameters[name].key}.table.over"
+    return [
+        Constant(
+            name=f"axis.{name}_{k}",
+            kind="fixed",
+            value=0.0,
+            unit=str(axis.unit.dimension),
+            key=f"{key} {axis.name}",
+            items=tuple(rounded(point, automaton.numbers) for point in axis.points),
+        )
+        for k, axis in enumerate(table.axes if table else (), start=1)
+    ]
 
 
 def derive_block(automaton: Automaton) -> Block:
@@ -62,8 +83,9 @@ def derive_block(automaton: Automaton) -> Block:
 
 
 def values_of(constants: Mapping[str, Constant]) -> dict[str, Scalar]:
-    """Return the values by the Program's names."""
-    return {constant.name: constant.value for constant in constants.values()}
+    """Return the values by the Program's names, a tuple for an array."""
+    found: dict[str, Any] = {c.name: c.items or c.value for c in constants.values()}
+    return found
 
 
 def constant_value(

@@ -6,11 +6,11 @@ import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from language.call import WHERE, lookup_kind, memory_kind
 from language.kind import LARGEST_WHOLE, Enumeration, Kind, Truthful, Whole, combined
+from language.model import LookupTable
 from language.problem import Problems, Span, nearest
 from language.syntax import (
-    EDGES,
-    KEPT,
     MEMORY,
     Application,
     Arithmetic,
@@ -27,7 +27,7 @@ from language.syntax import (
     Truth,
     whole_literal,
 )
-from language.units import NUMBER, SECOND, Dimension, Unit, common, fits, power, product, root
+from language.units import NUMBER, Dimension, Unit, common, fits, power, product, root
 
 ANGLE = Dimension(angle=1)
 SAME = {"abs": 1, "min": 2, "max": 2, "clip": 3}
@@ -35,14 +35,7 @@ SAME = {"abs": 1, "min": 2, "max": 2, "clip": 3}
 NUMBERS = {"exp": 1, "tanh": 1, "floor": 1, "sign": 1}
 ANGLES = {"sin": 1, "cos": 1, "tan": 1}
 ARGUMENTS = {**SAME, **NUMBERS, **ANGLES, "sqrt": 1, "atan2": 2}
-KNOWN = (*ARGUMENTS, *MEMORY, "in", "der")
-LATER = ("lookup",)
-WHERE = {
-    "previous": "it is for equations, updates, resets and guards of a sampled automaton",
-    "delay": "it is for equations, balances, updates, resets and guards",
-    **dict.fromkeys(("rising", "falling", "after"), "it is for guards: `when`"),
-}
-"""What functions with memory are for."""
+KNOWN = (*ARGUMENTS, *MEMORY, "lookup", "in", "der")
 
 
 @dataclass(frozen=True)
@@ -50,7 +43,7 @@ class Scope:
     """What names mean at one place: their dimensions, and the modes that `in(...)` may name.
 
     `angles` are the units of the parameters that are declared in a unit of angle, `memory` the
-    functions with memory that may be used.
+    functions with memory that may be used, `tables` what `lookup` reads.
     """
 
     names: Mapping[str, Kind | None]
@@ -58,6 +51,7 @@ class Scope:
     place: str = "here"
     angles: Mapping[str, Unit] = field(default_factory=dict)
     memory: frozenset[str] = frozenset()
+    tables: Mapping[str, LookupTable] = field(default_factory=dict)
 
 
 class DimensionCheck:
@@ -67,6 +61,11 @@ class DimensionCheck:
         """Check against `scope`, report into `problems`."""
         self.scope = scope
         self.problems = problems
+
+    def remembering(self, *functions: str) -> DimensionCheck:
+        """Return the check of what stands inside a function with memory."""
+        memory = self.scope.memory & {*functions}
+        return DimensionCheck(dataclasses.replace(self.scope, memory=memory), self.problems)
 
     def quantity(self, tree: Tree, want: Dimension, what: str) -> None:
         """Check that an expression is a quantity that fits `want`."""
@@ -160,6 +159,10 @@ class DimensionCheck:
         return None
 
     def _name(self, tree: Name) -> Kind | None:
+        if tree.path in self.scope.tables:
+            hint = f"read it with `lookup({tree.path}, ...)`"
+            self._report("table", tree.span, f"`{tree.path}` is a table, not a value", hint)
+            return None
         if tree.path in self.scope.names:
             return self.scope.names[tree.path]
         hint = nearest(tree.path, self.scope.names)
@@ -264,12 +267,13 @@ class DimensionCheck:
         if name == "in":
             return self._in(tree)
         if name in WHERE:
-            return self._memory(tree)
+            return memory_kind(self, tree)
+        if name == "lookup":
+            return lookup_kind(self, tree)
         wanted = ARGUMENTS.get(name)
         if wanted is None:
             label = f"`{name}` is not a function that can be used here"
-            hint = "it comes with a later version" if name in LATER else nearest(name, KNOWN)
-            self._report("name", tree.span, label, hint)
+            self._report("name", tree.span, label, nearest(name, KNOWN))
             return None
         if len(arguments) != wanted:
             label = f"`{name}` takes {wanted} argument(s), not {len(arguments)}"
@@ -279,28 +283,6 @@ class DimensionCheck:
         if any(kind is None for kind in kinds):
             return None
         return self._function(tree, [kind for kind in kinds if kind is not None])
-
-    def _memory(self, tree: Application) -> Kind | None:
-        """`delay` and `previous` have the kind of what they keep, the others are conditions."""
-        name, arguments = tree.function, tree.arguments
-        wanted = 2 if name == "delay" else 1
-        if name not in self.scope.memory:
-            label = f"`{name}` is not a function that can be used here"
-            self._report("name", tree.span, label, WHERE[name])
-            return None
-        if len(arguments) != wanted:
-            label = f"`{name}` takes {wanted} argument(s), not {len(arguments)}"
-            self._report("arguments", tree.span, label)
-            return None
-        if name in ("delay", "after"):
-            self.quantity(arguments[-1], SECOND, f"the time of {name}")
-        if name in KEPT or name in EDGES:
-            kept = dataclasses.replace(self.scope, memory=self.scope.memory & {*KEPT})
-            inside = DimensionCheck(kept, self.problems)
-            if name in KEPT:
-                return inside.kind(arguments[0])
-            inside.truth(arguments[0], name)
-        return "truth"
 
     def _function(self, tree: Application, kinds: list[Dimension]) -> Dimension | None:
         name, first = tree.function, kinds[0]

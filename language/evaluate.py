@@ -6,7 +6,8 @@ import math
 from collections.abc import Callable, Mapping
 
 from language.functions import FUNCTIONS_OF
-from language.number import ROUNDING, NumberType
+from language.interpolation import Interpolation
+from language.number import ROUNDING, NumberType, single
 from language.operation import (
     Assign,
     Binary,
@@ -98,11 +99,18 @@ ELEMENTARY: Elementary = {
     "real": float,
     "floor": floor,
     "whole": whole,
+    "lookup": Interpolation(float).lookup,
+    "lookup2": Interpolation(float).lookup2,
 }
 """In double: exact or rounded once, so that rounding once more gives the result of float32."""
 EXACT: Mapping[NumberType, Elementary] = {
     "float64": ELEMENTARY,
-    "float32": {**ELEMENTARY, "pow2": power_of_two_single},
+    "float32": {
+        **ELEMENTARY,
+        "pow2": power_of_two_single,
+        "lookup": Interpolation(single).lookup,
+        "lookup2": Interpolation(single).lookup2,
+    },
 }
 """By number type, before the rounding to it."""
 OPERATIONS: Mapping[str, Callable[[Scalar, Scalar], Scalar]] = {

@@ -84,8 +84,21 @@ def expression(tree: Tree, known: Names) -> Expr:
             return _power(_real(base, known), exponent)
         case Choice(condition, then, other, _):
             return Select(expression(condition, known), *_matched(then, other, known))
+        case Application():
+            return _application(tree, known)
+
+
+def _application(tree: Application, known: Names) -> Expr:
+    """Return a call; what reads the automaton's mode, memory or tables is known by its key."""
+    match tree:
         case Application("in", (Name(path, _),), _):
             return known[f"in {path}"]
+        case Application("lookup", (Name(path, _), *arguments), _):
+            axes = [known[f"{path} axis {k}"] for k in range(1, len(arguments) + 1)]
+            sizes = [known[f"{path} size {k}"] for k in range(1, len(arguments) + 1)]
+            read = [_real(part, known) for part in arguments]
+            function = "lookup" if len(arguments) == 1 else "lookup2"
+            return Call(function, (*axes, *sizes, known[path], *read))
         case Application(function, _, _) if function in MEMORY:
             return known[memory_key(tree)]
         case Application(function, arguments, _):
@@ -248,6 +261,10 @@ def constant_names(automaton: Automaton) -> dict[str, Expr]:
     for name, kind in parameter_kinds(automaton).items():
         is_whole = automaton.parameters[name].type in WHOLE_TYPES
         found[name] = Ref(f"{groups[kind]}.{name}", is_whole)
+    for name, parameter in automaton.parameters.items():
+        for k, axis in enumerate(parameter.table.axes if parameter.table else (), start=1):
+            found[f"{name} axis {k}"] = Ref(f"axis.{name}_{k}")
+            found[f"{name} size {k}"] = Value(len(axis.points))
     return found
 
 
@@ -313,10 +330,11 @@ def constant_of(automaton: Automaton, name: str, kind: str, value: float) -> Con
         kind=kind,  # type: ignore[arg-type]
         value=typed(value, parameter.type),
         unit=si_text(automaton, name),
-        key=f"{_owner(automaton, name)} {parameter.key}",
+        key=f"{owner(automaton, name)} {parameter.key}",
         range=(rounded(limits[0]), rounded(limits[1])) if limits else None,
         type=value_type(parameter.type),
         values=parameter.values,
+        items=tuple(rounded(item) for item in parameter.table.values) if parameter.table else (),
     )
 
 
@@ -327,7 +345,7 @@ def typed(value: float, kind: Type) -> float | int | bool:
     return bool(value) if kind == "bool" else int(value)
 
 
-def _owner(automaton: Automaton, name: str) -> str:
+def owner(automaton: Automaton, name: str) -> str:
     """Return the automaton that declares a parameter: the model, or this one."""
     model = automaton.model
     return model.name if model and name in model.parameters else automaton.name

@@ -49,6 +49,24 @@ class Fitting:
 
 
 @dataclass(frozen=True)
+class Axis:
+    """An axis of a table: its strictly ascending points in SI, exact."""
+
+    name: str
+    unit: Unit
+    points: tuple[Fraction, ...]
+
+
+@dataclass(frozen=True)
+class LookupTable:
+    """Values over one or two axes in SI, exact; the last axis varies fastest."""
+
+    axes: tuple[Axis, ...]
+    unit: Unit
+    values: tuple[Fraction, ...]
+
+
+@dataclass(frozen=True)
 class Parameter:
     """A value in SI (exact) or, if derived, an expression of other parameters.
 
@@ -66,6 +84,7 @@ class Parameter:
     fitting: Fitting = Fitting()
     type: Type = "real"
     values: tuple[str, ...] = ()
+    table: LookupTable | None = None
 
 
 @dataclass(frozen=True)

@@ -113,7 +113,9 @@ def _parse(scalar: Scalar, start: str) -> Any:
             problems.stop_if_any()
         return built
     except lark.exceptions.VisitError as error:
-        raise error.orig_exc from None
+        if not isinstance(error.orig_exc, RecursionError):
+            raise error.orig_exc from None
+        problems.error("expression", span, "the expression is nested too deeply")
     except lark.exceptions.UnexpectedInput as error:
         problems.error("expression", *_explain(text, span, start, error))
     except RecursionError:

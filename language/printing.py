@@ -117,7 +117,8 @@ def _program_lines(program: Program) -> Iterator[str]:
     for constant in program.constants:
         stamps = f" from {', '.join(constant.depends_on)}" if constant.depends_on else ""
         limits = f" in {constant.range[0]!r} .. {constant.range[1]!r}" if constant.range else ""
-        yield f"{constant.name} = {constant.value!r} {constant.unit}{limits}{stamps}"
+        value = constant.items or constant.value
+        yield f"{constant.name} = {value!r} {constant.unit}{limits}{stamps}"
     for variable in program.variables:
         size = f"[{variable.size}]" if variable.size else ""
         values = f" of {', '.join(variable.values)}" if variable.values else ""

@@ -41,7 +41,10 @@ class Variable:
 
 @dataclass(frozen=True)
 class Constant:
-    """A value that no operation writes; solved ones list the tunables that they came from."""
+    """A value that no operation writes; solved ones list the tunables that they came from.
+
+    `items` are the values of an array, empty for a scalar.
+    """
 
     name: str
     kind: Literal["fixed", "tunable", "derived", "solved"]
@@ -52,6 +55,7 @@ class Constant:
     range: tuple[float, float] | None = None
     type: ValueType = "real"
     values: tuple[str, ...] = ()
+    items: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -226,6 +226,12 @@ class _Sampled:
         for name in sorted(stamped):
             if STALE_CALIBRATION not in self.faults:
                 self.faults.append(STALE_CALIBRATION)
+            if self.parameters[name].items:
+                label = (
+                    f"`{name}` enters what is solved when the spec is checked: it is not tunable"
+                )
+                self.problems.error("table", self.automaton.parameters[name].span, label)
+                continue
             stamp = f"solved.stamp_{name}"
             value = self.parameters[name].value
             unit = self.parameters[name].unit

@@ -38,6 +38,7 @@ def _constant(constant: Constant, number: NumberType) -> Constant:
     return dataclasses.replace(
         constant,
         value=rounded(constant.value, number) if constant.type == "real" else constant.value,
+        items=tuple(rounded(item, number) for item in constant.items),
         range=(rounded(limits[0], number), rounded(limits[1], number)) if limits else None,
     )
 

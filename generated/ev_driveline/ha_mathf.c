@@ -176,3 +176,56 @@ float ha_atan2f(float rise, float run)
     const float size = first + (rest + arc);
     return (up <= 0.0F) ? ((run >= 0.0F) ? rise : size) : ((rise < 0.0F) ? (-size) : size);
 }
+
+/* The interval of an axis that x is in, and the part of it before x: 0 or 1 outside */
+static int32_t cell(const float *axis, int32_t size, float x, float *part)
+{
+    int32_t low = 0;
+    int32_t high = size - 1;
+
+    if (x <= axis[low]) {
+        *part = 0.0F;
+        return low;
+    }
+    if (x >= axis[high]) {
+        *part = 1.0F;
+        return high - 1;
+    }
+    while ((high - low) > 1) {
+        const int32_t middle = low + ((high - low) / 2);
+        if (x < axis[middle]) {
+            high = middle;
+        } else {
+            low = middle;
+        }
+    }
+    *part = (x - axis[low]) / (axis[high] - axis[low]);
+    return low;
+}
+
+static float blend(float a, float b, float part)
+{
+    return (part >= 1.0F) ? b : (a + (part * (b - a)));
+}
+
+float ha_lookupf(const float *axis, int32_t size, const float *values, float x)
+{
+    float part;
+    const int32_t low = cell(axis, size, x, &part);
+
+    return blend(values[low], values[low + 1], part);
+}
+
+float ha_lookup2f(const float *rows, const float *columns, int32_t count, int32_t width,
+    const float *values, float x, float y)
+{
+    float down;
+    float along;
+    const int32_t row = cell(rows, count, x, &down);
+    const int32_t column = cell(columns, width, y, &along);
+    const int32_t first = (row * width) + column;
+    const float upper = blend(values[first], values[first + 1], along);
+    const float lower = blend(values[first + width], values[first + width + 1], along);
+
+    return blend(upper, lower, down);
+}

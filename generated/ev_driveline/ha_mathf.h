@@ -15,6 +15,11 @@ float ha_tanf(float x); /* tangent; |x| <= 1000 rad, clamped; error < 2.4 ULP */
 float ha_atan2f(float rise, float run); /* angle of (run, rise), in (-pi, pi] rad; error < 1.5 ULP */
 float ha_pow2f(float k); /* 2^k for a whole k from -126 to 127, else k */
 
+/* Tables: linear between points, held outside, NaN at NaN */
+float ha_lookupf(const float *axis, int32_t size, const float *values, float x);
+float ha_lookup2f(const float *rows, const float *columns, int32_t count, int32_t width,
+    const float *values, float x, float y);
+
 static inline float ha_minf(float a, float b)
 {
     return (b < a) ? b : a;

@@ -205,3 +205,56 @@ double ha_atan2(double rise, double run)
     const double size = first + (rest + arc);
     return (up <= 0.0) ? ((run >= 0.0) ? rise : size) : ((rise < 0.0) ? (-size) : size);
 }
+
+/* The interval of an axis that x is in, and the part of it before x: 0 or 1 outside */
+static int32_t cell(const double *axis, int32_t size, double x, double *part)
+{
+    int32_t low = 0;
+    int32_t high = size - 1;
+
+    if (x <= axis[low]) {
+        *part = 0.0;
+        return low;
+    }
+    if (x >= axis[high]) {
+        *part = 1.0;
+        return high - 1;
+    }
+    while ((high - low) > 1) {
+        const int32_t middle = low + ((high - low) / 2);
+        if (x < axis[middle]) {
+            high = middle;
+        } else {
+            low = middle;
+        }
+    }
+    *part = (x - axis[low]) / (axis[high] - axis[low]);
+    return low;
+}
+
+static double blend(double a, double b, double part)
+{
+    return (part >= 1.0) ? b : (a + (part * (b - a)));
+}
+
+double ha_lookup(const double *axis, int32_t size, const double *values, double x)
+{
+    double part;
+    const int32_t low = cell(axis, size, x, &part);
+
+    return blend(values[low], values[low + 1], part);
+}
+
+double ha_lookup2(const double *rows, const double *columns, int32_t count, int32_t width,
+    const double *values, double x, double y)
+{
+    double down;
+    double along;
+    const int32_t row = cell(rows, count, x, &down);
+    const int32_t column = cell(columns, width, y, &along);
+    const int32_t first = (row * width) + column;
+    const double upper = blend(values[first], values[first + 1], along);
+    const double lower = blend(values[first + width], values[first + width + 1], along);
+
+    return blend(upper, lower, down);
+}

@@ -15,6 +15,11 @@ double ha_tan(double x); /* tangent; |x| <= 1e5 rad, clamped; error < 2.4 ULP */
 double ha_atan2(double rise, double run); /* angle of (run, rise), in (-pi, pi] rad; error < 1.5 ULP */
 double ha_pow2(double k); /* 2^k for a whole k from -1022 to 1023, else k */
 
+/* Tables: linear between points, held outside, NaN at NaN */
+double ha_lookup(const double *axis, int32_t size, const double *values, double x);
+double ha_lookup2(const double *rows, const double *columns, int32_t count, int32_t width,
+    const double *values, double x, double y);
+
 static inline double ha_min(double a, double b)
 {
     return (b < a) ? b : a;

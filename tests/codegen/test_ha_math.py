@@ -19,6 +19,12 @@ language: 1
 automaton: functions
 period: 1 ms
 numbers: float64
+parameters:
+  curve: {tunable: true, table: {over: u, points: {-3: 2, -0.5: 7.1, 0: -1, 0.25: 0.1, 100: 5}}}
+  plane:
+    table:
+      over: [u, v]
+      points: {-1: {-2: 1, 0: 0.3}, 0: {-2: 4, 0: -7}, 1.5: {-2: 0.1, 0: 0.2}}
 inputs: {u: {unit: "1"}, v: {unit: "1"}, w: {unit: "1"}}
 equations:
   s: sin(u * 1 rad)
@@ -34,8 +40,11 @@ equations:
   whole: floor(u)
   slope: tan(u * 1 rad)
   heading: atan2(u, v)
+  along: lookup(curve, u)
+  over: lookup(plane, u, v)
 modes: {only: {}}
-outputs: [s, c, e, t, size, root, least, most, limited, direction, whole, slope, heading]
+outputs:
+  [s, c, e, t, size, root, least, most, limited, direction, whole, slope, heading, along, over]
 """
 SIGNALS = {"sin": "s", "cos": "c", "exp": "e", "tanh": "t", "abs": "size", "sqrt": "root"}
 SIGNALS |= {"floor": "whole", "tan": "slope"}
@@ -98,4 +107,4 @@ def same(a: float, b: float) -> bool:
 def test_no_function_of_the_language_is_left_out() -> None:
     """`pow2`, `real` and `whole` are not written in specs: other lock-steps compare them."""
     called = {name for name in (*FUNCTIONS, *ELEMENTARY) if f"{name}(" in SPEC}
-    assert called == {*FUNCTIONS, *ELEMENTARY} - {"pow2", "real", "whole"}
+    assert called == {*FUNCTIONS, *ELEMENTARY} - {"pow2", "real", "whole", "lookup2"}

@@ -7,7 +7,7 @@ import math
 import pytest
 from hypothesis import assume, given, strategies as st
 
-from language.dimension import LATER, DimensionCheck, Scope
+from language.dimension import DimensionCheck, Scope
 from language.evaluate import evaluate
 from language.kind import Kind
 from language.lower import expression
@@ -114,13 +114,6 @@ def test_a_mistake_that_was_told_is_not_told_again_further_out() -> None:
         "6 `+` joins `N` and `m/s`",
         "22 this is true or false, a quantity is needed",
     ]
-
-
-@pytest.mark.parametrize("name", LATER)
-def test_a_function_of_a_later_version_is_told_as_such(name: str) -> None:
-    problems = Problems()
-    DimensionCheck(SCOPE, problems).kind(tree(f"{name}(x)"))
-    assert [problem.help for problem in problems.found] == ["it comes with a later version"]
 
 
 def test_the_nearest_name_is_proposed() -> None:

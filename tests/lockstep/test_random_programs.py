@@ -56,7 +56,7 @@ def test_random_programs_hold_every_kind_of_operation() -> None:
 
     look()
     wanted = {kind.__name__ for kind in get_args(Op) + get_args(Expr)} | {*OPERATIONS}
-    wanted |= {f"call {name}" for name in (*ELEMENTARY, *FUNCTIONS)}
+    wanted |= {f"call {name}" for name in (*ELEMENTARY, *FUNCTIONS) if "lookup" not in name}
     assert wanted <= kinds, wanted - kinds
 
 
