@@ -84,8 +84,6 @@ def test_a_scenario_does_not_set_a_table_by_one_value() -> None:
 
 def test_points_that_are_one_in_float32_are_refused() -> None:
     near = SPEC.replace("90: 1", "60.0000001: 1")
-    assert told(lambda: automaton(near)) == []
+    assert told(lambda: program(near)) == []
     single = near.replace("float64", "float32")
-    assert told(lambda: automaton(single)) == [
-        "6:3 two points of the axis `temp` are one in float32"
-    ]
+    assert told(lambda: program(single)) == ["6:3 two points of the axis `temp` are one in float32"]
