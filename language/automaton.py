@@ -20,6 +20,7 @@ from language.model import (
     State,
 )
 from language.number import NUMBERS, NumberType
+from language.observer import METHODS
 from language.overlay import lay, without
 from language.problem import Problems, nearest
 from language.project import Project, expanded, read_document
@@ -33,7 +34,7 @@ from language.values import with_value
 COMMON_KEYS = ("language", "automaton", "parameters", "inputs", "states", "discrete", "equations")
 LOGIC_KEYS = ("flow", "terms", "initial", "modes", "regions", "templates", "outputs")
 LAID_KEYS = ("elements", "places")
-CLOCK_KEYS = ("period", "step", "numbers", "model")
+CLOCK_KEYS = ("period", "step", "method", "numbers", "model")
 FITTING_KEYS = ("neutral", "starts", "per", "form")
 FORMS = ("constant", "constant_or_random_walk")
 Per = Literal["model", "recording"]
@@ -138,6 +139,7 @@ class _AutomatonReader(Reader):
             name=document.name,
             period=period,
             step=self._time(tree.get("step"), "step") or DEFAULT_STEP,
+            method=self.choice(tree.get("method"), "method", METHODS, "rk4"),
             model=model,
             parameters={**(model.parameters if model else {}), **own},
             inputs={e.key: self._input(e) for e in self.named(tree.get("inputs"), "inputs")},
@@ -164,7 +166,7 @@ class _AutomatonReader(Reader):
         return cast(NumberType, self.choice(node, "numbers", NUMBERS, "float64"))
 
     def _check_sections(self, tree: Table) -> None:
-        for key in ("flow", "terms", "step") if self.sampled else ("model",):
+        for key in ("flow", "terms", "step", "method") if self.sampled else ("model",):
             node = tree.get(key)
             if node is not None:
                 other = "continuous" if self.sampled else "sampled"

@@ -397,11 +397,13 @@ class _Check:
 
     def _sampled_ranges(self) -> None:
         automaton = self.automaton
-        exponential = any(m.run and m.run.method == "exponential" for m in automaton.modes.values())
+        used = {m.run.method for m in automaton.modes.values() if m.run}
+        used |= set() if automaton.is_sampled else {automaton.method}
+        scaling = next((name for name in ("exponential", "exact") if name in used), None)
         models = automaton.model.states if automaton.model else {}
         for state in (*automaton.states.values(), *models.values()):
-            if exponential and state.range is None:
-                label = f"state `{state.name}` needs a `range`: method `exponential` scales with it"
+            if scaling and state.range is None:
+                label = f"state `{state.name}` needs a `range`: method `{scaling}` scales with it"
                 self.problems.error("missing", state.span, label)
 
 

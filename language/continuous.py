@@ -11,10 +11,11 @@ the step: a parabola through its values at the ends and the middle, the times of
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Collection
 
 from language.action import discrete_variables
-from language.constants import derive_block, parameter_constants
+from language.constants import derive_block, parameter_constants, values_of
 from language.field import (
     Field,
     at_state,
@@ -25,6 +26,8 @@ from language.field import (
     field_variables,
     switch,
 )
+from language.integration import method_of
+from language.linear import Point
 from language.lower import constant_names, equations, variable_names
 from language.model import Automaton, Mode, Transition
 from language.motion import FLOW_HALVINGS, motion_blocks, motion_variables
@@ -45,7 +48,6 @@ from language.parallel import Selection, parallel_blocks, parallel_step
 from language.problem import Problems
 from language.program import Program, TransitionInfo, Variable
 from language.region import fired_variable, in_modes, slots
-from language.rk4 import rk4
 from language.transition import infos_of, transition_infos
 from language.wiring import (
     assembled,
@@ -81,12 +83,16 @@ def continuous_program(
     }
     moving = {**inputs, **{name: _parabola(name) for name in varying}}
     field = Field(automaton, known, moving, "memory.mode", f"{automaton.name} ", bool(varying))
-    method = rk4(field)
+    flows = field_blocks(field)
+    point = Point(automaton, values_of(parameters), {})
+    method, info = method_of(
+        automaton.method, field, flows, point, automaton.step, automaton.span, problems
+    )
     armed = {slot: f"memory.armed_{slot}" for slot in field.slots}
     selection = _selection(automaton, transitions)
     halvings = FLOW_HALVINGS[automaton.numbers]
     blocks = {
-        **field_blocks(field),
+        **flows,
         **method.blocks,
         **motion_blocks(field, method, Ref("work.merge"), halvings, lambda mode: armed),
     }
@@ -102,6 +108,7 @@ def continuous_program(
     variables = [*_variables(automaton, field), *motion_variables(field, method)]
     variables += [Variable(name, "real") for name in _courses(varying)]
     program = assembled(automaton, blocks, constants, variables, transitions)
+    program = dataclasses.replace(program, motion=info)
     return finished(program, ENTRIES, keep=(*BETWEEN, *_courses(varying)))
 
 

@@ -7,13 +7,14 @@ Inside a step the solution of x' = A x + pull is a Taylor sum of a fixed number 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
 from language.affine import jacobian
 from language.evaluate import Scalar
-from language.field import Field, at_state
+from language.field import Field, at_state, at_time
+from language.linear import Point
 from language.matrix import Matrix, exponential as matrix_exponential, exponential_integral
 from language.motion import Method
 from language.number import DIGITS, NumberType
@@ -45,51 +46,71 @@ LARGEST_NORM = 4.0
 
 
 @dataclass(frozen=True)
-class _Numbers:
-    """The solved numbers of one mode, (n, n) each; `half` is over h/2."""
+class Solved:
+    """What a method knows before it runs: constants, the step [s], the rates of each mode.
 
-    a: Matrix
-    whole: Matrix
-    whole_pull: Matrix
-    half: Matrix
-    half_pull: Matrix
+    `corners` are the constants at the ends of the ranges of the tunables in `depends_on`.
+    """
+
+    point: Point
+    corners: tuple[Mapping[str, Scalar], ...]
+    h: Fraction
+    rates: Mapping[str, Block]
+    depends_on: tuple[str, ...]
+    number: NumberType
+
+    def matrix(self, field: Field, mode: str) -> Matrix:
+        """Return A (n, n) of a mode: see `jacobian`."""
+        return jacobian(self.rates[mode], field.states, self.point.values)
+
+    def largest_norm(self, field: Field, mode: str) -> float:
+        """Return the largest |A h| of a mode within the ranges of the tunables.
+
+        It is taken at their ends: an entry that is largest between them is not seen.
+        """
+        norm = 0.0
+        for constants in (self.point.values, *self.corners):
+            found = scaled_norm(field, jacobian(self.rates[mode], field.states, constants))
+            norm = found if not found <= norm else norm
+        return norm * float(self.h)
 
 
-def exponential(
+def exponential(field: Field, solved: Solved, span: Span, problems: Problems) -> Method:
+    """Return the method for a field."""
+    return linear_motion(field, solved, _step, span, problems)
+
+
+def linear_motion(
     field: Field,
-    blocks: Mapping[str, Block],
-    constants: Mapping[str, Scalar],
-    h: Fraction,
-    depends_on: tuple[str, ...],
+    solved: Solved,
+    step: Callable[[Field, str, Solved], Block],
     span: Span,
     problems: Problems,
-    number: NumberType = "float64",
 ) -> Method:
-    """Return the method for a field; `h` [s] is the whole substep."""
+    """Return a method that has the linear part solved; `step` makes the step of a mode."""
     made: dict[str, Block] = {}
-    solved: list[Constant] = []
-    terms = 1
+    constants: list[Constant] = []
+    norms: dict[str, float] = {}
     for name in field.automaton.modes:
-        a = jacobian(blocks[f"rates_{name}"], field.states, constants)
-        norm = scaled_norm(field, a) * float(h)
-        if not norm <= LARGEST_NORM:
-            label = f"mode `{name}` is too fast for one step: |A h| = {norm:.3g} is above 4"
+        norms[name] = solved.largest_norm(field, name)
+        if not norms[name] <= LARGEST_NORM:
+            label = f"mode `{name}` is too fast for one step: |A h| = {norms[name]:.3g} is above 4"
+            norm = norms[name]
             needed = math.ceil(norm / LARGEST_NORM) if math.isfinite(norm) else "more"
             problems.error("step", span, label, f"{needed} times as many `substeps` are enough")
             continue
-        terms = max(terms, taylor_terms(norm, number))
-        numbers = _numbers(a, float(h))
-        solved += _constants(field, name, numbers, depends_on)
-        made[f"step_{name}"] = _step(field, name, numbers, h)
+        constants += _constants(field, name, solved)
+        made[f"step_{name}"] = step(field, name, solved)
+    bounded = [norm if norm <= LARGEST_NORM else 0.0 for norm in norms.values()]
+    terms = max(taylor_terms(norm, solved.number) for norm in bounded)
     for name in field.automaton.modes:
-        a = jacobian(blocks[f"rates_{name}"], field.states, constants)
-        made[f"series_{name}"] = _series(field, name, a, terms)
+        made[f"series_{name}"] = _series(field, name, solved.matrix(field, name), terms)
     variables = [
         Variable(f"work.pull_{name}", "real", f"({state.unit.dimension})/s")
         for name, state in field.automaton.states.items()
     ]
-    order = Variable("work.order", "real", about="order of a term")
-    return Method(made, terms, tuple(solved), (*variables, order))
+    number = Variable("work.order", "real", about="order of a term")
+    return Method(made, terms, tuple(constants), (*variables, number), norms)
 
 
 def scaled_norm(field: Field, a: Matrix) -> float:
@@ -116,23 +137,15 @@ def taylor_terms(norm: float, number: NumberType = "float64") -> int:
     return max(1, terms)
 
 
-def _numbers(a: Matrix, h: float) -> _Numbers:
-    return _Numbers(
-        a,
-        matrix_exponential(a, h),
-        exponential_integral(a, h),
-        matrix_exponential(a, 0.5 * h),
-        exponential_integral(a, 0.5 * h),
-    )
-
-
-def _table(numbers: _Numbers) -> dict[str, Matrix]:
+def _table(field: Field, mode: str, solved: Solved) -> dict[str, Matrix]:
+    """Return A, and E = e^(A h) with F = its integral over the step and over half of it."""
+    a, h = solved.matrix(field, mode), float(solved.h)
     return {
-        "A": numbers.a,
-        "E": numbers.whole,
-        "F": numbers.whole_pull,
-        "Eh": numbers.half,
-        "Fh": numbers.half_pull,
+        "A": a,
+        "E": matrix_exponential(a, h),
+        "F": exponential_integral(a, h),
+        "Eh": matrix_exponential(a, 0.5 * h),
+        "Fh": exponential_integral(a, 0.5 * h),
     }
 
 
@@ -140,16 +153,15 @@ def _name(mode: str, letter: str, row: str, column: str) -> str:
     return f"solved.{mode}_{letter}.{row}.{column}"
 
 
-def _constants(
-    field: Field, mode: str, numbers: _Numbers, depends_on: tuple[str, ...]
-) -> list[Constant]:
+def _constants(field: Field, mode: str, solved: Solved) -> list[Constant]:
     found = []
-    for letter, matrix in _table(numbers).items():
+    for letter, matrix in _table(field, mode, solved).items():
         for i, row in enumerate(field.states):
             for j, column in enumerate(field.states):
                 if matrix[i][j] != 0.0:
                     name = _name(mode, letter, row, column)
-                    found.append(Constant(name, "solved", matrix[i][j], depends_on=depends_on))
+                    value, depends_on = matrix[i][j], solved.depends_on
+                    found.append(Constant(name, "solved", value, depends_on=depends_on))
     return found
 
 
@@ -177,36 +189,51 @@ def _pull(field: Field, mode: str, a: Matrix) -> list[Op]:
     return ops
 
 
-def _step(field: Field, mode: str, numbers: _Numbers, h: Fraction) -> Block:
-    state: dict[str, Expr] = {name: Ref(f"state.{name}") for name in field.states}
-    pull: dict[str, Expr] = {name: Ref(f"work.pull_{name}") for name in field.states}
-    table = _table(numbers)
+def opening(field: Field, mode: str, solved: Solved) -> Block:
+    """Return the operations that find what is not linear, at the start of the step."""
+    pull = _pull(field, mode, solved.matrix(field, mode))
+    start = (*at_state(field), *at_time(field, real(0.0)))
+    return (*start, Run(f"rates_{mode}"), *pull)
 
-    def moved(target: str, e: str, f: str) -> Block:
-        return tuple(
-            Assign(
-                f"work.{target}_{name}",
-                total(
-                    _row(field, mode, e, table[e], i, state)
-                    + _row(field, mode, f, table[f], i, pull)
-                ),
-            )
-            for i, name in enumerate(field.states)
-        )
 
-    whole_step = Compare("==", Ref("work.h"), real(h))
-    series = Run(f"series_{mode}")
-    middle = Assign("work.s", multiply(real(0.5), Ref("work.h")))
+def closing(field: Field, mode: str, solved: Solved) -> Block:
+    """Return the operations that go to the end of the step; `work.pull_<state>` is known."""
     end = Assign("work.s", Ref("work.h"))
     arrive = [Assign(f"work.end_{name}", Ref(f"work.at_{name}")) for name in field.states]
+    rest: Block = (Run(f"series_{mode}"), end, Run("point"), *arrive)
+    moved = _moved(field, mode, ("end", "E", "F"), solved)
+    return (Branch(_is_whole(solved), moved, rest),)
+
+
+def _is_whole(solved: Solved) -> Expr:
+    return Compare("==", Ref("work.h"), real(solved.h))
+
+
+def _moved(field: Field, mode: str, letters: tuple[str, str, str], solved: Solved) -> Block:
+    """x = E x + F pull into `work.<target>_<state>`; letters are target, E and F."""
+    target, e, f = letters
+    table = _table(field, mode, solved)
+    state: dict[str, Expr] = {name: Ref(f"state.{name}") for name in field.states}
+    pull: dict[str, Expr] = {name: Ref(f"work.pull_{name}") for name in field.states}
+    ops = []
+    for i, name in enumerate(field.states):
+        parts = _row(field, mode, e, table[e], i, state)
+        parts += _row(field, mode, f, table[f], i, pull)
+        ops.append(Assign(f"work.{target}_{name}", total(parts)))
+    return tuple(ops)
+
+
+def _step(field: Field, mode: str, solved: Solved) -> Block:
+    half = multiply(real(0.5), Ref("work.h"))
+    middle = Assign("work.s", half)
+    moved = _moved(field, mode, ("at", "Eh", "Fh"), solved)
     return (
-        *at_state(field),
+        *opening(field, mode, solved),
+        Branch(_is_whole(solved), moved, (Run(f"series_{mode}"), middle, Run("point"))),
+        *at_time(field, half),
         Run(f"rates_{mode}"),
-        *_pull(field, mode, numbers.a),
-        Branch(whole_step, moved("at", "Eh", "Fh"), (series, middle, Run("point"))),
-        Run(f"rates_{mode}"),
-        *_pull(field, mode, numbers.a),
-        Branch(whole_step, moved("end", "E", "F"), (series, end, Run("point"), *arrive)),
+        *_pull(field, mode, solved.matrix(field, mode)),
+        *closing(field, mode, solved),
     )
 
 

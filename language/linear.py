@@ -50,7 +50,8 @@ class Point:
 def inlined(mode: Mode, given: Mapping[str, Tree]) -> dict[str, Tree]:
     """Return the equations of a mode in states, inputs and parameters; some names are given."""
     known = dict(given)
-    for name in equation_order(mode):
+    own = [name for name in equation_order(mode) if name in mode.equations]
+    for name in own:  # those of a region beside are not known: its mode chooses them
         known[name] = replaced(mode.equations[name].tree, known)
     return known
 

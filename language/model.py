@@ -174,14 +174,21 @@ class Observer:
 
 @dataclass(frozen=True)
 class Run:
-    """A mode of the model run inside the tick, following the model's own transitions."""
+    """A mode of the model run inside the tick, following the model's own transitions.
+
+    Where it does not follow them it keeps the one flow. `linearise` is the point at which the
+    flows are replaced by their tangents, None where they are not.
+    """
 
     mode: str
-    method: Literal["rk4", "exponential"]
+    method: str
     substeps: int
     events: int
     key: str
     span: Span
+    follow: bool = True
+    linearise: Mapping[str, Formula] | None = None
+    method_span: Span | None = None
 
 
 @dataclass(frozen=True)
@@ -257,6 +264,7 @@ class Automaton:
     initial: str
     outputs: Mapping[str, Span]
     span: Span
+    method: str = "rk4"
     dimensions: Mapping[str, Dimension] = field(default_factory=dict, repr=False)
     discrete: Mapping[str, State] = field(default_factory=dict)
     kinds: Mapping[str, ValueKind] = field(default_factory=dict, repr=False)

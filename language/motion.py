@@ -9,7 +9,7 @@ the bracket on the polynomial; the upper end is kept, so the guard is true where
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 
 from language.field import Field, any_guard, at_time
@@ -51,12 +51,13 @@ Armed = Mapping[str, str]
 
 @dataclass(frozen=True)
 class Method:
-    """A method of integration for one field."""
+    """A method of integration for one field; `norms` are |A h| of each mode, where it has them."""
 
     blocks: dict[str, Block]
     terms: int
     constants: tuple[Constant, ...]
     variables: tuple[Variable, ...]
+    norms: Mapping[str, float] = field(default_factory=dict)
 
 
 def merge_time(number: NumberType, step: Fraction, time: Fraction = Fraction(0)) -> float:

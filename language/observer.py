@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal, cast
+from typing import TYPE_CHECKING
 
 from language.document import Entry, Node, Table
 from language.model import Automaton, Formula, Observer, Run
@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 WRITTEN_KEYS = ("inputs", "A", "B", "C", "f")
 OBSERVER_KEYS = ("kalman", "of", "at", *WRITTEN_KEYS, "measures")
 NOISE_KEYS = ("process_noise", "measurement_noise")
-RUN_KEYS = ("of", "method", "substeps", "events")
-METHODS = ("rk4", "exponential")
+RUN_KEYS = ("of", "method", "substeps", "events", "follow", "linearise")
+METHODS = ("euler", "midpoint", "rk4", "exact", "exponential")
 MAX_SUBSTEPS = 100
 MAX_EVENTS = 100
 
@@ -73,14 +73,20 @@ def read_run(reader: Reader, node: Node, key: str, model: Automaton | None) -> R
     """Read a run of one mode of the model."""
     table = reader.table(node, key, RUN_KEYS)
     mode = _mode_of_model(reader, table.get("of"), "a run", node.span, model) or ""
-    method = reader.choice(table.get("method"), "method", METHODS, "rk4")
+    point: dict[str, Formula] = {}
+    if "linearise" in table.entries:
+        where = reader.table(table.get("linearise"), f"{key}.linearise", ("at",))
+        point = _point(reader, where.get("at"), f"{key}.linearise.at", model)
     return Run(
         mode=mode,
-        method=cast(Literal["rk4", "exponential"], method),
+        method=reader.choice(table.get("method"), "method", METHODS, "rk4"),
         substeps=reader.whole(table.get("substeps"), "substeps", 1, 1, MAX_SUBSTEPS),
         events=reader.whole(table.get("events"), "events", 4, 1, MAX_EVENTS),
         key=key,
         span=node.span,
+        follow=reader.choice(table.get("follow"), "follow", ("true", "false"), "true") == "true",
+        linearise=point if "linearise" in table.entries else None,
+        method_span=(table.get("method") or node).span,
     )
 
 

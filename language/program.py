@@ -147,6 +147,29 @@ class ObserverInfo:
 
 
 @dataclass(frozen=True)
+class MotionLimit:
+    """The largest stable step [s] of a mode, and the eigenvalue [1/s] and term that set it."""
+
+    mode: str
+    step: float
+    eigenvalue: complex
+    term: str
+    state: str
+
+
+@dataclass(frozen=True)
+class MotionInfo:
+    """How states move: method, step [s], terms of its polynomial, |A h| and limits by mode."""
+
+    method: str
+    step: float
+    terms: int
+    norms: Mapping[str, float]
+    limits: tuple[MotionLimit, ...]
+    events: int = 0
+
+
+@dataclass(frozen=True)
 class Program:
     """A checked automaton as operations. `blocks` are named; the order is that of printing.
 
@@ -168,6 +191,7 @@ class Program:
     blocks: Mapping[str, Block]
     run_modes: tuple[ModeInfo, ...] = ()
     observers: tuple[ObserverInfo, ...] = ()
+    motion: MotionInfo | None = None
     defaults: Mapping[str, float | bool] = field(default_factory=dict)
     regions: tuple[RegionInfo, ...] = ()
 

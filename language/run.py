@@ -6,12 +6,12 @@ mode of ours that runs, `run_<mode>`: the period, segment by segment, at most `e
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 from language.check_memory import uses_memory
 from language.evaluate import Scalar
-from language.exponential import exponential
 from language.field import (
     Field,
     by_mode,
@@ -19,15 +19,12 @@ from language.field import (
     field_variables,
     switch,
 )
-from language.lower import constant_names, tunables_of, typed, variable_names
-from language.model import CHART, Automaton, Formula, Mode, Run as ModelRun
-from language.motion import (
-    RUN_HALVINGS,
-    Method,
-    merge_time,
-    motion_blocks,
-    motion_variables,
-)
+from language.integration import method_of
+from language.linear import Point
+from language.linearised import linearised
+from language.lower import constant_names, typed, variable_names
+from language.model import CHART, Automaton, Mode, Run as ModelRun
+from language.motion import RUN_HALVINGS, merge_time, motion_blocks, motion_variables
 from language.number import rounded
 from language.operation import (
     Assign,
@@ -39,6 +36,7 @@ from language.operation import (
     Loop,
     Op,
     Ref,
+    Run,
     Value,
     real,
     subtract,
@@ -46,11 +44,10 @@ from language.operation import (
 )
 from language.parallel import Selection, parallel_blocks, parallel_step
 from language.problem import Problems
-from language.program import Constant, Variable
+from language.program import Constant, MotionInfo, Variable
 from language.region import mode_variable
-from language.rk4 import rk4
+from language.syntax import form
 from language.wiring import enter_initial
-from language.working import working
 
 EVENT_LIMIT = "event_limit"
 MODE = "memory.run_mode"
@@ -63,6 +60,7 @@ class Motion:
     blocks: dict[str, Block]
     variables: tuple[Variable, ...]
     constants: tuple[Constant, ...]
+    info: MotionInfo
 
 
 def run_motion(
@@ -71,10 +69,14 @@ def run_motion(
     """Return the motion of the model inside a tick; `values` are those of the constants."""
     model = automaton.model
     assert model and automaton.period is not None
+    first = runs[0]
     for run in runs:
-        if (run.method, run.substeps) != (runs[0].method, runs[0].substeps):
-            label = "all runs of an automaton have one method and one number of substeps"
+        if _way(run) != _way(first):
+            label = "all runs of an automaton have one method, one number of substeps and one point"
             problems.error("run", run.span, label)
+    point = Point(automaton, values, {})
+    if first.linearise is not None:
+        model = linearised(model, first, point, problems)
     inputs = _inputs(automaton, problems)
     remembering = uses_memory(model)
     if remembering:
@@ -84,7 +86,10 @@ def run_motion(
     _refuse_actions(automaton, model, problems)
     field = Field(model, constant_names(automaton), inputs, MODE, f"{model.name} ")
     blocks = field_blocks(field)
-    method = _method(automaton, field, runs[0], blocks, values, problems)
+    h = automaton.period / first.substeps
+    place = first.method_span or first.span
+    method, info = method_of(first.method, field, blocks, point, h, place, problems)
+    events = max(run.events if run.follow else 0 for run in runs)
     merge = real(merge_time(automaton.numbers, automaton.period))
     made = {
         **blocks,
@@ -100,7 +105,7 @@ def run_motion(
         *field_variables(field),
         *motion_variables(field, method),
     )
-    return Motion(made, variables, method.constants)
+    return Motion(made, variables, method.constants, dataclasses.replace(info, events=events))
 
 
 def run_block(automaton: Automaton, run: ModelRun) -> Block:
@@ -108,6 +113,8 @@ def run_block(automaton: Automaton, run: ModelRun) -> Block:
     model = automaton.model
     assert model and automaton.period is not None
     field = Field(model, {}, {}, MODE, "")
+    if not run.follow:
+        return _one_flow(automaton, field, run)
     may_jump = Compare("<", Ref("work.event"), whole(run.events))
     at_limit: Block = (FaultBit(EVENT_LIMIT), Assign("work.left", real(0.0)))
     after: Block = (Branch(may_jump, (by_mode(field, "switch"),), at_limit),)
@@ -152,27 +159,22 @@ def _inputs(automaton: Automaton, problems: Problems) -> dict[str, Expr]:
     return found
 
 
-def _method(
-    automaton: Automaton,
-    field: Field,
-    run: ModelRun,
-    blocks: Mapping[str, Block],
-    values: Mapping[str, Scalar],
-    problems: Problems,
-) -> Method:
+def _one_flow(automaton: Automaton, field: Field, run: ModelRun) -> Block:
+    """The whole period in the flow of one mode: no guard of the model is looked at."""
     assert automaton.period is not None
-    if run.method == "rk4":
-        return rk4(field)
-    h = automaton.period / run.substeps
-    formulas: list[Formula] = []
-    for mode in field.automaton.all_modes:
-        formulas += mode.equations.values()
-        for balance in mode.flow.values():
-            formulas += [Formula(balance.left, ""), Formula(balance.right, "")]
-    depends_on = tunables_of(automaton, formulas)
-    number = automaton.numbers
-    rates = {name: working(block, number) for name, block in blocks.items()}
-    return exponential(field, rates, values, h, depends_on, run.span, problems, number)
+    substep = real(automaton.period / run.substeps)
+    ends = [Assign(f"state.{name}", Ref(f"work.end_{name}")) for name in field.states]
+    body: Block = (
+        Assign("work.h", substep, f"{automaton.name} {run.key}"),
+        Run(f"step_{run.mode}"),
+        *ends,
+    )
+    return body if run.substeps == 1 else (Loop(run.substeps, "work.substep", body),)
+
+
+def _way(run: ModelRun) -> tuple[object, ...]:
+    at = {name: form(formula.tree) for name, formula in (run.linearise or {}).items()}
+    return run.method, run.substeps, run.linearise is None, at
 
 
 def _switches(field: Field, problems: Problems) -> dict[str, Block]:

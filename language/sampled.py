@@ -37,6 +37,7 @@ from language.problem import Problems
 from language.program import (
     Constant,
     ModeInfo,
+    MotionInfo,
     Program,
     Variable,
 )
@@ -78,6 +79,7 @@ class _Sampled:
         self.transitions = transition_infos(automaton, problems)
         self.observers: dict[str, Kalman] = {}
         self.faults: list[str] = []
+        self.motion: MotionInfo | None = None
         self.before = self._names("before")
         self.delays = delays_of(automaton)
         names = {n: Ref(f"equation.{n}") for m in automaton.all_modes for n in m.equations}
@@ -107,6 +109,7 @@ class _Sampled:
             blocks.update(motion.blocks)
             variables += motion.variables
             self.constants += motion.constants
+            self.motion = motion.info
         for mode in modes:
             blocks.update(self._advance(mode))
         for mode in automaton.all_modes:
@@ -122,6 +125,7 @@ class _Sampled:
             faults=tuple(self.faults),
             run_modes=self._run_modes() if runs else (),
             observers=tuple(observer.info for observer in self.observers.values()),
+            motion=self.motion,
         )
         return finished(program, entries=("init", "derive", "step"))
 
@@ -186,7 +190,7 @@ class _Sampled:
             self.constants += made.constants
             return {f"predict_{mode.name}": made.predict, f"correct_{mode.name}": made.correct}
         if mode.run:
-            if EVENT_LIMIT not in self.faults:
+            if mode.run.follow and EVENT_LIMIT not in self.faults:
                 self.faults.append(EVENT_LIMIT)
             return {f"run_{mode.name}": run_block(self.automaton, mode.run)}
         return {}

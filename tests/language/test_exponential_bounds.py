@@ -117,7 +117,11 @@ def test_every_mode_that_is_too_fast_is_told(tmp_path: Path) -> None:
 
 
 def test_rk4_knows_no_such_bound(tmp_path: Path) -> None:
-    assert not refusal(lambda: decay(tmp_path, "-40").program(method="rk4"))
+    """It takes |A h| = 4 and more where that is no decay; where it is, its own limit counts."""
+    swings = "x: der(x) = 1 1/s * z * 50, z: der(z) = -1 1/s * x / 50"
+    flow = Flow(tmp_path, swings, TWO)
+    assert refusal(flow.program)
+    assert not refusal(lambda: flow.program(method="rk4"))
 
 
 BARE = """language: 1
@@ -136,13 +140,22 @@ def test_a_tunable_in_the_matrix_may_be_tuned_and_stamps_its_numbers(tmp_path: P
     assert "stale_calibration" in made.faults
 
 
-@pytest.mark.xfail(
-    reason="exponential takes the norm at present values; language.md section 9: K is fixed for "
-    "the worst case over the tunables' ranges, so a tuned Program has another number of terms",
-    strict=True,
-)
 def test_the_terms_are_enough_for_the_whole_range_of_a_tunable(tmp_path: Path) -> None:
     made = Flow(tmp_path, "x: tau * der(x) = -x", ONE, parameters=TAU).program()
+    assert series_length(made) == terms_of(Fraction(2))
+
+
+def test_the_bound_holds_for_the_whole_range_of_a_tunable(tmp_path: Path) -> None:
+    fast = TAU.replace("[0.5, 2]", "[0.2, 2]")
+    flow = Flow(tmp_path, "x: tau * der(x) = -x", ONE, parameters=fast)
+    (problem,) = refusal(flow.program)
+    assert problem.label == "mode `one` is too fast for one step: |A h| = 5 is above 4"
+    assert not refusal(lambda: flow.program(substeps=2))
+
+
+def test_what_is_derived_from_a_tunable_follows_it_to_the_ends_of_its_range(tmp_path: Path) -> None:
+    more = f"{TAU}, rate: {{derived: 1 / tau, unit: 1/s}}"
+    made = Flow(tmp_path, "x: der(x) = -rate * x", ONE, parameters=more).program()
     assert series_length(made) == terms_of(Fraction(2))
 
 

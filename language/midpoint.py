@@ -1,0 +1,71 @@
+"""Midpoint: the explicit method of two stages (Runge 1895) with a quadratic inside the step.
+
+Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.1 (1.4) and II.6. The
+quadratic starts with the first rate and ends at the end of the step: it is of second order all
+through the step, as the method is, and needs no third rate as a cubic would.
+"""
+
+from __future__ import annotations
+
+from language.field import Field, at_state, at_time
+from language.motion import Method
+from language.operation import (
+    Assign,
+    Block,
+    Op,
+    Ref,
+    Run,
+    Store,
+    add,
+    divide,
+    multiply,
+    real,
+    subtract,
+    whole,
+)
+from language.program import Variable
+
+TERMS = 2
+
+
+def midpoint(field: Field) -> Method:
+    """Return the method for a field."""
+    blocks: dict[str, Block] = {}
+    for name in field.automaton.modes:
+        blocks[f"step_{name}"] = _step(field, name)
+        blocks[f"series_{name}"] = _series(field)
+    variables = [
+        Variable(f"work.{what}_{name}", "real", f"({state.unit.dimension})/s")
+        for what in ("first", "middle")
+        for name, state in field.automaton.states.items()
+    ]
+    return Method(blocks, TERMS, (), tuple(variables))
+
+
+def _step(field: Field, mode: str) -> Block:
+    """x + h f(x + h/2 f(x))."""
+    h = Ref("work.h")
+    half = multiply(real(0.5), h)
+    ops: list[Op] = [*at_state(field), *at_time(field, real(0.0)), Run(f"rates_{mode}")]
+    for name in field.states:
+        ops.append(Assign(f"work.first_{name}", Ref(f"work.rate_{name}")))
+        moved = add(Ref(f"state.{name}"), multiply(half, Ref(f"work.first_{name}")))
+        ops.append(Assign(f"work.at_{name}", moved))
+    ops += at_time(field, half)
+    ops.append(Run(f"rates_{mode}"))
+    for name in field.states:
+        ops.append(Assign(f"work.middle_{name}", Ref(f"work.rate_{name}")))
+        moved = add(Ref(f"state.{name}"), multiply(h, Ref(f"work.middle_{name}")))
+        ops.append(Assign(f"work.end_{name}", moved))
+    return tuple(ops)
+
+
+def _series(field: Field) -> Block:
+    """x0 + s k1 + s^2 (k2 - k1)/h."""
+    ops: list[Op] = []
+    for name in field.states:
+        first, middle = Ref(f"work.first_{name}"), Ref(f"work.middle_{name}")
+        series = f"work.series_{name}"
+        ops.append(Store(series, whole(0), first))
+        ops.append(Store(series, whole(1), divide(subtract(middle, first), Ref("work.h"))))
+    return tuple(ops)

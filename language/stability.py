@@ -1,0 +1,90 @@
+"""Stability: the largest step with which a method lets the decaying parts of a flow decay.
+
+A method makes x R(h lambda) of a part that decays as e^(lambda t): that must not grow. Hairer and
+Wanner, Solving Ordinary Differential Equations II, IV.2. Growing and undamped parts set no limit.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from language.eigen import eigenvalues, governing_entry
+from language.field import Field
+from language.linear import Point
+from language.matrix import Matrix
+from language.problem import Problems, Span
+from language.terms import strongest
+
+GROWTH: Mapping[str, Callable[[complex], complex]] = {
+    "euler": lambda z: 1 + z,
+    "midpoint": lambda z: 1 + z + z * z / 2,
+    "rk4": lambda z: 1 + z + z * z / 2 + z * z * z / 6 + z * z * z * z / 24,
+}
+"""R(z) of each method: the first terms of e^z."""
+UNDAMPED = 1e-6
+"""Damping ratio below which a part counts as undamped: an eigenvalue has rounding errors."""
+LOOK = 1.0 / 64
+"""Step of the walk along the ray h lambda: no method here has a region narrower than that."""
+FARTHEST = 8.0
+"""|h lambda| beyond which none of these methods is stable."""
+HALVINGS = 50
+ROUNDING = 2.0**-40
+"""Growth per step that is rounding of an eigenvalue."""
+
+
+@dataclass(frozen=True)
+class Limit:
+    """The largest stable step [s] in a mode, the eigenvalue [1/s] and the term that set it."""
+
+    mode: str
+    step: float
+    eigenvalue: complex
+    term: str
+    state: str
+
+
+def limit_of(field: Field, mode: str, a: Matrix, method: str, point: Point) -> Limit | None:
+    """Return the limit of a mode whose linear part is A (n, n) [1/s]; None where there is none."""
+    if method not in GROWTH or not a or not all(math.isfinite(x) for row in a for x in row):
+        return None
+    damped = [value for value in eigenvalues(a) if value.real < -UNDAMPED * abs(value)]
+    if not damped:
+        return None
+    fastest = min(damped, key=lambda value: largest_step(method, value))
+    row, column = (field.states[k] for k in governing_entry(a, fastest))
+    term = strongest(field.automaton.modes[mode], row, column, point)
+    step = largest_step(method, fastest)
+    return Limit(mode, step, fastest, term.text if term else "", row)
+
+
+def largest_step(method: str, eigenvalue: complex) -> float:
+    """Return the largest h [s] with |R(h' lambda)| <= 1 for all h' up to h."""
+    growth, size = GROWTH[method], abs(eigenvalue)
+    turn = eigenvalue / size
+
+    def decays(z: float) -> bool:
+        return abs(growth(z * turn)) <= 1.0 + ROUNDING
+
+    low = 0.0
+    while low < FARTHEST and decays(low + LOOK):
+        low += LOOK
+    high = low + LOOK
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if decays(middle) else (low, middle)
+    return low / size
+
+
+def check_step(limit: Limit, method: str, h: float, span: Span, problems: Problems) -> None:
+    """Report a step h [s] above the limit."""
+    if h <= limit.step * (1.0 + ROUNDING):
+        return
+    label = f"`{method}` is not stable in mode `{limit.mode}` with a step of {h:.4g} s: "
+    label += f"the largest is {limit.step:.4g} s"
+    rate = f"{abs(limit.eigenvalue):.4g} 1/s"
+    times = math.ceil(h / limit.step)
+    help = f"`{limit.term}` sets the eigenvalue of {rate} in the rate of `{limit.state}`: "
+    help += f"{times} times as many steps, or `method: exponential`"
+    problems.error("stability", span, label, help)
