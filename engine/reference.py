@@ -2,7 +2,8 @@
 
 Of a continuous Program only its field and its instants are kept, scipy integrates: see
 engine/library_stepper.py. Of a sampled Program the numbers of its observers are computed anew; what
-a mode `runs` inside a tick stays ours. The loop over instants is the engine's, through the Stepper protocol.
+a mode `runs` inside a tick stays ours. The loop over instants is the engine's, through the Stepper
+protocol.
 """
 
 from __future__ import annotations
