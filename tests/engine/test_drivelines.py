@@ -28,8 +28,8 @@ WIDE = Fraction(2, 1000)
 """Step [s] of scipy's methods: they choose their own inside it, and look at guards in quarters."""
 EVENTS_WITHIN = 2e-7
 """Of RK4 at the step of the spec against orders 8 and 5 at a tolerance of 1e-11 [s]."""
-SIGNALS_WITHIN = 2e-6
-"""Of the largest value."""
+SIGNALS_WITHIN = {"two_gaps": 2e-6, "clutch": 2e-6, "light_damping": 1e-4}
+"""Of the largest value; the last one's gap has h k / c = 0.34, to the fifth over 120: 4e-5."""
 AWAY = 5e-6
 """Around an event [s], a sample may fall on either side of it."""
 
@@ -74,7 +74,10 @@ def assert_same(name: str, theirs: mw.Trajectory) -> None:
         near |= np.abs(theirs.times - event.time) < AWAY
     for signal, values in theirs.signals.items():
         off = np.abs(mine.signals[signal][:count] - values)[~near]
-        assert off.max() <= SIGNALS_WITHIN * max(1e-3, np.abs(values).max()), (signal, off.max())
+        assert off.max() <= SIGNALS_WITHIN[name] * max(1e-3, np.abs(values).max()), (
+            signal,
+            off.max(),
+        )
 
 
 @pytest.mark.parametrize("name", DRIVES)
