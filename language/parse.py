@@ -28,9 +28,12 @@ from language.syntax import (
     Truth,
     depth,
 )
-from language.units import NO_UNIT, Unit, UnitError, parse_unit, unit_hint
+from language.units import NO_UNIT, UNIT, Unit, UnitError, parse_unit, unit_hint
 
 DECIMAL = re.compile(r"(0|[1-9]\d*)(\.\d+)?([eE][-+]?\d+)?")
+SIMPLE_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+SIMPLE_QUANTITY = re.compile(rf"{DECIMAL.pattern} {UNIT.pattern}")
+WORDS = frozenset({"if", "then", "else", "and", "or", "not", "true", "false"})
 MAX_TEXT = 2000
 """Longest expression read; longer ones want an equation of their own."""
 COMMA_HINT = "in `{...}` YAML ends a value at a comma: quote a value that has one"
@@ -92,7 +95,7 @@ def _exponent(text: str) -> int:
 @cache
 def _parser(start: str) -> lark.Lark:
     grammar = resources.files("language").joinpath("expression.lark").read_text("utf-8")
-    return lark.Lark(grammar, parser="lalr", start=start, propagate_positions=True)
+    return lark.Lark(grammar, parser="lalr", start=start)
 
 
 def _parse(scalar: Scalar, start: str) -> Any:
@@ -103,6 +106,9 @@ def _parse(scalar: Scalar, start: str) -> Any:
     if "\n" in text:
         problems.error("expression", span, "an expression stands on one line")
     problems.stop_if_any()
+    simple = _simple(text, span) if start == "expression" else None
+    if simple is not None:
+        return simple
     try:
         tree = _parser(start).parse(text)
         built = _Build(span).transform(tree)
@@ -121,6 +127,19 @@ def _parse(scalar: Scalar, start: str) -> Any:
     except RecursionError:
         problems.error("expression", span, "the expression is nested too deeply")
     raise SpecError(problems.found)
+
+
+def _simple(text: str, span: Span) -> Tree | None:
+    """Return a name or a literal without the parser: most values of a spec are one."""
+    build, token = _Build(span), lark.Token("SIMPLE", text, start_pos=0)
+    if SIMPLE_NAME.fullmatch(text) and text not in WORDS:
+        return Name(text, span.inside(0, len(text)))
+    tree: Tree | None = None
+    if DECIMAL.fullmatch(text):
+        tree = build.number([token])
+    elif SIMPLE_QUANTITY.fullmatch(text) and text.partition(" ")[2] not in WORDS:
+        tree = build.quantity([token])
+    return tree
 
 
 def _explain(

@@ -22,7 +22,7 @@ class Source:
     """
 
     name: str
-    lines: tuple[str, ...] = field(repr=False, default=())
+    lines: tuple[str, ...] = field(repr=False, compare=False, default=())
     layer: str = ""
     laid: Span | None = field(repr=False, default=None)
 

@@ -11,12 +11,13 @@ from functools import cached_property
 from importlib import resources
 from pathlib import Path
 
-from language.document import Document, Entry, Scalar, Table, parse, read_text
+from language.document import Document, Entry, Scalar, Table, read_text
 from language.effect import read_laying
 from language.laying import lay_effect
 from language.overlay import lay, without
 from language.problem import Problems, Source, Span, SpecError, nearest
 from language.tree import entries
+from language.yaml_tree import parse
 
 KINDS = ("automaton", "system", "scenario", "map", "variant", "effect")
 LATER_KINDS = ("study", "test", "calibration")

@@ -11,7 +11,7 @@ from language.document import Entry, Items, Node, Scalar, Table
 from language.kind import LARGEST_WHOLE, TYPES, Type
 from language.model import Formula, Range
 from language.parse import COMMA_HINT, parse_expression
-from language.problem import Problems, Source, Span, SpecError, nearest
+from language.problem import Problems, Source, Span, nearest
 from language.syntax import Broken, Negative, Number, Tree
 from language.units import NO_UNIT, UNKNOWN_UNIT, Unit, UnitError, fits, parse_unit, unit_hint
 
@@ -128,6 +128,7 @@ class Reader:
     def __init__(self, problems: Problems) -> None:
         """Report into `problems`."""
         self.problems = problems
+        self.parsed: dict[int, tuple[Scalar, Tree]] = {}
 
     def table(self, node: Node | None, what: str, allowed: Iterable[str] | None = None) -> Table:
         """Return a mapping with known keys only; an empty one where the node is absent."""
@@ -230,11 +231,16 @@ class Reader:
         scalar = self.scalar(node, key.rpartition(".")[2], span)
         if scalar is None:
             return None
-        try:
-            return Formula(parse_expression(scalar), key)
-        except SpecError as error:
-            self.problems.found.extend(error.problems)
-            return Formula(Broken(scalar.span), key)
+        return Formula(self._parsed(scalar), key)
+
+    def _parsed(self, scalar: Scalar) -> Tree:
+        """Every text is parsed once: what stands at the root or in a template is read often."""
+        if id(scalar) not in self.parsed:
+            tree: Tree = Broken(scalar.span)
+            with self.problems.collecting():
+                tree = parse_expression(scalar)
+            self.parsed[id(scalar)] = scalar, tree
+        return self.parsed[id(scalar)][1]
 
     def quantity(self, node: Node | None, what: str, span: Span, unit: Unit | None) -> Quantity:
         """Return a literal in SI and its unit; a bare number is in `unit` where one is given."""

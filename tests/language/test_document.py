@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 from hypothesis import given, strategies as st
 
-from language.document import MAX_BYTES, MAX_DEPTH, Items, Scalar, Table, parse, read_text
+from language.document import MAX_BYTES, Items, Scalar, Table, read_text
 from language.problem import Source
+from language.yaml_tree import MAX_DEPTH, parse
 from tests.language.making import automaton, refusal, told
 
 

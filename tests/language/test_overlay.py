@@ -7,13 +7,14 @@ from pathlib import Path
 import pytest
 from hypothesis import given, strategies as st
 
-from language.document import Items, Node, Scalar, Table, parse
+from language.document import Items, Node, Scalar, Table
 from language.load import automaton_of
 from language.model import Automaton
 from language.overlay import lay, without
 from language.problem import Problem, Problems, Source
 from language.project import read_document
 from language.syntax import form
+from language.yaml_tree import parse
 from tests.language.making import automaton, project_of, refusal, told, tree
 
 Plain = str | list[str] | dict[str, "Plain"]

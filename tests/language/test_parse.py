@@ -8,7 +8,7 @@ from fractions import Fraction
 import pytest
 from hypothesis import given, strategies as st
 
-from language.document import Scalar, parse
+from language.document import Scalar
 from language.parse import decimal, parse_balance, parse_expression
 from language.problem import Source
 from language.syntax import (
@@ -28,6 +28,7 @@ from language.syntax import (
     walk,
 )
 from language.units import NO_UNIT, parse_unit
+from language.yaml_tree import parse
 from tests.language.making import NOWHERE, refusal, scalar, tree
 
 SUM, PRODUCT, SIGN, POWER, ATOM = 5, 6, 7, 8, 9
