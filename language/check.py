@@ -211,15 +211,13 @@ class _Check:
             modes |= {f"{automaton.model.name}.{name}" for name in automaton.model.modes}
             modes |= {f"{automaton.model.name}.{path}" for path in _mode_paths(automaton.model)}
         formulas = sources(mode)
+        scope = Scope(known, modes, place, self._angles(), self._kept(), self._tables())
+        check = DimensionCheck(scope, self.problems)
         for name in equation_order(mode):
-            scope = Scope({**known}, modes, place, self._angles(), self._kept(), self._tables())
-            check = DimensionCheck(scope, self.problems)
             for formula in formulas[name]:
                 kind = check.kind(formula.tree)
                 agreed = self._agreed(name, kind, formula)
                 known[name] = kind if isinstance(kind, Whole) else agreed
-        scope = Scope(known, modes, place, self._angles(), self._kept(), self._tables())
-        check = DimensionCheck(scope, self.problems)
         self._flow(mode, check)
         for assignments in (mode.update, mode.entry, mode.exit):
             self._assignments(assignments, check)

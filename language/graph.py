@@ -33,6 +33,28 @@ def topological(edges: Edges) -> list[str] | None:
     return found if len(found) == len(names) else None
 
 
+def post_order(reads: Edges) -> list[str]:
+    """Return the names, each directly after those that it reads and that are not there yet.
+
+    In a circle, which is reported elsewhere, one member comes before what it reads.
+    """
+    found: dict[str, None] = {}
+    begun: set[str] = set()
+    for start in reads:
+        stack = [] if start in begun else [(start, iter(list(reads[start])))]
+        begun.add(start)
+        while stack:
+            name, waiting = stack[-1]
+            needed = next((read for read in waiting if read in reads and read not in begun), None)
+            if needed is None:
+                found[name] = None
+                stack.pop()
+            else:
+                begun.add(needed)
+                stack.append((needed, iter(list(reads[needed]))))
+    return list(found)
+
+
 def circle(edges: Edges) -> list[str]:
     """Return the members of a circle, each leading to the next; an empty list if there is none."""
     done: set[str] = set()

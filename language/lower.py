@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from typing import Literal
 
 from language.balance import coefficient_of
+from language.graph import post_order
 from language.kind import Type
 from language.model import Automaton, Balance, Formula, Mode, Region
 from language.number import rounded
@@ -244,8 +245,7 @@ def closure(mode: Mode, wanted: Iterable[str]) -> set[str]:
         name = stack.pop()
         if name not in needed:
             needed.add(name)
-            reads = (read for formula in known[name] for read in names(formula.tree))
-            stack.extend(read.path for read in reads if read.path in known)
+            stack += [r for formula in known[name] for r in formula.reads if r in known]
     return needed
 
 
@@ -271,35 +271,19 @@ def constant_names(automaton: Automaton) -> dict[str, Expr]:
 def parameter_kinds(automaton: Automaton) -> dict[str, str]:
     """Return each parameter's kind: what is derived from fixed values alone is fixed."""
     kinds: dict[str, str] = {}
-
-    def kind_of(name: str) -> str:
-        if name not in kinds:
-            parameter = automaton.parameters[name]
-            kinds[name] = parameter.kind
-            if parameter.derived:
-                reads = {kind_of(read.path) for read in names(parameter.derived.tree)}
-                kinds[name] = "fixed" if reads <= {"fixed"} else "derived"
-        return kinds[name]
-
-    for name in automaton.parameters:
-        kind_of(name)
-    return kinds
+    for name in parameter_order(automaton):
+        parameter = automaton.parameters[name]
+        kinds[name] = parameter.kind
+        if parameter.derived:
+            reads = {kinds.get(read, "derived") for read in parameter.derived.reads}
+            kinds[name] = "fixed" if reads <= {"fixed"} else "derived"
+    return {name: kinds[name] for name in automaton.parameters}
 
 
 def parameter_order(automaton: Automaton) -> list[str]:
     """Return the parameters so that each comes after those that it is derived from."""
-    done: dict[str, None] = {}
-
-    def visit(name: str) -> None:
-        parameter = automaton.parameters[name]
-        if name not in done:
-            for read in names(parameter.derived.tree) if parameter.derived else []:
-                visit(read.path)
-            done[name] = None
-
-    for name in automaton.parameters:
-        visit(name)
-    return list(done)
+    parameters = automaton.parameters.items()
+    return post_order({name: p.derived.reads if p.derived else () for name, p in parameters})
 
 
 def tunables_of(automaton: Automaton, formulas: Iterable[Formula]) -> tuple[str, ...]:
@@ -316,7 +300,7 @@ def tunables_of(automaton: Automaton, formulas: Iterable[Formula]) -> tuple[str,
         if parameter.kind == "tunable":
             found[name] = None
         if parameter.derived:
-            stack.extend(read.path for read in names(parameter.derived.tree))
+            stack.extend(parameter.derived.reads)
     return tuple(sorted(found))
 
 

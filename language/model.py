@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import cached_property
 from typing import Literal
 
 from language.kind import Kind as ValueKind, Type
@@ -27,6 +28,11 @@ class Formula:
     tree: Tree
     key: str
     whole: bool = False
+
+    @cached_property
+    def reads(self) -> tuple[str, ...]:
+        """The names that the expression reads, from left to right."""
+        return tuple(name.path for name in names(self.tree))
 
     @property
     def span(self) -> Span:

@@ -16,15 +16,15 @@ def equation_order(mode: Mode) -> list[str]:
 
     Ties are broken by the order in the file. Raises SpecError naming an algebraic loop.
     """
-    trees = {name: [f.tree for f in formulas] for name, formulas in sources(mode).items()}
-    edges = _reading(trees)
+    formulas = sources(mode)
+    edges = turned({name: [r for f in found for r in f.reads] for name, found in formulas.items()})
     found = topological(edges)
     if found is not None:
         return found
     loop = circle(edges)
     problems = Problems()
     label = f"an algebraic loop in mode `{mode.name}`: {chain(loop)}"
-    spans = {name: alternatives[0].span for name, alternatives in trees.items()}
+    spans = {name: alternatives[0].span for name, alternatives in formulas.items()}
     hint = "each reads the one before it at the same instant; one of them has to be a state"
     problems.error("loop", spans[loop[0]], label, hint + _places(loop, spans))
     raise SpecError(problems.found)

@@ -128,7 +128,7 @@ class Reader:
     def __init__(self, problems: Problems) -> None:
         """Report into `problems`."""
         self.problems = problems
-        self.parsed: dict[int, tuple[Scalar, Tree]] = {}
+        self.parsed: dict[tuple[int, str], tuple[Scalar, Formula]] = {}
 
     def table(self, node: Node | None, what: str, allowed: Iterable[str] | None = None) -> Table:
         """Return a mapping with known keys only; an empty one where the node is absent."""
@@ -227,20 +227,22 @@ class Reader:
             return UNKNOWN_UNIT
 
     def expression(self, node: Node | None, key: str, span: Span) -> Formula | None:
-        """Return an expression, or None with the problem reported."""
+        """Return an expression, or None with the problem reported.
+
+        Every text is parsed once: what stands at the root is read again in each mode.
+        """
         scalar = self.scalar(node, key.rpartition(".")[2], span)
         if scalar is None:
             return None
-        return Formula(self._parsed(scalar), key)
+        if (id(scalar), key) not in self.parsed:
+            self.parsed[id(scalar), key] = scalar, self._parse_once(scalar, key)
+        return self.parsed[id(scalar), key][1]
 
-    def _parsed(self, scalar: Scalar) -> Tree:
-        """Every text is parsed once: what stands at the root or in a template is read often."""
-        if id(scalar) not in self.parsed:
-            tree: Tree = Broken(scalar.span)
-            with self.problems.collecting():
-                tree = parse_expression(scalar)
-            self.parsed[id(scalar)] = scalar, tree
-        return self.parsed[id(scalar)][1]
+    def _parse_once(self, scalar: Scalar, key: str) -> Formula:
+        tree: Tree = Broken(scalar.span)
+        with self.problems.collecting():
+            tree = parse_expression(scalar)
+        return Formula(tree, key)
 
     def quantity(self, node: Node | None, what: str, span: Span, unit: Unit | None) -> Quantity:
         """Return a literal in SI and its unit; a bare number is in `unit` where one is given."""

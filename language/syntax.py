@@ -155,9 +155,12 @@ def names(tree: Tree) -> list[Name]:
 
 def walk(tree: Tree) -> list[Tree]:
     """Return every part of the tree, parents first, from left to right."""
-    found: list[Tree] = [tree]
-    for child in children(tree):
-        found.extend(walk(child))
+    found: list[Tree] = []
+    stack = [tree]
+    while stack:
+        part = stack.pop()
+        found.append(part)
+        stack.extend(reversed(children(part)))
     return found
 
 

@@ -6,6 +6,7 @@ import dataclasses
 from collections.abc import Iterable, Iterator, Mapping
 
 from language.functions import FUNCTIONS_OF
+from language.graph import post_order
 from language.kind import Enumeration, Whole
 from language.lower import WHOLE_TYPES, assigned, typed
 from language.model import CHART, Automaton, Region
@@ -43,7 +44,6 @@ from language.program import (
     value_type,
 )
 from language.region import fired_variable, mode_variable
-from language.syntax import names
 from language.units import Dimension
 from language.working import in_working_type
 
@@ -138,22 +138,14 @@ def enter_initial(automaton: Automaton, base: str) -> list[Assign]:
 
 def initial_ops(automaton: Automaton, known: Mapping[str, Expr], prefix: str) -> list[Op]:
     """Return the start values, each after those that it reads."""
-    done: dict[str, Op] = {}
-
-    def visit(name: str) -> None:
-        if name in done:
-            return
-        state = automaton.carried[name]
-        for read in names(state.initial.tree):
-            if read.path in automaton.carried:
-                visit(read.path)
+    ops: list[Op] = []
+    carried = automaton.carried
+    for name in post_order({name: state.initial.reads for name, state in carried.items()}):
+        state = carried[name]
         value = assigned(state.initial.tree, known, state.type in WHOLE_TYPES)
         group = "discrete" if name in automaton.discrete else "state"
-        done[name] = Assign(f"{group}.{name}", value, prefix + state.initial.key)
-
-    for name in automaton.carried:
-        visit(name)
-    return list(done.values())
+        ops.append(Assign(f"{group}.{name}", value, prefix + state.initial.key))
+    return ops
 
 
 def defaults_of(automaton: Automaton) -> dict[str, float | bool]:

@@ -197,7 +197,8 @@ class WitnessSearch:
         steps: list[tuple[str, Expr]] = []
         try:
             for op in equations(mode, known, "equation.", "", [n.path for n in names(tree)]):
-                assert isinstance(op, Assign)
+                if not isinstance(op, Assign):
+                    return None  # what a region beside sets depends on its mode
                 steps.append((op.target, op.value))
             value = expression(tree, known)
         except KeyError:

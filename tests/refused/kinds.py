@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).parent.parent.parent
 FLOORS = ("language", "engine", "codegen", "lockstep", "sweep", "diagnosis", "modewright")
+KIND = re.compile(r"[a-z]+(-[a-z]+)*")
+"""Loggers have `warning` too: their messages are no kinds."""
 REPORTERS = {"error": 0, "warning": 0, "Problem": 0}
 """What reports a problem, and which of its arguments is the kind."""
 
@@ -59,5 +62,5 @@ def _literals(node: ast.expr | None) -> Iterator[str]:
     if isinstance(node, ast.IfExp):
         yield from _literals(node.body)
         yield from _literals(node.orelse)
-    elif isinstance(node, ast.Constant) and isinstance(node.value, str):
-        yield node.value
+    elif isinstance(node, ast.Constant) and KIND.fullmatch(str(node.value)):
+        yield str(node.value)

@@ -12,6 +12,7 @@ class Check:
         self.tell("told", span)
         refuse(span, "refused")
         print("error", "no kind")
+        logger.warning("not kept: %s", span)
 
     def tell(self, kind, span):
         self.problems.error(kind, span, "label")
