@@ -9,6 +9,7 @@ from fractions import Fraction
 from typing import Protocol
 
 from engine.interpreter import Stepper
+from engine.keeping import Alarms, Records
 from engine.trajectory import Event
 from language.motion import merge_time
 from language.program import Program, TransitionInfo, short
@@ -77,6 +78,8 @@ class ContinuousRun:
         self.time = Fraction(0)
         self._log = log
         self._due: dict[str, Fraction] = {}
+        self._records = Records(program, stepper)
+        self._alarms = Alarms(program, stepper, self._due)
         self._in_step: list[TransitionInfo] = []
         self.is_settled = False
         self._modes = program.mode_variables()
@@ -87,8 +90,12 @@ class ContinuousRun:
 
     def start(self) -> None:
         """Put the states where they start; `settle` enters the initial mode (rule 16)."""
+        self._records.start()
+        self._records.age(self.time)
         self.stepper.run("init")
         self.stepper.run("equations")
+        for region, variable in self._modes.items():
+            self._alarms.enter(region, self.stepper.get(variable), self.time)
         self.is_settled = False
 
     def flow_to(self, time: Fraction, looks: Sequence[Fraction] = ()) -> None:
@@ -118,6 +125,7 @@ class ContinuousRun:
                 raise Stopped(f"{self._here()}: {_fired(fired)} fire for ever at one instant")
             for info in taken:
                 self._forget(info)
+                self._alarms.enter(info.region, info.target, self.time)
                 self._log_event(info, micro_step)
         self._in_step += fired
         self.stepper.run("watch")
@@ -172,6 +180,7 @@ class ContinuousRun:
         merge = merge_time(self.program.number, self.program.major_step, stop)
         self.stepper.set("work.merge", merge)
         start, states = self.time, self._read_states()
+        self._records.leave(start)
         self._around.aim(start, stop)
         self.stepper.run("flow")
         self._require_finite()
@@ -182,6 +191,7 @@ class ContinuousRun:
         if self._looks and self._looks[0] < self.time:
             self._look_inside(start, stop, states)
         self._around.place(self.time)
+        self._records.age(self.time)
         if self._around.is_watching:
             self.stepper.run("equations")
             self._around.watch(self.time)
@@ -197,6 +207,7 @@ class ContinuousRun:
             time = self._looks.popleft()
             self._put(states)
             self._around.aim(start, stop)
+            self._records.age(start)
             self.stepper.set("work.h", float(time - start))
             self.stepper.run("peek")
             self._look(time)
@@ -210,6 +221,7 @@ class ContinuousRun:
 
     def _look(self, time: Fraction) -> None:
         self._around.place(time)
+        self._records.age(time)
         self.stepper.run("equations")
         self._around.look(time)
 
@@ -221,6 +233,7 @@ class ContinuousRun:
         return bool(self.stepper.get(self._modes[info.region]) == info.source)
 
     def _mark_due(self) -> None:
+        self._alarms.ring(self.time)
         for info in self._timed:
             if self._is_active(info):
                 due = self._due.get(info.key)

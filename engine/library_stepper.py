@@ -70,7 +70,8 @@ class LibraryStepper:
         self._rates = self._inner.reader(tuple(f"work.rate_{name}" for name in self._names))
         self._sizes = np.full(len(names), SMALLEST_SCALE)
         self._time = 0.0
-        self._is_timed = any(v.name.startswith("work.rise_") for v in program.variables)
+        timed = ("work.rise_", "memory.age")
+        self._is_timed = any(v.name.startswith(timed) for v in program.variables)
         self._guards = {}
         for mode in program.modes:
             slots = watched(program, mode)

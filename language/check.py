@@ -166,7 +166,7 @@ class _Check:
 
     def _kept(self) -> frozenset[str]:
         """Return the functions with memory that are for every expression of a mode."""
-        return frozenset(KEPT if self.automaton.is_sampled else ())
+        return frozenset(KEPT if self.automaton.is_sampled else ("delay",))
 
     def _tables(self) -> dict[str, LookupTable]:
         declared = self.automaton.parameters.items()
@@ -324,7 +324,7 @@ class _Check:
         automaton = self.automaton
         parameters = self._scope([automaton.parameters], "in `wait`: it is a fixed time")
         constant = DimensionCheck(parameters, self.problems)
-        remembered = frozenset(MEMORY if automaton.is_sampled else ())
+        remembered = frozenset(MEMORY if automaton.is_sampled else ("delay", "after"))
         guards = dataclasses.replace(check.scope, memory=remembered)
         guard = DimensionCheck(guards, self.problems)
         for transition in mode.transitions:

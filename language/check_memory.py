@@ -6,7 +6,7 @@ from fractions import Fraction
 
 from language.constants import exact_value
 from language.lower import parameter_kinds
-from language.memory import MAX_DELAY, applications, formulas
+from language.memory import MAX_DELAY, applications, formulas, type_of
 from language.model import Automaton, Formula, Transition
 from language.problem import Problems
 from language.region import equation_names
@@ -20,6 +20,9 @@ def check_memory(automaton: Automaton, problems: Problems) -> None:
     """Report what `previous`, `delay`, `rising`, `falling` and `after` cannot do."""
     for tree in applications(automaton, KEPT).values():
         _known_in_every_mode(automaton, tree, problems)
+        if not automaton.is_sampled and type_of(automaton, tree.arguments[0]) != "real":
+            label = "a continuous automaton delays quantities: this is none"
+            problems.error("type", tree.arguments[0].span, label)
         if tree.function == "delay":
             _time(automaton, tree, tree.arguments[1], MAX_DELAY, problems)
     for tree in applications(automaton, ("after",)).values():

@@ -26,9 +26,19 @@ from language.field import (
     field_variables,
     switch,
 )
+from language.history import (
+    History,
+    alarm_names,
+    alarms_of,
+    delayed,
+    fill_block,
+    histories_of,
+    history_variables,
+    record_block,
+)
 from language.integration import method_of
 from language.linear import Point
-from language.lower import constant_names, equations, variable_names
+from language.lower import constant_names, equation_names, equations, variable_names
 from language.model import Automaton, Mode, Transition
 from language.motion import FLOW_HALVINGS, motion_blocks, motion_variables
 from language.operation import (
@@ -37,6 +47,7 @@ from language.operation import (
     Block,
     Choose,
     Expr,
+    Loop,
     Ref,
     Run,
     add,
@@ -62,7 +73,7 @@ from language.wiring import (
 
 BETWEEN = ("work.h", "work.merge", "work.elapsed", "work.crossed")
 """What an engine sets before `flow` and reads after it."""
-ENTRIES = ("init", "derive", "equations", "watch", "jump", "flow", "peek")
+ENTRIES = ("init", "derive", "equations", "watch", "jump", "flow", "peek", "record")
 
 
 def continuous_program(
@@ -81,8 +92,18 @@ def continuous_program(
         **variables_known,
         **in_modes(automaton, "memory.mode"),
     }
+    histories = histories_of(automaton)
+    known.update(delayed(automaton, histories))
     moving = {**inputs, **{name: _parabola(name) for name in varying}}
-    field = Field(automaton, known, moving, "memory.mode", f"{automaton.name} ", bool(varying))
+    field = Field(
+        automaton,
+        known,
+        moving,
+        "memory.mode",
+        f"{automaton.name} ",
+        bool(varying or histories),
+        alarm_names(automaton),
+    )
     flows = field_blocks(field)
     point = Point(automaton, values_of(parameters), {})
     method, info = method_of(
@@ -102,13 +123,16 @@ def continuous_program(
         blocks[f"jump_{mode.name}"] = _jump(field, mode, transitions, selection)
     if automaton.regions:
         blocks.update(parallel_blocks(field, selection))
-    blocks.update(_entries(automaton, field, known))
+    blocks.update(_entries(automaton, field, known, histories))
     problems.stop_if_any()
     constants = (*parameters.values(), *method.constants)
     variables = [*_variables(automaton, field), *motion_variables(field, method)]
     variables += [Variable(name, "real") for name in _courses(varying)]
+    variables += history_variables(histories)
+    alarms = alarms_of(automaton)
+    variables += [Variable(alarm.variable, "truth") for alarm in alarms]
     program = assembled(automaton, blocks, constants, variables, transitions)
-    program = dataclasses.replace(program, motion=info)
+    program = dataclasses.replace(program, motion=info, alarms=alarms)
     return finished(program, ENTRIES, keep=(*BETWEEN, *_courses(varying)))
 
 
@@ -165,9 +189,18 @@ def _jump(
     return (guards, *switch(field, mode, enabled, fired))
 
 
-def _entries(automaton: Automaton, field: Field, known: dict[str, Expr]) -> dict[str, Block]:
+def _entries(
+    automaton: Automaton, field: Field, known: dict[str, Expr], histories: tuple[History, ...]
+) -> dict[str, Block]:
     now = (*at_state(field), *at_time(field, real(0.0)))
     ends = [Assign(f"state.{name}", Ref(f"work.end_{name}")) for name in field.states]
+    at_start = at_time(field, real(0.0))
+    evaluate: Block = (*at_start, by_mode(field, "equations"))
+    whole_known = {**known, **equation_names(automaton.all_modes, "equation.")}
+    # A delayed quantity may read another one: each round fills one more from what is inside it.
+    rounds = (*evaluate, *fill_block(histories, whole_known))
+    fill: Block = (Loop(len(histories), "work.round", rounds),) if histories else ()
+    record = {"record": (*evaluate, *record_block(histories, whole_known))} if histories else {}
     watch = tuple((mode.number, _watch(mode)) for mode in automaton.modes.values())
     return {
         "derive": derive_block(automaton),
@@ -175,8 +208,10 @@ def _entries(automaton: Automaton, field: Field, known: dict[str, Expr]) -> dict
             *initial_ops(automaton, known, field.prefix),
             *enter_initial(automaton, "memory.mode"),
             *entered(field, automaton.modes[automaton.initial]),
+            *fill,
         ),
-        "equations": (by_mode(field, "equations"),),
+        "equations": evaluate,
+        **record,
         "watch": (*now, Choose("memory.mode", watch)),
         "jump": (*none_fired(automaton), *now, by_mode(field, "jump")),
         "flow": (by_mode(field, "move"),),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -50,7 +51,8 @@ class Field:
     """A continuous automaton where it moves: on its own, or as a run inside a tick.
 
     `inputs` are what its inputs read; `mode` is the variable that holds its mode; `timed` says
-    whether an input changes with `work.s`, the time since the start of the step.
+    whether something changes with `work.s`, the time since the start of the step; `remembered` is
+    what the guards of a mode (by its key) remember.
     """
 
     automaton: Automaton
@@ -59,6 +61,7 @@ class Field:
     mode: str
     prefix: str
     timed: bool = False
+    remembered: Mapping[str, Names] = dataclasses.field(default_factory=dict)
 
     @property
     def states(self) -> tuple[str, ...]:
@@ -239,7 +242,7 @@ def _guards(field: Field, mode: Mode) -> Block:
 
 def _own_guards(field: Field, mode: Mode, count: int) -> list[Op]:
     """Return what sets the guards of a mode, and those up to `count` to false."""
-    known = all_known_at(field)
+    known = {**all_known_at(field), **field.remembered.get(mode.key, {})}
     ops: list[Op] = []
     for k, transition in enumerate(mode.transitions):
         guard = expression(transition.when.tree, known)

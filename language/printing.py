@@ -112,6 +112,8 @@ def _program_lines(program: Program) -> Iterator[str]:
     for t in program.transitions:
         wait = f" wait {t.wait} s = {t.ticks} ticks" if t.wait else ""
         yield f"transition {t.number} {t.name}: {t.source} -> {t.target}{wait}"
+    for alarm in program.alarms:
+        yield f"alarm {alarm.variable}: {alarm.time} s in {alarm.region} mode {alarm.mode}"
     for bit, fault in enumerate(program.faults):
         yield f"fault {bit} {fault}"
     for constant in program.constants:

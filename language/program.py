@@ -109,6 +109,16 @@ class TransitionInfo:
 
 
 @dataclass(frozen=True)
+class Alarm:
+    """A time [s] after the entry of a mode at which a variable becomes true (rule 8)."""
+
+    variable: str
+    region: str
+    mode: int
+    time: Fraction
+
+
+@dataclass(frozen=True)
 class Function:
     """An elementary function as operations: parameters `work.x` ..., result in `work.y`."""
 
@@ -194,6 +204,7 @@ class Program:
     motion: MotionInfo | None = None
     defaults: Mapping[str, float | bool] = field(default_factory=dict)
     regions: tuple[RegionInfo, ...] = ()
+    alarms: tuple[Alarm, ...] = ()
 
     @property
     def inputs(self) -> tuple[Variable, ...]:
