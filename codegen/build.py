@@ -14,10 +14,10 @@ from pathlib import Path
 
 from codegen.cache import key_of, stored
 from codegen.expression import literal
-from codegen.names import REAL, CNames, c_type
+from codegen.names import REAL, CNames, c_member, c_type
 from codegen.source import c_files, render
 from language.missing import ToolMissing as ToolMissing
-from language.program import Program, Variable
+from language.program import Constant, Program, Variable
 
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-fast-math", "-fno-math-errno")
 WARNINGS = [
@@ -52,9 +52,9 @@ class Observed:
     kind: str
 
 
-def compiler() -> list[str]:
-    """Return the C compiler: `CC` if it is set, else cc, gcc or clang. Raises ToolMissing."""
-    wanted = shlex.split(os.environ.get("CC", ""))
+def compiler(named: str | None = None) -> list[str]:
+    """Return the C compiler: the one named, else `CC`, else cc, gcc, clang. Raises ToolMissing."""
+    wanted = shlex.split(named or os.environ.get("CC", ""))
     for candidate in [wanted] if wanted else [["cc"], ["gcc"], ["clang"]]:
         if shutil.which(candidate[0]):
             return candidate
@@ -62,9 +62,14 @@ def compiler() -> list[str]:
     raise ToolMissing(f"the C compiler `{name}` is missing: apt-get install gcc libc6-dev")
 
 
-def compiler_version() -> str:
+def optimised(level: str) -> tuple[str, ...]:
+    """Return the flags with another level of optimisation, like `O3`."""
+    return tuple(f"-{level}" if flag == "-O2" else flag for flag in FLAGS)
+
+
+def compiler_version(named: str | None = None) -> str:
     """Return where the compiler is and the first line that it says of itself. Raises BuildError."""
-    command = compiler()
+    command = compiler(named)
     try:
         done = subprocess.run(
             [*command, "--version"], capture_output=True, text=True, timeout=SECONDS, check=False
@@ -97,6 +102,11 @@ def fed(program: Program) -> tuple[Variable, ...]:
     )
 
 
+def tunable(program: Program) -> tuple[Constant, ...]:
+    """Return the parameters of a calibration page, in the order of its members."""
+    return tuple(constant for constant in program.constants if constant.kind == "tunable")
+
+
 def write_harness(program: Program, folder: Path) -> list[Path]:
     """Write the C files of a program and a main around them; return the sources to compile."""
     files = c_files(program)
@@ -106,9 +116,14 @@ def write_harness(program: Program, folder: Path) -> list[Path]:
     return [folder / name for name in files if name.endswith(".c")]
 
 
-def compile_program(sources: Sequence[Path], target: Path, flags: Sequence[str] = FLAGS) -> None:
+def compile_program(
+    sources: Sequence[Path],
+    target: Path,
+    flags: Sequence[str] = FLAGS,
+    named: str | None = None,
+) -> None:
     """Compile sources into an executable. Raises ToolMissing, BuildError."""
-    command = [*compiler(), *flags, *WARNINGS, *map(str, sources)]
+    command = [*compiler(named), *flags, *WARNINGS, *map(str, sources)]
     try:
         done = subprocess.run(
             [*command, "-lm", "-o", str(target)], capture_output=True, text=True, timeout=SECONDS
@@ -120,13 +135,15 @@ def compile_program(sources: Sequence[Path], target: Path, flags: Sequence[str] 
 
 
 @contextmanager
-def executable(program: Program, flags: Sequence[str] = FLAGS) -> Iterator[Path]:
+def executable(
+    program: Program, flags: Sequence[str] = FLAGS, named: str | None = None
+) -> Iterator[Path]:
     """Give the compiled harness of a program, kept from an earlier run if there was one."""
     with tempfile.TemporaryDirectory(prefix="modewright-") as name:
         folder = Path(name)
         sources = write_harness(program, folder)
-        key = key_of(sources, [*compiler(), *flags, *WARNINGS], compiler_version())
-        yield stored(key, lambda target: compile_program(sources, target, flags), folder)
+        key = key_of(sources, [*compiler(named), *flags, *WARNINGS], compiler_version(named))
+        yield stored(key, lambda target: compile_program(sources, target, flags, named), folder)
 
 
 def run_executable(target: Path, records: bytes) -> bytes:
@@ -160,13 +177,12 @@ def _harness(program: Program) -> Mapping[str, object]:
         }
         for o in observed(program)
     ]
-    width = max(1, len(inputs))
     return {
         "name": program.name,
         "whole": ("uint8_t", "int32_t"),
         "inputs": inputs,
         "fields": fields,
-        "width": width,
+        "page": [c_member(constant.name) for constant in tunable(program)],
         "real": real,
         "zero": literal(0.0, program.number),
     }

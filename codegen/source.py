@@ -165,6 +165,7 @@ def _context(program: Program) -> dict[str, Any]:
         "work": [_field(variable, number) for variable in shared],
         "blocks": [block for block in blocks if block["name"] not in ENTRIES],
         "entries": {block["name"]: block for block in blocks if block["name"] in ENTRIES},
+        "has_stamps": "compare_stamps" in program.blocks,
         "uses_math": bool(called & {*FUNCTIONS_OF[number], *INLINE}),
         "uses_libm": bool(called & {"abs", "sqrt", "floor"}),
     }

@@ -69,7 +69,8 @@ class Schedule:
                     at.append(Grid(own.start - line.delay, own.period))
                 elif reader not in self.ticks and ticking is not None:
                     self._arrivals.append(Grid(ticking.start + line.delay, ticking.period))
-        self._events = sorted(set(_events(system, scenario.inputs)))
+        pages = {page.time for page in scenario.pages}
+        self._events = sorted(pages.union(_events(system, scenario.inputs)))
         self._require_bounded(scenario)
 
     @property

@@ -10,6 +10,7 @@ from typing import Any
 
 from engine.continuous import ContinuousRun, Stopped
 from engine.interpreter import Interpreter, Stepper
+from engine.page import calibrate
 from engine.rows import Rows, recorded
 from engine.schedule import Schedule
 from engine.signals import Signals
@@ -137,6 +138,7 @@ class _Simulation:
     def _instant(self, time: Fraction) -> None:
         """Flow has ended: inputs take their new values, then jumps, then ticks in their order."""
         self.signals.read_inputs(time)
+        self._turn_pages(time)
         for name in self.flows:
             if time > 0 or not self._is_controlled(name):
                 self._update_flow(name, time)
@@ -152,6 +154,15 @@ class _Simulation:
             self._update_flow(name, time)
         for name in self.schedule.captured(time):
             self._capture(name, time)
+
+    def _turn_pages(self, time: Fraction) -> None:
+        """A change of the calibration is an event: what follows from it is derived anew."""
+        for page in self.scenario.pages:
+            if page.time == time:
+                for name, program in self.programs.items():
+                    values = {p: v for (owner, p), v in page.values.items() if owner == name}
+                    if calibrate(self.steppers[name], program, values) and name in self.flows:
+                        self.flows[name].is_settled = False
 
     def _sample(self, name: str, time: Fraction) -> None:
         run = self.signals.sensors[name]

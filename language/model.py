@@ -409,6 +409,14 @@ class System:
 
 
 @dataclass(frozen=True)
+class Page:
+    """A calibration from a time on: values [SI] of tunable parameters by instance and name."""
+
+    time: Fraction
+    values: Mapping[tuple[str, str], Fraction]
+
+
+@dataclass(frozen=True)
 class Scenario:
     """Inputs, initial values, horizon of a system and what is recorded of it.
 
@@ -426,6 +434,7 @@ class Scenario:
     seed: int = 0
     signals: tuple[str, ...] = ()
     recording: RecordingUse | None = None
+    pages: tuple[Page, ...] = ()
 
 
 @dataclass(frozen=True)

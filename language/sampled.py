@@ -56,6 +56,8 @@ from language.wiring import (
 )
 
 STALE_CALIBRATION = "stale_calibration"
+STAMPS = "compare_stamps"
+"""Run before the first tick and after each change of the calibration."""
 
 
 def sampled_program(automaton: Automaton, problems: Problems) -> Program:
@@ -127,7 +129,7 @@ class _Sampled:
             observers=tuple(observer.info for observer in self.observers.values()),
             motion=self.motion,
         )
-        return finished(program, entries=("init", "derive", "step"))
+        return finished(program, entries=("init", "derive", STAMPS, "step"))
 
     def _phases(self, mode: Mode) -> dict[str, Block]:
         """Equations, jump and update of one mode."""
@@ -144,13 +146,14 @@ class _Sampled:
 
     def _entries(self) -> dict[str, Block]:
         """What is run from outside, and what these run whatever the mode."""
-        inputs = self.automaton.inputs
-        return {
+        inputs, stamps = self.automaton.inputs, self._stamps()
+        found: dict[str, Block] = {STAMPS: stamps} if stamps else {}
+        return found | {
             "remember": tuple(Assign(f"before.{n}", Ref(f"input.{n}")) for n in inputs),
             "keep": keep_block(self.automaton, self.delays, self.all),
             "start": self._start(),
             "derive": derive_block(self.automaton),
-            "init": self._init(),
+            "init": self._init(stamps),
             "step": self._step(),
         }
 
@@ -219,13 +222,18 @@ class _Sampled:
             ops.append(Run(f"correct_{initial.name}"))
         return tuple(ops)
 
-    def _init(self) -> Block:
-        """Before the first tick: nothing has started; solved numbers must fit the calibration."""
+    def _init(self, stamps: Block) -> Block:
+        """Before the first tick: nothing has started."""
         ops: list[Op] = [
             Assign("memory.started", Value(False)),
             *enter_initial(self.automaton, "memory.mode"),
             Assign("memory.faults", whole(0)),
         ]
+        return (*ops, Run(STAMPS)) if stamps else tuple(ops)
+
+    def _stamps(self) -> Block:
+        """Solved numbers must fit the calibration: before the first tick, and after a change."""
+        ops: list[Op] = []
         stamped = {name for constant in self.constants for name in constant.depends_on}
         for name in sorted(stamped):
             if STALE_CALIBRATION not in self.faults:

@@ -10,6 +10,7 @@ from language.document import Document, Scalar, Table
 from language.literal import constant
 from language.map import MAP_KEYS, column_dimension, map_of
 from language.model import RecordingMap, Scenario, System
+from language.page import read_pages
 from language.problem import Problems, Span, nearest
 from language.project import Project, expanded, read_document
 from language.signal import Piece, RecordingUse, Stimulus
@@ -18,7 +19,7 @@ from language.syntax import Application, Name, Tree
 from language.units import Dimension, Unit, fits
 
 SCENARIO_KEYS = tuple(
-    "language scenario of horizon seed initial inputs recording record".split()  # noqa: SIM905
+    "language scenario of horizon seed initial inputs pages recording record".split()  # noqa: SIM905
 )
 RECORDING_KEYS = ("file", "map", *(key for key in MAP_KEYS if key not in ("language", "map")))
 MAX_HORIZON = Fraction(86400)
@@ -66,6 +67,7 @@ class _ScenarioReader(StimulusReader):
             seed=self.whole(tree.get("seed"), "seed", 0, 0, LARGEST_SEED),
             signals=self._signals(self.items(record.get("signals"), "signals")),
             recording=recording,
+            pages=read_pages(tree.get("pages"), self.system, self.problems),
         )
 
     def _horizon(self, tree: Table, at: Span) -> Fraction | None:

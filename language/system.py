@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from fractions import Fraction
 
@@ -10,6 +11,7 @@ from language.document import Document, Entry, Scalar
 from language.graph import chain, circle, topological
 from language.load import automaton_of
 from language.model import Automaton, Connection, Instance, System, SystemInput
+from language.number import NumberType
 from language.problem import Problems, Span, nearest
 from language.project import Project, expanded, read_document
 from language.reader import Reader
@@ -43,6 +45,17 @@ def read_system(document: Document, project: Project, overrides: Overrides | Non
     system = _SystemReader(problems, project, dict(overrides or {})).read(document)
     problems.stop_if_any()
     return system
+
+
+def in_numbers(system: System, numbers: NumberType) -> System:
+    """Return the system with another number type in every instance."""
+    instances = {
+        name: dataclasses.replace(
+            instance, automaton=dataclasses.replace(instance.automaton, numbers=numbers)
+        )
+        for name, instance in system.instances.items()
+    }
+    return dataclasses.replace(system, instances=instances)
 
 
 def around(automaton: Automaton) -> System:

@@ -10,7 +10,7 @@ import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from codegen.build import FLAGS, executable, fed, observed, run_executable
+from codegen.build import FLAGS, executable, fed, observed, run_executable, tunable
 from engine.interpreter import Stepper
 from language.number import NumberType, decimal
 from language.program import Program, short
@@ -72,15 +72,23 @@ class Tape:
         self._names = tuple(item.name for item in self._observed)
         real = FORMAT[self.program.number]
         kinds = [real if item.kind == "real" else "q" for item in self._observed]
-        self._input = struct.Struct(f"<{max(1, len(self._fed))}{real}")
+        self._input = struct.Struct(f"<{len(self._fed) + 1}{real}")
+        self._tunable = tuple(constant.name for constant in tunable(self.program))
+        self._page = [constant.value for constant in tunable(self.program)]
+        self._page_record = struct.Struct(f"<{len(self._page)}{real}")
         self._value = struct.Struct(f"<{''.join(kinds)}")
         ends = [0, *itertools.accumulate(struct.calcsize(f"<{kind}") for kind in kinds)]
         self._places = [slice(*ends[k : k + 2]) for k in range(len(kinds))]
 
     def record(self, stepper: Stepper) -> None:
-        """Keep the inputs and values of the tick that was just done."""
-        inputs = [float(stepper.get(name)) for name in self._fed] or [0.0]
-        self.inputs.append(self._input.pack(*inputs))
+        """Keep the inputs, a new calibration and the values of the tick that was just done."""
+        inputs = [float(stepper.get(name)) for name in self._fed]
+        page = [stepper.get(name) for name in self._tunable]
+        record = self._input.pack(*inputs, float(page != self._page))
+        if page != self._page:
+            record += self._page_record.pack(*page)
+            self._page = page
+        self.inputs.append(record)
         self.values.append(self._value.pack(*[stepper.get(n) for n in self._names]))
         self.transitions += stepper.get("memory.fired") != 0
 
@@ -103,12 +111,12 @@ class Tape:
         return self._value.size
 
 
-def compare(tape: Tape, flags: Sequence[str] = FLAGS) -> Verdict:
+def compare(tape: Tape, flags: Sequence[str] = FLAGS, compiler: str | None = None) -> Verdict:
     """Compile the tape's program, run it on the tape's inputs and compare every value.
 
     Raises ToolMissing, BuildError.
     """
-    with executable(tape.program, flags) as target:
+    with executable(tape.program, flags, compiler) as target:
         output = run_executable(target, b"".join(tape.inputs))
     size, ticks = tape.size, len(tape.values)
     differing, first = 0, None

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import dataclasses
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from codegen.build import optimised
 from codegen.source import c_files
 from engine.recording import Recording, read_recording
 from engine.replay import Replay, replay as replay_recording, used_columns
@@ -16,11 +18,13 @@ from language.document import Scalar
 from language.load import automaton_of, command_line_value, program_of
 from language.map import read_map
 from language.model import Automaton, RecordingMap, Scenario, System
+from language.number import NumberType
+from language.page import pages_of
 from language.problem import Problems, SpecError
 from language.program import Program
 from language.project import Project, layered, read_document
 from language.scenario import read_scenario
-from language.system import read_system
+from language.system import in_numbers, read_system
 from lockstep.compare import Tape, Verdict, compare
 from modewright.checking import check as check
 
@@ -109,13 +113,28 @@ def generate(
 
 
 def lockstep(
-    system: str, scenario: str, values: Values | None = None, root: Path | None = None
+    system: str,
+    scenario: str,
+    values: Values | None = None,
+    root: Path | None = None,
+    *,
+    numbers: NumberType | None = None,
+    changes: Sequence[str] = (),
+    compiler: str | None = None,
+    optimise: str = "O2",
 ) -> tuple[Trajectory, list[Verdict]]:
     """Simulate, then run the C of every sampled instance on the same inputs and compare bits.
 
+    `numbers` replaces the number type of every instance; `changes` are pages of the calibration
+    like `1.5 s: k_hs = 6000 N*m/rad`, in place of those of the scenario.
     Raises SpecError, ToolMissing.
     """
     loaded = load(system, scenario, values, root)
+    if numbers:
+        loaded = Loaded(in_numbers(loaded.system, numbers), loaded.scenario)
+    if changes:
+        pages = pages_of(changes, loaded.system)
+        loaded = Loaded(loaded.system, dataclasses.replace(loaded.scenario, pages=pages))
     tapes: dict[str, Tape] = {}
 
     def ticked(name: str, used: Program, stepper: object) -> None:
@@ -125,7 +144,8 @@ def lockstep(
         tapes[name].record(stepper)  # type: ignore[arg-type]
 
     trajectory = simulate_system(loaded.system, loaded.scenario, ticked=ticked)
-    return trajectory, [compare(tape) for tape in tapes.values()]
+    flags = optimised(optimise)
+    return trajectory, [compare(tape, flags, compiler) for tape in tapes.values()]
 
 
 def replay(

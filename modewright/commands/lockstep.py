@@ -2,20 +2,54 @@
 
 from __future__ import annotations
 
+from typing import Annotated, Literal
+
+import typer
+
 from modewright.commands.options import Json, Scenario, Sets, System, stop_where, values_of
 from modewright.console import console, working
 
+Numbers = Annotated[
+    Literal["float64", "float32"] | None,
+    typer.Option(help="compute in this type, whatever the automata say"),
+]
+Changes = Annotated[
+    list[str] | None,
+    typer.Option("--change", help="a tunable from a time on: '1.5 s: k_hs = 6000 N*m/rad'"),
+]
+Compiler = Annotated[str | None, typer.Option(help="a C compiler, like gcc or clang; default CC")]
+Optimise = Annotated[
+    Literal["O0", "O1", "O2", "O3", "Os"], typer.Option(help="level of the C compiler")
+]
 
-def lockstep(system: System, scenario: Scenario, sets: Sets = None, as_json: Json = False) -> None:
+
+def lockstep(
+    system: System,
+    scenario: Scenario,
+    sets: Sets = None,
+    numbers: Numbers = None,
+    changes: Changes = None,
+    compiler: Compiler = None,
+    optimise: Optimise = "O2",
+    as_json: Json = False,
+) -> None:
     """Compare engine and compiled C, tick by tick and bit by bit.
 
     \b
-    modewright lockstep ev_driveline -s tip_out
+    modewright lockstep ev_driveline -s tip_out --numbers float32 --optimise O3
     """
     from modewright import api, show
 
     with working(f"simulating {system}, {scenario}, and running its C"):
-        trajectory, verdicts = api.lockstep(system, scenario, values_of(sets))
+        trajectory, verdicts = api.lockstep(
+            system,
+            scenario,
+            values_of(sets),
+            numbers=numbers,
+            changes=changes or (),
+            compiler=compiler,
+            optimise=optimise,
+        )
     if as_json:
         found = {"lockstep": [show.verdict_json(verdict) for verdict in verdicts]}
         show.print_json({**show.trajectory_json(trajectory), **found})

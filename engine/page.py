@@ -1,0 +1,26 @@
+"""Page: a change of the calibration of one running Program."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from fractions import Fraction
+
+from engine.interpreter import Stepper
+from language.number import rounded
+from language.program import Program
+
+AFTER = ("derive", "compare_stamps")
+"""What runs after a change, as `X_Calibrate` does in C."""
+
+
+def calibrate(stepper: Stepper, program: Program, values: Mapping[str, Fraction]) -> bool:
+    """Set tunable parameters, derive what follows, compare stamps; tell whether one is used."""
+    used = {f"calibration.{name}": value for name, value in values.items()}
+    known = {constant.name for constant in program.constants}
+    used = {name: value for name, value in used.items() if name in known}
+    for name, value in used.items():
+        stepper.set(name, rounded(value, program.number))
+    for block in AFTER if used else ():
+        if block in program.blocks:
+            stepper.run(block)
+    return bool(used)
