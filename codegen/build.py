@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from codegen.cache import key_of, stored
-from codegen.expression import literal
 from codegen.names import REAL, CNames, c_member, c_type
 from codegen.source import c_files, render
 from language.missing import ToolMissing as ToolMissing
@@ -179,10 +178,9 @@ def _harness(program: Program) -> Mapping[str, object]:
     ]
     return {
         "name": program.name,
-        "whole": ("uint8_t", "int32_t"),
+        "cast": ("uint8_t", "int32_t", "float"),
         "inputs": inputs,
         "fields": fields,
         "page": [c_member(constant.name) for constant in tunable(program)],
         "real": real,
-        "zero": literal(0.0, program.number),
     }

@@ -72,10 +72,10 @@ class Tape:
         self._names = tuple(item.name for item in self._observed)
         real = FORMAT[self.program.number]
         kinds = [real if item.kind == "real" else "q" for item in self._observed]
-        self._input = struct.Struct(f"<{len(self._fed) + 1}{real}")
+        self._input = struct.Struct(f"<{len(self._fed) + 1}d")
         self._tunable = tuple(constant.name for constant in tunable(self.program))
         self._page = [constant.value for constant in tunable(self.program)]
-        self._page_record = struct.Struct(f"<{len(self._page)}{real}")
+        self._page_record = struct.Struct(f"<{len(self._page)}d")
         self._value = struct.Struct(f"<{''.join(kinds)}")
         ends = [0, *itertools.accumulate(struct.calcsize(f"<{kind}") for kind in kinds)]
         self._places = [slice(*ends[k : k + 2]) for k in range(len(kinds))]

@@ -26,9 +26,11 @@ def compiled(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
     made: list[Path] = []
     original = build.compile_program
 
-    def counting(sources: list[Path], target: Path, flags: tuple[str, ...] = FLAGS) -> None:
+    def counting(
+        sources: list[Path], target: Path, flags: tuple[str, ...], named: str | None
+    ) -> None:
         made.append(target)
-        original(sources, target, flags)
+        original(sources, target, flags, named)
 
     monkeypatch.setattr(build, "compile_program", counting)
     return made
