@@ -102,8 +102,12 @@ def fed(program: Program) -> tuple[Variable, ...]:
 
 
 def tunable(program: Program) -> tuple[Constant, ...]:
-    """Return the parameters of a calibration page, in the order of its members."""
-    return tuple(constant for constant in program.constants if constant.kind == "tunable")
+    """Return the parameters that a calibration page may change, in the order of its members."""
+    return tuple(
+        constant
+        for constant in program.constants
+        if constant.kind == "tunable" and constant.type == "real" and not constant.items
+    )
 
 
 def write_harness(program: Program, folder: Path) -> list[Path]:

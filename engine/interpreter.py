@@ -43,7 +43,7 @@ class Interpreter:
         ]
         self._frame += [self._constant(constant) for constant in program.constants]
         self._real = [v.type == "real" for v in program.variables]
-        self._real += [True] * len(program.constants)
+        self._real += [constant.type == "real" for constant in program.constants]
         compiler = Compiler(program, self._slots)
         self._blocks = compiler.blocks
         for entry in ("derive", "init"):

@@ -45,7 +45,7 @@ class _PageReader(StimulusReader):
         super().__init__(problems)
         self.system = system
         self.tunable: dict[str, dict[str, Parameter]] = {
-            name: {p.name: p for p in instance.automaton.parameters.values() if p.kind == "tunable"}
+            name: {p.name: p for p in instance.automaton.parameters.values() if _may_change(p)}
             for name, instance in system.instances.items()
         }
 
@@ -80,3 +80,8 @@ class _PageReader(StimulusReader):
             label = f"the value of `{parameter.name}` is outside its range"
             self.problems.error("range", place, label)
         return value
+
+
+def _may_change(parameter: Parameter) -> bool:
+    """Tables, whole numbers and words stay as they are while a system runs."""
+    return parameter.kind == "tunable" and parameter.type == "real" and parameter.table is None

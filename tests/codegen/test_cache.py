@@ -53,7 +53,7 @@ def test_other_flags_another_compiler_and_another_program_are_compiled(
     for flags in (FLAGS, (*FLAGS, "-O1")):
         with executable(heater(), flags):
             pass
-    monkeypatch.setattr(build, "compiler_version", lambda: "another")
+    monkeypatch.setattr(build, "compiler_version", lambda named: "another")
     with executable(heater()):
         pass
     assert len(compiled) == len(programs(folder)) == 3

@@ -108,6 +108,11 @@ void heater_Init(heater_Self *self, const heater_Cal *cal)
     self->faults = 0U;
 }
 
+void heater_Calibrate(heater_Self *self, const heater_Cal *cal)
+{
+    heater_Derive(cal, &self->derived);
+}
+
 void heater_Step(heater_Self *self, const heater_Cal *cal, const heater_In *in,
     heater_Out *out)
 {

@@ -60,8 +60,11 @@ typedef struct {
 /* Default values of the tunable parameters */
 extern const heater_Cal heater_default_cal;
 
-/* Before the first step and after a change of the calibration page, respectively */
+/* Before the first step */
 void heater_Init(heater_Self *self, const heater_Cal *cal);
+
+/* After a change of the calibration page: X_Derive, and a fault if solved numbers do not fit it */
+void heater_Calibrate(heater_Self *self, const heater_Cal *cal);
 void heater_Derive(const heater_Cal *cal, heater_Derived *derived);
 
 /* One tick of 1/10 s */
