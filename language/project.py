@@ -1,135 +1,35 @@
-"""Project: where specs are found by name, and how a document is read with what it extends."""
+"""Project: a document with what it extends: variants, effects and calibrations laid over a base."""
 
 from __future__ import annotations
 
 import dataclasses
-import os
-import re
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
-from functools import cached_property
-from importlib import resources
-from pathlib import Path
+from collections.abc import Sequence
 
-from language.document import Document, Entry, Scalar, Table, read_text
+from language.calibration import Calibration, calibrated, read_calibration, report_unknown
+from language.document import Document, Entry, Items, Scalar, Table
 from language.effect import read_laying
+from language.finding import Project, document_of, read_document, shown
 from language.laying import lay_effect
 from language.overlay import lay, without
-from language.problem import Problems, Source, Span, SpecError, nearest
-from language.tree import entries
-from language.yaml_tree import parse
+from language.problem import Problems, Source, Span, SpecError
+from language.reader import Reader
+from language.tree import entries, put
 
-KINDS = ("automaton", "system", "scenario", "map", "variant", "effect")
-LATER_KINDS = ("study", "test", "calibration")
-HEAD = re.compile(rf"^({'|'.join(KINDS + LATER_KINDS)}):\s*([^\s#]+)", re.MULTILINE)
-VERSION = "1"
+__all__ = [
+    "Project",
+    "document_of",
+    "expanded",
+    "layered",
+    "lineage",
+    "read_document",
+    "shown",
+    "with_calibrations",
+]
+
+LAYER_KEYS = ("effects", "calibrations")
+"""What a layer asks for beside its body: effects first, then calibrations."""
 MAX_LAYERS = 20
 """Most variants laid over each other."""
-
-
-@dataclass(frozen=True)
-class Project:
-    """A folder whose `spec/` is searched first, before the specs that are shipped."""
-
-    root: Path
-    files: list[Path] = field(default_factory=list, repr=False)
-
-    @cached_property
-    def index(self) -> dict[str, list[Path]]:
-        """Files by the name of what they hold, those of the project first.
-
-        An effect is called like physics; what else has its name goes before it.
-        """
-        return {**self.effects, **self._named(lambda kind: kind != "effect")}
-
-    @cached_property
-    def effects(self) -> dict[str, list[Path]]:
-        """Files of effects by name, those of the project first."""
-        return self._named(lambda kind: kind == "effect")
-
-    def _named(self, wanted: Callable[[str], bool]) -> dict[str, list[Path]]:
-        own: dict[str, list[Path]] = {}
-        for path in _yaml_files(self.root / "spec"):
-            for kind, name in _heads_in(path):
-                if wanted(kind):
-                    own.setdefault(name, []).append(path)
-        shipped = Path(str(resources.files("spec")))
-        if shipped.resolve() != (self.root / "spec").resolve():
-            for path in _yaml_files(shipped):
-                for kind, name in _heads_in(path):
-                    if wanted(kind):
-                        own.setdefault(name, [path])
-        return own
-
-    def effect(self, name: str, span: Span) -> Document:
-        """Return the document of an effect. Raises SpecError."""
-        return read_document(self._one_of(self.effects, name, span, "effect"))
-
-    def path_of(self, reference: str, span: Span | None = None) -> Path:
-        """Return the file of a name or path. Raises SpecError for none or several."""
-        if reference.endswith((".yaml", ".yml")) or os.sep in reference:
-            base = Path(span.source.name).parent if span else Path()
-            beside = base / reference
-            return beside if beside.exists() else Path(reference)
-        place = span or Span(Source("command line", (reference,)), 1, 1, len(reference))
-        return self._one_of(self.index, reference, place, "spec")
-
-    def _one_of(
-        self, index: Mapping[str, list[Path]], reference: str, place: Span, what: str
-    ) -> Path:
-        found = index.get(reference, [])
-        if len(found) == 1:
-            return found[0]
-        problems = Problems()
-        if found:
-            files = ", ".join(shown(path) for path in found)
-            problems.error("name", place, f"`{reference}` is defined twice", f"in {files}")
-        else:
-            hint = nearest(reference, index)
-            if what == "spec":
-                hint = nearest(reference, index) or "a name of a spec below spec/, or a path"
-            problems.error("name", place, f"there is no {what} named `{reference}`", hint)
-        raise SpecError(problems.found)
-
-
-def shown(path: Path) -> str:
-    """Return a path as it is shown: relative to the working directory where that is shorter."""
-    try:
-        relative = os.path.relpath(path)
-    except ValueError:
-        return str(path)
-    return relative if not relative.startswith("..") else str(path)
-
-
-def read_document(path: Path) -> Document:
-    """Read one file and its head. Raises SpecError."""
-    source, text = read_text(path, shown(path))
-    return document_of(source, text)
-
-
-def document_of(source: Source, text: str) -> Document:
-    """Return the document of a text: `language: 1`, then one kind and its name."""
-    root = parse(source, text)
-    problems = Problems()
-    _check_version(root, problems)
-    heads = [entry for entry in root if entry.key in KINDS + LATER_KINDS]
-    if not heads:
-        first = next(iter(root), None)
-        span = first.span if first else root.span
-        label = "the file does not say what it holds"
-        problems.error("form", span, label, f"one of the keys {', '.join(KINDS)} with a name")
-    elif len(heads) > 1:
-        label = f"one file holds one thing: `{heads[0].key}` is given too"
-        problems.error("form", heads[1].span, label)
-    elif heads[0].key in LATER_KINDS:
-        label = f"`{heads[0].key}` files are not read by this version"
-        problems.error("form", heads[0].span, label)
-    elif not isinstance(heads[0].node, Scalar):
-        problems.error("form", heads[0].span, f"`{heads[0].key}` is followed by a name")
-    problems.stop_if_any()
-    head = heads[0]
-    assert isinstance(head.node, Scalar)
-    return Document(head.key, head.node.text, head.node.span, root, source)
 
 
 def expanded(document: Document, project: Project, problems: Problems | None = None) -> Document:
@@ -139,7 +39,7 @@ def expanded(document: Document, project: Project, problems: Problems | None = N
     """
     problems = problems or Problems()
     *variants, base = _layers(document, project)
-    made = _with_effects(base, base, project, problems)
+    made = _finished(base, base, project, problems)
     for variant in reversed(variants):
         made = _laid(made, variant, project, problems)
     return made
@@ -189,14 +89,105 @@ def _layers(document: Document, project: Project) -> list[Document]:
 
 def _laid(base: Document, over: Document, project: Project, problems: Problems) -> Document:
     """Return a variant with its effects laid over its expanded base, with the variant's name."""
-    body = without(over.root, "language", "variant", "extends", "effects")
+    body = without(over.root, "language", "variant", "extends", *LAYER_KEYS)
     root = lay(base.root, body, problems)
     problems.stop_if_any()
     name = Scalar(over.name, over.name_span)
     named = {**root.entries, base.kind: Entry(base.kind, over.name_span, name)}
     tree = Table(named, over.root.span)
     made = Document(base.kind, over.name, over.name_span, tree, over.source)
-    return _with_effects(made, over, project, problems)
+    return _finished(made, over, project, problems)
+
+
+def with_calibrations(document: Document, names: Sequence[str], option: str) -> Document:
+    """Return a document that is calibrated further, as an option of a command asks for it."""
+    node = document.root.get("calibrations")
+    own = node.nodes if isinstance(node, Items) else ()
+    span = Span(Source(option, (" ".join(names),)), 1, 1)
+    more = tuple(Scalar(name, span) for name in names)
+    if not more:
+        return document
+    entry = Entry("calibrations", span, Items((*own, *more), span))
+    root = Table({**document.root.entries, "calibrations": entry}, document.root.span)
+    return dataclasses.replace(document, root=root)
+
+
+def parameters_of(tree: Table, project: Project) -> dict[str, Table]:
+    """Return the parameters of an automaton's tree, those of its model too."""
+    found: dict[str, Table] = {}
+    model = tree.get("model")
+    if isinstance(model, Scalar):
+        base = expanded(read_document(project.path_of(model.text, model.span)), project)
+        found = parameters_of(without(base.root, "model"), project)
+    for entry in entries(tree.get("parameters")):
+        if isinstance(entry.node, Table):
+            found[entry.key] = entry.node
+    return found
+
+
+def _finished(made: Document, layer: Document, project: Project, problems: Problems) -> Document:
+    """Return a document with the effects, then the calibrations, of one of its layers."""
+    made = _with_effects(made, layer, project, problems)
+    node = layer.root.get("calibrations")
+    if node is None:
+        return made
+    root = without(made.root, "calibrations")
+    names = Reader(problems).items(node, "calibrations")
+    for name in names:
+        document = read_document(project.path_of(name.text, name.span))
+        calibration = read_calibration(document, problems)
+        known = [*lineage(layer, project), made.name, *_models(root, project)]
+        if made.kind == "automaton" and calibration.of.text in known:
+            root = calibrated(root, calibration, parameters_of(root, project), problems)
+        elif made.kind == "system":
+            root = _calibrated_system(root, calibration, known, project, problems)
+        else:
+            _report_not_of(calibration, made.name, name.span, problems)
+    problems.stop_if_any()
+    return dataclasses.replace(made, root=root)
+
+
+def _models(tree: Table, project: Project) -> list[str]:
+    """Return the names of the model of a sampled automaton's tree and of what that extends."""
+    model = tree.get("model")
+    if not isinstance(model, Scalar):
+        return []
+    return lineage(read_document(project.path_of(model.text, model.span)), project)
+
+
+def _calibrated_system(
+    root: Table, calibration: Calibration, names: list[str], project: Project, problems: Problems
+) -> Table:
+    """Give the values to the instances of what the calibration is of; or by `instance.name`."""
+    found: dict[str, tuple[str, str]] = {}
+    fits = calibration.of.text in names
+    for entry in entries(root.get("instances")):
+        of = entry.node.get("of") if isinstance(entry.node, Table) else None
+        if not isinstance(of, Scalar):
+            continue
+        document = read_document(project.path_of(of.text, of.span))
+        mine = calibration.of.text in lineage(document, project)
+        fits = fits or mine
+        for name in parameters_of(expanded(document, project).root, project):
+            found[name if mine else f"{entry.key}.{name}"] = (entry.key, name)
+            if mine and name in calibration.values:
+                value = calibration.values[name].value
+                root = put(root, ("instances", entry.key, "values", name), value)
+    if not fits:
+        _report_not_of(calibration, names[0], calibration.of.span, problems)
+        return root
+    for key, given in calibration.values.items():
+        if key not in found:
+            report_unknown(calibration, given, found, problems)
+        elif "." in key:
+            owner, name = found[key]
+            root = put(root, ("instances", owner, "values", name), given.value)
+    return root
+
+
+def _report_not_of(calibration: Calibration, name: str, span: Span, problems: Problems) -> None:
+    label = f"calibration `{calibration.name}` is of `{calibration.of.text}`, not of `{name}`"
+    problems.error("values", span, label)
 
 
 def _with_effects(
@@ -229,28 +220,3 @@ def _extends(document: Document) -> Scalar:
     problems = Problems()
     problems.error("form", document.name_span, "a variant says what it `extends`")
     raise SpecError(problems.found)
-
-
-def _check_version(root: Table, problems: Problems) -> None:
-    first = next(iter(root), None)
-    node = root.get("language")
-    if node is None:
-        span = first.span if first else root.span
-        problems.error(
-            "version", span, "`language: 1` is missing", "it is the first line of a spec"
-        )
-    elif not isinstance(node, Scalar) or node.text != VERSION:
-        problems.error("version", node.span, "this version of the language is not known: use 1")
-
-
-def _yaml_files(folder: Path) -> Iterator[Path]:
-    if folder.is_dir():
-        yield from sorted(folder.rglob("*.yaml"))
-
-
-def _heads_in(path: Path) -> list[tuple[str, str]]:
-    try:
-        text = path.read_text("utf-8", errors="replace")[:65536]
-    except OSError:
-        return []
-    return [(match.group(1), match.group(2).strip("'\"")) for match in HEAD.finditer(text)]

@@ -14,7 +14,7 @@ from engine.recording import Recording, read_recording
 from engine.replay import Replay, replay as replay_recording, used_columns
 from engine.simulate import simulate as simulate_system
 from engine.trajectory import Trajectory
-from language.document import Scalar
+from language.document import Document, Scalar
 from language.load import automaton_of, command_line_value, program_of
 from language.map import read_map
 from language.model import Automaton, RecordingMap, Scenario, System
@@ -22,7 +22,7 @@ from language.number import NumberType
 from language.page import pages_of
 from language.problem import Problems, SpecError
 from language.program import Program
-from language.project import Project, layered, read_document
+from language.project import Project, layered, read_document, with_calibrations
 from language.scenario import read_scenario
 from language.system import in_numbers, read_system
 from lockstep.compare import Tape, Verdict, compare
@@ -55,11 +55,15 @@ class Replayed:
 
 
 def load(
-    system: str, scenario: str, values: Values | None = None, root: Path | None = None
+    system: str,
+    scenario: str,
+    values: Values | None = None,
+    root: Path | None = None,
+    calibrations: Sequence[str] = (),
 ) -> Loaded:
     """Return a system with a scenario. Raises SpecError with all problems."""
     project = Project(root or Path())
-    read = read_system(read_document(project.path_of(system)), project, _scalars(values))
+    read = read_system(_document(system, project, calibrations), project, _scalars(values))
     document = read_document(project.path_of(scenario))
     return Loaded(read, read_scenario(document, project, read))
 
@@ -72,6 +76,7 @@ def simulate(
     *,
     reference: bool = False,
     method: str = "RK4",
+    calibrations: Sequence[str] = (),
 ) -> Trajectory:
     """Return the trajectory of a system, or of an automaton alone, through a scenario.
 
@@ -80,7 +85,7 @@ def simulate(
     """
     if method not in METHODS:
         raise ValueError(f"`{method}` is no method of integration: {', '.join(METHODS)}")
-    loaded = load(system, scenario, values, root)
+    loaded = load(system, scenario, values, root, calibrations)
     if reference or method != "RK4":
         from engine import reference as independent  # scipy only where asked for
 
@@ -98,11 +103,14 @@ def program(reference: str, values: Values | None = None, root: Path | None = No
 
 
 def generate(
-    reference: str, values: Values | None = None, root: Path | None = None
+    reference: str,
+    values: Values | None = None,
+    root: Path | None = None,
+    calibrations: Sequence[str] = (),
 ) -> dict[str, str]:
     """Return the C files of a sampled automaton by name. Raises SpecError."""
     project = Project(root or Path())
-    document = read_document(project.path_of(reference))
+    document = _document(reference, project, calibrations)
     automaton = automaton_of(document, project, _scalars(values))
     if not automaton.is_sampled:
         problems = Problems()
@@ -122,6 +130,7 @@ def lockstep(
     changes: Sequence[str] = (),
     compiler: str | None = None,
     optimise: str = "O2",
+    calibrations: Sequence[str] = (),
 ) -> tuple[Trajectory, list[Verdict]]:
     """Simulate, then run the C of every sampled instance on the same inputs and compare bits.
 
@@ -129,7 +138,7 @@ def lockstep(
     like `1.5 s: k_hs = 6000 N*m/rad`, in place of those of the scenario.
     Raises SpecError, ToolMissing.
     """
-    loaded = load(system, scenario, values, root)
+    loaded = load(system, scenario, values, root, calibrations)
     if numbers:
         loaded = Loaded(in_numbers(loaded.system, numbers), loaded.scenario)
     if changes:
@@ -157,12 +166,13 @@ def replay(
     root: Path | None = None,
     *,
     compiled: bool = True,
+    calibrations: Sequence[str] = (),
 ) -> Replayed:
     """Replay a recording through a sampled automaton, in lock-step with its C.
 
     Raises SpecError, ToolMissing.
     """
-    automaton, used = _estimator(estimator, variant, values, root)
+    automaton, used = _estimator(estimator, variant, values, root, calibrations)
     mapping = _map(map, root)
     columns, left_out = used_columns(automaton, mapping)
     read = read_recording(recording, mapping, columns)
@@ -173,8 +183,17 @@ def replay(
     return Replayed(result, verdict, tuple(left_out), read)
 
 
+def _document(reference: str, project: Project, calibrations: Sequence[str]) -> Document:
+    document = read_document(project.path_of(reference))
+    return with_calibrations(document, calibrations, "--calibration")
+
+
 def _estimator(
-    reference: str, variant: str | None, values: Values | None, root: Path | None
+    reference: str,
+    variant: str | None,
+    values: Values | None,
+    root: Path | None,
+    calibrations: Sequence[str],
 ) -> tuple[Automaton, Program]:
     project = Project(root or Path())
     document = read_document(project.path_of(reference))
@@ -186,6 +205,7 @@ def _estimator(
             problems.error("form", over.name_span, label)
         problems.stop_if_any()
         document = layered(document, over, project, problems)
+    document = with_calibrations(document, calibrations, "--calibration")
     automaton = automaton_of(document, project, _scalars(values))
     if not automaton.is_sampled:
         problems = Problems()

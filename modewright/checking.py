@@ -6,12 +6,13 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from language.document import Scalar
+from language.calibration import read_calibration
+from language.document import Document, Scalar
 from language.effect import read_effect
 from language.load import automaton_of, program_of
 from language.map import read_map
 from language.problem import Problem, Problems, SpecError
-from language.project import Project, expanded, read_document
+from language.project import Project, expanded, read_document, with_calibrations
 from language.scenario import read_scenario
 from language.system import read_system
 
@@ -22,6 +23,8 @@ def check(reference: str, root: Path | None = None) -> list[Problem]:
     problems = Problems()
     try:
         document = read_document(project.path_of(reference))
+        if document.kind == "calibration":
+            document = _calibrated(document, reference, project, problems)
         base = expanded(document, project, problems)
         if base.kind == "automaton":
             program_of(automaton_of(document, project, problems=problems))
@@ -38,6 +41,16 @@ def check(reference: str, root: Path | None = None) -> list[Problem]:
     except SpecError as error:
         return list(dict.fromkeys(error.problems))
     return list(dict.fromkeys(problems.found))
+
+
+def _calibrated(
+    document: Document, reference: str, project: Project, problems: Problems
+) -> Document:
+    """Return what a calibration is of, calibrated by it: so its values are checked there."""
+    of = read_calibration(document, problems).of
+    problems.stop_if_any()
+    base = read_document(project.path_of(of.text, of.span))
+    return with_calibrations(base, [str(project.path_of(reference))], reference)
 
 
 def spec_files(root: Path) -> Iterator[Path]:

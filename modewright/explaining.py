@@ -7,13 +7,16 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
 
+from language.calibration import read_calibration
 from language.document import Document
 from language.load import automaton_of, command_line_value, program_of
+from language.lower import parameter_kinds
 from language.model_text import model_text
 from language.printing import program_text
 from language.problem import Problems, SpecError
-from language.project import Project, expanded, read_document
+from language.project import Project, expanded, read_document, with_calibrations
 from language.provenance import Row, difference_text, differences, rows, spec_text
+from language.system import read_system
 
 Pass = Literal["document", "model", "program"]
 Values = Mapping[str, str]
@@ -25,9 +28,36 @@ def explained(spec: str, stage: Pass, values: Values, root: Path | None = None) 
     document = read_document(project.path_of(spec))
     if stage == "document":
         return spec_text(_expanded(document, project).root)
+    if document.kind == "calibration":
+        return _calibration_text(document, project)
     given = {name: command_line_value(text) for name, text in values.items()}
     automaton = automaton_of(document, project, given)
     return model_text(automaton) if stage == "model" else program_text(program_of(automaton))
+
+
+def _calibration_text(document: Document, project: Project) -> str:
+    """Return the values of a calibration: SI, compiled in (fixed) or not (tunable), and origin."""
+    problems = Problems()
+    calibration = read_calibration(document, problems)
+    problems.stop_if_any()
+    base = read_document(project.path_of(calibration.of.text, calibration.of.span))
+    base = with_calibrations(base, [document.source.name], document.name)
+    if expanded(base, project).kind == "system":
+        instances = read_system(base, project).instances.values()
+        automata = {f"{instance.name}.": instance.automaton for instance in instances}
+    else:
+        automata = {"": automaton_of(base, project)}
+    lines = []
+    for owner, automaton in automata.items():
+        kinds = parameter_kinds(automaton)
+        for name, value in calibration.values.items():
+            own = name.removeprefix(owner)
+            parameter = automaton.parameters.get(own)
+            if parameter and ("." not in name or name.startswith(owner)):
+                texts = [kinds[own], *([f"std {value.std}"] if value.std else [])]
+                texts += [text for text in (value.origin, value.date) if text]
+                lines.append(f"{owner}{own} = {value.value.text}  # {', '.join(texts)}")
+    return "".join(f"{line}\n" for line in lines)
 
 
 def compared(spec: str, other: str, stage: Pass, values: Values, root: Path | None = None) -> str:

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from modewright.commands.options import Sets, values_of
+from modewright.commands.options import Calibrations, Sets, values_of
 from modewright.console import announce
 from modewright.exits import PROBLEMS
 from modewright.files import make_folder, write_files
@@ -20,6 +20,7 @@ def generate(
         "generated"
     ),
     sets: Sets = None,
+    calibrations: Calibrations = None,
     every: Annotated[bool, typer.Option("--all", help="all of spec/ into generated/")] = False,
     only_check: Annotated[
         bool, typer.Option("--check", help="with --all: write nothing, fail where stale")
@@ -40,7 +41,7 @@ def generate(
         _stop_where_stale()
         return
     if automaton is not None:
-        made = api.generate(automaton, values_of(sets))
+        made = api.generate(automaton, values_of(sets), calibrations=calibrations or ())
         files = {out / name: text.encode() for name, text in made.items()}
     else:
         files = generated_files(Path())

@@ -6,7 +6,15 @@ from typing import Annotated, Literal
 
 import typer
 
-from modewright.commands.options import Json, Scenario, Sets, System, stop_where, values_of
+from modewright.commands.options import (
+    Calibrations,
+    Json,
+    Scenario,
+    Sets,
+    System,
+    stop_where,
+    values_of,
+)
 from modewright.console import console, working
 
 Numbers = Annotated[
@@ -27,6 +35,7 @@ def lockstep(
     system: System,
     scenario: Scenario,
     sets: Sets = None,
+    calibrations: Calibrations = None,
     numbers: Numbers = None,
     changes: Changes = None,
     compiler: Compiler = None,
@@ -49,6 +58,7 @@ def lockstep(
             changes=changes or (),
             compiler=compiler,
             optimise=optimise,
+            calibrations=calibrations or (),
         )
     if as_json:
         found = {"lockstep": [show.verdict_json(verdict) for verdict in verdicts]}

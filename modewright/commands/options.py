@@ -25,6 +25,10 @@ Sets = Annotated[
     list[str] | None,
     typer.Option("--set", help="a parameter value: 'k_hs=6000 N*m/rad', 'est.t_wait=2 ms'"),
 ]
+Calibrations = Annotated[
+    list[str] | None,
+    typer.Option("--calibration", "-c", help="a calibration: name or file (repeatable)"),
+]
 Out = Annotated[
     Path | None,
     typer.Option("--out", "-o", help="write the run: .csv (with a side file) or .parquet"),

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from modewright.commands.options import (
+    Calibrations,
     Json,
     Out,
     Plot,
@@ -29,6 +30,7 @@ def replay(
         str | None, typer.Option("--variant", help="a variant laid over the estimator")
     ] = None,
     sets: Sets = None,
+    calibrations: Calibrations = None,
     out: Out = None,
     plot: Plot = None,
     as_json: Json = False,
@@ -44,7 +46,9 @@ def replay(
     require_run(out)
     require_writable(out, plot)
     with working(f"replaying {recording.name}"):
-        replayed = api.replay(estimator, recording, mapping, variant, values_of(sets))
+        replayed = api.replay(
+            estimator, recording, mapping, variant, values_of(sets), calibrations=calibrations or ()
+        )
     trajectory, verdict = replayed.result.trajectory, replayed.verdict
     files: dict[Path, bytes] = {}
     if out:

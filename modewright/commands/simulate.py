@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from modewright.commands.options import (
+    Calibrations,
     Json,
     Out,
     Plot,
@@ -28,6 +29,7 @@ def simulate(
     system: System,
     scenario: Scenario,
     sets: Sets = None,
+    calibrations: Calibrations = None,
     out: Out = None,
     plot: Plot = None,
     reference: Annotated[
@@ -51,7 +53,12 @@ def simulate(
     require_writable(out, plot)
     with working(f"simulating {system}, {scenario}"), usage_errors():
         trajectory = api.simulate(
-            system, scenario, values_of(sets), reference=reference, method=method
+            system,
+            scenario,
+            values_of(sets),
+            reference=reference,
+            method=method,
+            calibrations=calibrations or (),
         )
     files: dict[Path, bytes] = {}
     if out:

@@ -1,0 +1,150 @@
+"""Finding: where specs are found by name, and how a file and its head are read."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from importlib import resources
+from pathlib import Path
+
+from language.document import Document, Scalar, Table, read_text
+from language.problem import Problems, Source, Span, SpecError, nearest
+from language.yaml_tree import parse
+
+KINDS = ("automaton", "system", "scenario", "map", "variant", "effect", "calibration")
+LATER_KINDS = ("study", "test")
+HEAD = re.compile(rf"^({'|'.join(KINDS + LATER_KINDS)}):\s*([^\s#]+)", re.MULTILINE)
+VERSION = "1"
+
+
+@dataclass(frozen=True)
+class Project:
+    """A folder whose `spec/` is searched first, before the specs that are shipped."""
+
+    root: Path
+    files: list[Path] = field(default_factory=list, repr=False)
+
+    @cached_property
+    def index(self) -> dict[str, list[Path]]:
+        """Files by the name of what they hold, those of the project first.
+
+        An effect is called like physics; what else has its name goes before it.
+        """
+        return {**self.effects, **self._named(lambda kind: kind != "effect")}
+
+    @cached_property
+    def effects(self) -> dict[str, list[Path]]:
+        """Files of effects by name, those of the project first."""
+        return self._named(lambda kind: kind == "effect")
+
+    def _named(self, wanted: Callable[[str], bool]) -> dict[str, list[Path]]:
+        own: dict[str, list[Path]] = {}
+        for path in _yaml_files(self.root / "spec"):
+            for kind, name in _heads_in(path):
+                if wanted(kind):
+                    own.setdefault(name, []).append(path)
+        shipped = Path(str(resources.files("spec")))
+        if shipped.resolve() != (self.root / "spec").resolve():
+            for path in _yaml_files(shipped):
+                for kind, name in _heads_in(path):
+                    if wanted(kind):
+                        own.setdefault(name, [path])
+        return own
+
+    def effect(self, name: str, span: Span) -> Document:
+        """Return the document of an effect. Raises SpecError."""
+        return read_document(self._one_of(self.effects, name, span, "effect"))
+
+    def path_of(self, reference: str, span: Span | None = None) -> Path:
+        """Return the file of a name or path. Raises SpecError for none or several."""
+        if reference.endswith((".yaml", ".yml")) or os.sep in reference:
+            base = Path(span.source.name).parent if span else Path()
+            beside = base / reference
+            return beside if beside.exists() else Path(reference)
+        place = span or Span(Source("command line", (reference,)), 1, 1, len(reference))
+        return self._one_of(self.index, reference, place, "spec")
+
+    def _one_of(
+        self, index: Mapping[str, list[Path]], reference: str, place: Span, what: str
+    ) -> Path:
+        found = index.get(reference, [])
+        if len(found) == 1:
+            return found[0]
+        problems = Problems()
+        if found:
+            files = ", ".join(shown(path) for path in found)
+            problems.error("name", place, f"`{reference}` is defined twice", f"in {files}")
+        else:
+            hint = nearest(reference, index)
+            if what == "spec":
+                hint = nearest(reference, index) or "a name of a spec below spec/, or a path"
+            problems.error("name", place, f"there is no {what} named `{reference}`", hint)
+        raise SpecError(problems.found)
+
+
+def shown(path: Path) -> str:
+    """Return a path as it is shown: relative to the working directory where that is shorter."""
+    try:
+        relative = os.path.relpath(path)
+    except ValueError:
+        return str(path)
+    return relative if not relative.startswith("..") else str(path)
+
+
+def read_document(path: Path) -> Document:
+    """Read one file and its head. Raises SpecError."""
+    source, text = read_text(path, shown(path))
+    return document_of(source, text)
+
+
+def document_of(source: Source, text: str) -> Document:
+    """Return the document of a text: `language: 1`, then one kind and its name."""
+    root = parse(source, text)
+    problems = Problems()
+    _check_version(root, problems)
+    heads = [entry for entry in root if entry.key in KINDS + LATER_KINDS]
+    if not heads:
+        first = next(iter(root), None)
+        span = first.span if first else root.span
+        label = "the file does not say what it holds"
+        problems.error("form", span, label, f"one of the keys {', '.join(KINDS)} with a name")
+    elif len(heads) > 1:
+        label = f"one file holds one thing: `{heads[0].key}` is given too"
+        problems.error("form", heads[1].span, label)
+    elif heads[0].key in LATER_KINDS:
+        label = f"`{heads[0].key}` files are not read by this version"
+        problems.error("form", heads[0].span, label)
+    elif not isinstance(heads[0].node, Scalar):
+        problems.error("form", heads[0].span, f"`{heads[0].key}` is followed by a name")
+    problems.stop_if_any()
+    head = heads[0]
+    assert isinstance(head.node, Scalar)
+    return Document(head.key, head.node.text, head.node.span, root, source)
+
+
+def _check_version(root: Table, problems: Problems) -> None:
+    first = next(iter(root), None)
+    node = root.get("language")
+    if node is None:
+        span = first.span if first else root.span
+        problems.error(
+            "version", span, "`language: 1` is missing", "it is the first line of a spec"
+        )
+    elif not isinstance(node, Scalar) or node.text != VERSION:
+        problems.error("version", node.span, "this version of the language is not known: use 1")
+
+
+def _yaml_files(folder: Path) -> Iterator[Path]:
+    if folder.is_dir():
+        yield from sorted(folder.rglob("*.yaml"))
+
+
+def _heads_in(path: Path) -> list[tuple[str, str]]:
+    try:
+        text = path.read_text("utf-8", errors="replace")[:65536]
+    except OSError:
+        return []
+    return [(match.group(1), match.group(2).strip("'\"")) for match in HEAD.finditer(text)]

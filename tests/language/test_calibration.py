@@ -1,0 +1,124 @@
+"""Calibrations: values apart from structure, laid last, with their provenance."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import modewright as mw
+from language.load import load_automaton
+from language.project import Project, read_document
+from language.system import read_system
+from modewright import explaining
+from tests.language.making import project_of, told
+
+FIT = """language: 1
+calibration: fit
+of: {of}
+from: tip-out on the rig
+date: 2026-11-20
+parameters:
+  J_em: {{value: 0.061 kg*m^2, std: 0.002 kg*m^2, from: run-up}}
+  k_hs: 5.2 kN*m/rad
+"""
+BETTER = """language: 1
+variant: better
+extends: {base}
+{body}calibrations: [fit]
+"""
+
+
+def fitted(folder: Path, base: str, body: str = "", of: str = "driveline") -> Project:
+    return project_of(folder, fit=FIT.format(of=of), better=BETTER.format(base=base, body=body))
+
+
+def value(project: Project, name: str, parameter: str) -> float:
+    return float(load_automaton(name, project).parameters[parameter].value or 0)
+
+
+def test_a_variant_takes_values_from_a_calibration_last(tmp_path: Path) -> None:
+    project = fitted(tmp_path, "driveline", "parameters: {J_em: {value: 0.07 kg*m^2}}\n")
+    assert value(project, "better", "J_em") == 0.061
+    assert value(project, "better", "k_hs") == 5200
+    assert load_automaton("better", project).parameters["J_em"].kind == "tunable"
+    assert mw.check("better", tmp_path) == [] == mw.check("fit", tmp_path)
+
+
+def test_a_calibration_reaches_what_an_effect_brings(tmp_path: Path) -> None:
+    body = "effects: {coulomb_friction@w_em: {}}\n"
+    project = fitted(tmp_path, "driveline", body)
+    more = FIT.format(of="better").replace("k_hs: 5.2 kN*m/rad", "T_c_w_em: 2 N*m")
+    project_of(tmp_path, more=more.replace("calibration: fit", "calibration: more"))
+    project_of(tmp_path, best="language: 1\nvariant: best\nextends: better\ncalibrations: [more]\n")
+    assert value(Project(tmp_path), "best", "T_c_w_em") == 2
+    assert value(project, "best", "k_hs") == 5200
+
+
+def test_an_estimator_takes_a_calibration_of_its_model(tmp_path: Path) -> None:
+    project = fitted(tmp_path, "estimator")
+    automaton = load_automaton("better", project)
+    assert automaton.model is not None
+    assert float(automaton.model.parameters["J_em"].value or 0) == 0.061
+
+
+@pytest.mark.parametrize("of", ["driveline", "ev_driveline"])
+def test_a_system_gives_it_to_the_instances_that_it_is_of(tmp_path: Path, of: str) -> None:
+    project = fitted(tmp_path, "ev_driveline", of=of)
+    if of == "ev_driveline":
+        text = FIT.format(of=of).replace("J_em:", "plant.J_em:").replace("k_hs:", "plant.k_hs:")
+        project_of(tmp_path, fit=text)
+    system = read_system(read_document(project.path_of("better")), project)
+    inertia = {n: i.automaton.parameters["J_em"].value for n, i in system.instances.items()}
+    assert {n: float(v or 0) for n, v in inertia.items()} == {
+        "plant": 0.061,
+        "est": 0.05,
+        "simple": 0.05,
+    }
+
+
+def test_an_option_of_a_command_calibrates(tmp_path: Path) -> None:
+    fitted(tmp_path, "driveline")
+    loaded = mw.load("ev_driveline", "tip_out", None, tmp_path, ["fit"])
+    parameters = loaded.system.instances["plant"].automaton.parameters
+    assert float(parameters["k_hs"].value or 0) == 5200
+    files = mw.generate("estimator", None, tmp_path, ["fit"])
+    assert any("5200" in text for text in files.values())
+
+
+def test_a_value_given_by_name_goes_before_a_calibration(tmp_path: Path) -> None:
+    fitted(tmp_path, "driveline")
+    loaded = mw.load("ev_driveline", "tip_out", {"plant.k_hs": "6 kN*m/rad"}, tmp_path, ["fit"])
+    parameters = loaded.system.instances["plant"].automaton.parameters
+    assert float(parameters["k_hs"].value or 0) == 6000
+
+
+def test_a_calibrated_value_says_its_file_and_line(tmp_path: Path) -> None:
+    fitted(tmp_path, "driveline")
+    found = {row["path"]: row for row in explaining.explained_json("better", tmp_path)["values"]}
+    row = found["parameters.k_hs.value"]
+    assert (row["value"], row["layer"]) == ("5.2 kN*m/rad", "calibration fit")
+    assert str(row["place"]).endswith("fit.yaml:8")
+
+
+def test_what_is_tunable_and_what_is_compiled_in_is_told(tmp_path: Path) -> None:
+    fitted(tmp_path, "driveline")
+    lines = explaining.explained("fit", "model", {}, tmp_path).splitlines()
+    assert lines == [
+        "J_em = 0.061 kg*m^2  # tunable, std 0.002 kg*m^2, run-up, 2026-11-20",
+        "k_hs = 5.2 kN*m/rad  # fixed, tip-out on the rig, 2026-11-20",
+    ]
+
+
+def test_a_calibration_of_something_else_is_refused(tmp_path: Path) -> None:
+    project = fitted(tmp_path, "driveline", of="estimator")
+    assert told(lambda: load_automaton("better", project)) == [
+        "4:16 calibration `fit` is of `estimator`, not of `better`"
+    ]
+
+
+def test_a_bare_number_is_in_the_unit_of_the_parameter(tmp_path: Path) -> None:
+    project = fitted(tmp_path, "driveline")
+    text = FIT.format(of="driveline").replace("5.2 kN*m/rad", "5200")
+    project_of(tmp_path, fit=text)
+    assert value(project, "better", "k_hs") == 5200
