@@ -19,12 +19,13 @@ from language.model import (
     Range,
     State,
 )
+from language.names import check_file_name
 from language.number import NUMBERS, NumberType
 from language.observer import METHODS
 from language.overlay import lay, without
 from language.problem import Problems, nearest
 from language.project import Project, expanded, read_document
-from language.reader import FILE_WORDS, Reader, check_name
+from language.reader import Reader
 from language.region import with_regions
 from language.syntax import Broken
 from language.table import TableReader, section
@@ -122,10 +123,7 @@ class _AutomatonReader(Reader):
         keys = (*COMMON_KEYS, *LOGIC_KEYS, *LAID_KEYS, *CLOCK_KEYS)
         tree = self.table(tree, f"automaton {document.name}", keys)
         self.at = document.name_span
-        check_name(document.name, document.name_span, self.problems)
-        if document.name in FILE_WORDS:
-            label = f"an automaton is not called `{document.name}`: generated code has that file"
-            self.problems.error("name", document.name_span, label)
+        check_file_name(document.name, document.name_span, self.problems)
         self.model = model
         self.declared = (section(tree, "inputs"), section(tree, "states"))
         period = self._time(tree.get("period"), "period")

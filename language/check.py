@@ -24,6 +24,7 @@ from language.model import (
     State,
     SystemInput,
 )
+from language.names import report_case_twins
 from language.order import equation_order, report_circle, unreached
 from language.problem import Problems, Span, SpecError, nearest
 from language.region import sources, with_regions
@@ -132,6 +133,15 @@ class _Check:
                     break
         for region in automaton.regions:
             self._clash(region.name, region.span)
+        self._case_twins()
+
+    def _case_twins(self) -> None:
+        automaton = self.automaton
+        named = list(self.first.items())
+        for mode in automaton.all_modes:
+            named += [(name, formula.span) for name, formula in mode.equations.items()]
+        report_case_twins(named, self.problems)
+        report_case_twins([(m.name, m.span) for m in automaton.all_modes], self.problems)
 
     def _new(self, name: str, kind: Kind, span: Span) -> None:
         self._clash(name, span)

@@ -6,10 +6,11 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 from language.document import Document, Entry, Items, Node, Scalar, Table
+from language.names import check_name
 from language.parse import parse_balance, parse_expression
 from language.passage import EFFECT, Path, changed
 from language.problem import Problems, Span, nearest
-from language.reader import Reader, check_name
+from language.reader import Reader
 from language.syntax import Name, Tree, names
 from language.units import Dimension
 

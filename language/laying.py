@@ -9,11 +9,11 @@ from language.document import Entry, Items, Node, Scalar, Table
 from language.effect import ADDED, Laying, items_of, own_names
 from language.known import entries_of
 from language.moving import put_in, taken_out
+from language.names import NAME, check_name
 from language.overlay import lay
 from language.passage import EFFECT, Path, changed
 from language.place import Hole, Misfit, Place, place_of
 from language.problem import Problems, Source, Span, nearest
-from language.reader import NAME, check_name
 from language.redirect import Part, exists, rebuilt, redirected, rewritten
 from language.rewrite import renamed
 from language.tree import at, entries, put, resourced

@@ -5,7 +5,7 @@ from __future__ import annotations
 from fractions import Fraction
 from typing import Literal, cast
 
-from language.document import Document, Entry, Table
+from language.document import Document, Entry, Items, Table
 from language.literal import constant
 from language.model import Column, RecordingMap
 from language.problem import Problems, Span
@@ -67,7 +67,11 @@ class _MapReader(Reader):
     def _column(self, entry: Entry) -> Column:
         what = f"columns.{entry.key}"
         table = self.table(entry.node, what, COLUMN_KEYS)
-        names = [item.text for item in self.items(table.get("mean"), f"{what}.mean")]
+        mean = table.get("mean")
+        names = [item.text for item in self.items(mean, f"{what}.mean")]
+        if isinstance(mean, Items) and not mean.nodes:
+            label = "`mean` is a list of at least one column"
+            self.problems.error("missing", mean.span, label)
         column = table.get("column")
         if not names:
             names = [self.text(column, "column", entry.span) if column else entry.key]

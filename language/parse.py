@@ -12,6 +12,7 @@ from typing import Any
 import lark
 
 from language.document import Scalar
+from language.names import COMMA_HINT
 from language.problem import Problems, Span, SpecError
 from language.syntax import (
     Application,
@@ -36,7 +37,6 @@ SIMPLE_QUANTITY = re.compile(rf"{DECIMAL.pattern} {UNIT.pattern}")
 WORDS = frozenset({"if", "then", "else", "and", "or", "not", "true", "false"})
 MAX_TEXT = 2000
 """Longest expression read; longer ones want an equation of their own."""
-COMMA_HINT = "in `{...}` YAML ends a value at a comma: quote a value that has one"
 MAX_POWER = 8
 MAX_DEPTH = 100
 """Deepest tree: a sum of 100 terms; more want an equation of their own."""

@@ -10,116 +10,16 @@ from typing import cast
 from language.document import Entry, Items, Node, Scalar, Table
 from language.kind import LARGEST_WHOLE, TYPES, Type
 from language.model import Formula, Range
-from language.parse import COMMA_HINT, parse_expression
+from language.names import COMMA_HINT, check_name
+from language.parse import parse_expression
 from language.problem import Problems, Source, Span, nearest
 from language.syntax import Broken, Negative, Number, Tree
 from language.units import NO_UNIT, UNKNOWN_UNIT, Unit, UnitError, fits, parse_unit, unit_hint
 
-NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,30}")
-GRAMMAR_WORDS = frozenset(
-    [
-        "if",
-        "then",
-        "else",
-        "and",
-        "or",
-        "not",
-        "true",
-        "false",
-        "der",
-        "in",
-        "after",
-        "rising",
-        "falling",
-        "delay",
-        "previous",
-        "column",
-        "time",
-        "abs",
-        "sqrt",
-        "min",
-        "max",
-        "clip",
-        "sign",
-        "floor",
-        "sin",
-        "cos",
-        "tan",
-        "exp",
-        "tanh",
-        "atan2",
-        "lookup",
-        "remove",
-        "like",
-    ]
-)
-YAML_WORDS = frozenset(["on", "off", "yes", "no", "y", "n", "null"])
-C_WORDS = frozenset(
-    [
-        "auto",
-        "break",
-        "case",
-        "char",
-        "const",
-        "continue",
-        "default",
-        "do",
-        "double",
-        "enum",
-        "extern",
-        "float",
-        "for",
-        "goto",
-        "inline",
-        "int",
-        "long",
-        "register",
-        "restrict",
-        "return",
-        "short",
-        "signed",
-        "sizeof",
-        "static",
-        "struct",
-        "switch",
-        "typedef",
-        "union",
-        "unsigned",
-        "void",
-        "volatile",
-        "while",
-        "bool",
-        "asm",
-    ]
-)
-C_MACRO = re.compile(
-    r"INFINITY|NAN|HUGE_VAL[FL]?|MATH_ERR\w*|math_errhandling|FP_\w+|(DBL|FLT|LDBL)_\w+|DECIMAL_DIG"
-    r"|U?INT\w*_(MAX|MIN|C)|(PTRDIFF|SIZE|WCHAR|WINT|SIG_ATOMIC)_(MAX|MIN)|NULL|errno|M_(E|PI\w*)"
-)
-"""Macros of the headers that generated code includes."""
-FILE_WORDS = frozenset(
-    {"main", "ha_math", "ha_mathf", "float", "math", "stdint", "stdbool", "string"}
-)
-"""Names of files beside which an automaton's own files would stand."""
 NOWHERE = Span(Source(""), 0, 0)
 """The place of an absent mapping: nothing is ever reported there."""
 TEXT_KEYS = frozenset({"about", "req"})
 """Keys that go on anything and have no influence."""
-
-
-def check_name(name: str, span: Span, problems: Problems) -> None:
-    """Report a name that is not one: docs/language.md, section 2."""
-    if not NAME.fullmatch(name):
-        hint = COMMA_HINT if ")" in name else "a letter, then at most 30 letters, digits or `_`"
-        problems.error("name", span, f"`{name}` is not a name", hint)
-    elif name in GRAMMAR_WORDS:
-        problems.error("name", span, f"`{name}` is a word of the language")
-    elif name.lower() in YAML_WORDS:
-        label = f"`{name}` means something else to other YAML tools: they read true, false or null"
-        problems.error("name", span, label, f"another name, like `{name}_1`")
-    elif name in C_WORDS or C_MACRO.fullmatch(name):
-        label = f"`{name}` is a word of C, and generated code keeps the names of the model"
-        problems.error("name", span, label)
 
 
 class Reader:

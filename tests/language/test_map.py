@@ -138,7 +138,6 @@ def test_a_delay_of_a_bare_0_is_none() -> None:
     assert one("to: u, delay: 0").delay == 0
 
 
-@pytest.mark.xfail(reason="map._column takes the mean of no columns for none given", strict=True)
 def test_a_mean_of_nothing_is_refused() -> None:
     assert lines("a: {to: u, mean: []}")
 

@@ -1,0 +1,54 @@
+"""Names: what is a name, and which names cannot stand beside each other."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+
+from language.problem import Problems, Span
+from language.reserved import C_MACRO, DEVICE_WORDS, FILE_WORDS, reserved_words
+
+NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,30}")
+COMMA_HINT = "in `{...}` YAML ends a value at a comma: quote a value that has one"
+
+
+def check_name(name: str, span: Span, problems: Problems) -> None:
+    """Report a name that is not one: docs/language.md, "Names, numbers, units"."""
+    words = reserved_words()
+    another = f"another name, like `{name}_1`"
+    if not NAME.fullmatch(name):
+        hint = COMMA_HINT if ")" in name else "a letter, then at most 30 letters, digits or `_`"
+        problems.error("name", span, f"`{name}` is not a name", hint)
+    elif name in words["GRAMMAR"]:
+        problems.error("name", span, f"`{name}` is a word of the language", another)
+    elif name.lower() in words["YAML"]:
+        label = f"`{name}` means something else to other YAML tools: they read true, false or null"
+        problems.error("name", span, label, another)
+    elif name in words["GENERATED"]:
+        label = f"`{name}` has a meaning of its own in generated code"
+        problems.error("name", span, label, another)
+    else:
+        for language in ("C", "C++", "A2L"):
+            if name in words[language] or (language == "C" and C_MACRO.fullmatch(name)):
+                label = f"`{name}` is a word of {language}, and generated files keep the names"
+                problems.error("name", span, label, another)
+                return
+
+
+def check_file_name(name: str, span: Span, problems: Problems) -> None:
+    """Report a name of an automaton that cannot be the name of its files."""
+    check_name(name, span, problems)
+    if name.lower() in FILE_WORDS or DEVICE_WORDS.fullmatch(name):
+        label = f"an automaton is not called `{name}`: that is another file"
+        problems.error("name", span, label, f"another name, like `{name}_1`")
+
+
+def report_case_twins(named: Iterable[tuple[str, Span]], problems: Problems) -> None:
+    """Report names that differ in case only: many tools for A2L and CSV do not tell them apart."""
+    first: dict[str, tuple[str, Span]] = {}
+    for name, span in named:
+        other, place = first.setdefault(name.lower(), (name, span))
+        if other != name:
+            label = f"`{name}` and `{other}` differ in case only"
+            hint = f"`{other}` is at {place}; tools for A2L and tables take them for one"
+            problems.error("duplicate", span, label, hint)
