@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from fractions import Fraction
 from pathlib import Path
@@ -24,6 +25,8 @@ SCENARIO_KEYS = tuple(
 RECORDING_KEYS = ("file", "map", *(key for key in MAP_KEYS if key not in ("language", "map")))
 MAX_HORIZON = Fraction(86400)
 """Longest horizon: a day; longer is a mistake of the unit."""
+RECORDINGS = "MODEWRIGHT_RECORDINGS"
+"""The folder where recordings are looked for after those of the spec and of the command."""
 LARGEST_SEED = 2**31 - 1
 
 
@@ -107,9 +110,9 @@ class _ScenarioReader(StimulusReader):
     def _use(self, file: Scalar | None, mapping: RecordingMap) -> RecordingUse | None:
         if file is None:
             return None
-        beside = Path(file.span.source.name).parent / file.text
-        path = beside if beside.exists() else Path(file.text)
-        return RecordingUse(path, mapping, file.span)
+        folders = [Path(file.span.source.name).parent, Path(), Path(os.environ.get(RECORDINGS, ""))]
+        found = [folder / file.text for folder in folders if (folder / file.text).exists()]
+        return RecordingUse(found[0] if found else Path(file.text), mapping, file.span)
 
     def _signals(self, items: Sequence[Scalar]) -> tuple[str, ...]:
         known = self.system.signals

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import csv
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import modewright as mw
@@ -69,6 +71,37 @@ def test_what_is_wrong_with_a_recording_is_told_with_its_place(tmp_path: Path) -
     (tmp_path / "spec" / "drive.csv").unlink()
     (line,) = told(lambda: mw.simulate("cart", "run", root=tmp_path))
     assert "the recording cannot be read" in line
+
+
+def test_a_recording_is_found_in_the_folder_of_recordings(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = run(tmp_path, "linear")
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    (tmp_path / "spec" / "drive.csv").rename(elsewhere / "drive.csv")
+    monkeypatch.setenv("MODEWRIGHT_RECORDINGS", str(elsewhere))
+    assert mw.simulate("cart", "run", root=tmp_path).csv() == found.csv()
+
+
+def test_the_motor_of_a_leaf_follows_its_recorded_wheels(
+    recordings: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Between wheel and motor are the ratio, a tyre that wears, and stamps of two CAN frames."""
+    monkeypatch.setenv("MODEWRIGHT_RECORDINGS", str(recordings))
+    found = mw.simulate("leaf_motor_side", "leaf_drive_eco")
+    assert found.stopped is None and found.times[-1] > 30.0
+    speed = found.signals["leaf_motor_side.w_em"]
+    with (recordings / "nissan_leaf" / "drive_eco.csv").open() as file:
+        table = list(csv.DictReader(file))
+    rows = [(float(row["t_s"]), float(row["em_speed_rpm"])) for row in table]
+    wheel = next(float(row["t_wheel_s"]) for row in table if row["wheel_a_kmh"])
+    start = max(rows[0][0], wheel)
+    measured = np.interp(found.times + start, *np.array(rows).T) * 2 * np.pi / 60
+    moving = measured > 100.0
+    assert moving.sum() > 10_000
+    off = np.abs(speed[moving] / measured[moving] - 1.0)
+    assert np.median(off) < 0.01 and off.max() < 0.05, (np.median(off), off.max())
 
 
 def test_columns_of_a_recording_fit_the_inputs(tmp_path: Path) -> None:
