@@ -57,7 +57,8 @@ def with_library_numbers(program: Program) -> Program:
     """
     numbers: dict[str, float] = {}
     for info in program.observers:
-        numbers.update(library_numbers(info))
+        if info.gain == "steady":
+            numbers.update(library_numbers(info))
     constants = tuple(
         dataclasses.replace(constant, value=numbers.get(constant.name, constant.value))
         for constant in program.constants

@@ -360,9 +360,13 @@ class _Check:
 
     def _writers(self, mode: Mode) -> None:
         automaton = self.automaton
-        if mode.observer and mode.run:
+        if mode.observer and mode.run and not mode.observer.runs:
             label = f"mode `{mode.name}` has both `observer` and `runs`: one carries the states"
-            self.problems.error("writer", mode.span, label)
+            help = "or the run predicts for the observer: `predict: runs`"
+            self.problems.error("writer", mode.span, label, help)
+        if mode.observer and mode.observer.runs and not mode.run:
+            label = "`predict: runs` needs `runs:` in this mode"
+            self.problems.error("observer", mode.observer.span, label)
         wrong = ("flow",) if automaton.is_sampled else ("update", "observer", "run")
         for what in wrong:
             if getattr(mode, what):
@@ -371,7 +375,7 @@ class _Check:
                 self.problems.error("form", mode.span, label)
         writers: dict[str, str] = {}
         groups = (
-            ("observer", mode.observer.states if mode.observer else ()),
+            ("observer", mode.observer.states if mode.observer and not mode.run else ()),
             ("runs", tuple(automaton.model.states) if mode.run and automaton.model else ()),
             ("update", tuple(mode.update)),
         )

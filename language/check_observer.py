@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 
 from language.dimension import DimensionCheck
 from language.kind import Kind
 from language.model import Automaton, Formula, Observer
-from language.problem import nearest
+from language.problem import Problems, nearest
 from language.syntax import names as names_of
 from language.units import Dimension, fits, product
 
@@ -25,6 +26,10 @@ def check_observer(
             if name not in known:
                 label = f"`{name}` is not {what}"
                 problems.error("name", observer.span, label, nearest(name, known))
+    if observer.correct is not None and kinds.get(observer.correct) != "truth":
+        label = f"`correct` names an input of type bool, `{observer.correct}` is none"
+        truths = [name for name, thing in automaton.inputs.items() if thing.truth]
+        problems.error("name", observer.span, label, nearest(observer.correct, truths))
     equations = _equations(automaton, observer)
     for measure, state in observer.measures.items():
         if state not in observer.states and state not in equations:
@@ -32,22 +37,35 @@ def check_observer(
             problems.error(
                 "name", observer.span, label, nearest(state, [*observer.states, *equations])
             )
-    for formula in observer.f.values():
-        for read in names_of(formula.tree):
-            if read.path in observer.states:
-                label = f"`f` reads the observer's own state `{read.path}`: that belongs into `A`"
-                problems.error("observer", read.span, label)
-    named = (*observer.states, *observer.measures, *observer.inputs)
+    _check_reads(automaton, observer, kinds, problems)
     _check_point(automaton, observer, check)
+    named = (*observer.states, *observer.measures, *observer.inputs)
     sizes = {name: kind for name, kind in kinds.items() if isinstance(kind, Dimension)}
     sizes = {**equations, **sizes}
     if all(name in sizes for name in named):
         _check_matrices(observer, sizes, check)
         _check_vectors(observer, sizes, check)
+        _check_limits(observer, sizes, check)
         for measure, state in observer.measures.items():
             if not observer.c and state in sizes and not fits(sizes[measure], sizes[state]):
                 label = f"`{measure}` is in `{sizes[measure]}`, `{state}` is in `{sizes[state]}`"
                 problems.error("dimension", observer.span, label)
+
+
+def _check_reads(
+    automaton: Automaton, observer: Observer, kinds: Mapping[str, Kind], problems: Problems
+) -> None:
+    for formula in observer.f.values():
+        for read in names_of(formula.tree):
+            if read.path in observer.states:
+                label = f"`f` reads the observer's own state `{read.path}`: that belongs into `A`"
+                problems.error("observer", read.span, label)
+    held = {*automaton.parameters, *automaton.inputs, *automaton.states}
+    for formula in (*observer.f.values(), *observer.process_noise.values()):
+        for read in names_of(formula.tree):
+            if read.path in kinds and read.path not in held:
+                label = f"`{read.path}` is an equation: an observer reads states and inputs"
+                problems.error("observer", read.span, label)
 
 
 def _equations(automaton: Automaton, observer: Observer) -> dict[str, Dimension]:
@@ -81,10 +99,20 @@ def _check_vectors(
 ) -> None:
     for row, formula in observer.f.items():
         _fits(check, formula, _rate(sizes[row]))
+    memory = frozenset({"previous"} if observer.gain == "recursive" else ())
+    noise = DimensionCheck(dataclasses.replace(check.scope, memory=memory), check.problems)
     for row, formula in observer.process_noise.items():
-        _fits(check, formula, _rate(product(sizes[row], sizes[row])))
+        _fits(noise, formula, _rate(product(sizes[row], sizes[row])))
     for row, formula in observer.measurement_noise.items():
         _fits(check, formula, product(sizes[row], sizes[row]))
+
+
+def _check_limits(
+    observer: Observer, sizes: Mapping[str, Dimension], check: DimensionCheck
+) -> None:
+    for name, limits in observer.limits.items():
+        for formula in limits:
+            _fits(check, formula, product(sizes[name], sizes[name]))
 
 
 def _fits(check: DimensionCheck, formula: Formula, want: Dimension) -> None:

@@ -19,6 +19,7 @@ from language.matrix import Matrix, exponential, exponential_integral, multiply
 from language.model import Automaton, Formula, Mode, Observer
 from language.operation import (
     Assign,
+    Binary,
     Block,
     Expr,
     Op,
@@ -37,12 +38,17 @@ from language.riccati import discrete_noise, steady_gain
 
 @dataclass(frozen=True)
 class Kalman:
-    """The operations and numbers of one mode's observer."""
+    """The operations and numbers of one mode's observer.
+
+    `start` sets its covariance at the first tick, `enter` when its mode is entered.
+    """
 
     predict: Block
     correct: Block
     constants: tuple[Constant, ...]
     info: ObserverInfo
+    start: Block = ()
+    enter: Block = ()
 
 
 def kalman(
@@ -64,11 +70,11 @@ def kalman(
         return None
     period = float(automaton.period)
     with problems.collecting():
-        a = _matrix(automaton, values, observer.a, observer.states, observer.states, "A")
-        b = _matrix(automaton, values, observer.b, observer.states, observer.inputs, "B")
-        c = _output_matrix(automaton, values, observer)
-        q = _diagonal(automaton, values, observer.process_noise, observer.states)
-        r = _diagonal(automaton, values, observer.measurement_noise, tuple(observer.measures))
+        a = number_matrix(automaton, values, observer.a, observer.states, observer.states, "A")
+        b = number_matrix(automaton, values, observer.b, observer.states, observer.inputs, "B")
+        c = output_matrix(automaton, values, observer)
+        q = number_diagonal(automaton, values, observer.process_noise, observer.states)
+        r = number_diagonal(automaton, values, observer.measurement_noise, tuple(observer.measures))
         try:
             phi, held = exponential(a, period), exponential_integral(a, period)
             gain, _ = steady_gain(phi, discrete_noise(a, q, period), c, r)
@@ -80,17 +86,24 @@ def kalman(
         own = {name: Ref(f"solved.{name}") for name in observer.constants}
         known = ({**before, **own}, {**now, **own})
         built = _built(automaton, mode, observer, known, numbers, (a, b, c, q, r))
-        more = tuple(
-            Constant(
-                f"solved.{name}",
-                "solved",
-                constant_value(formula, automaton, values, "what remains"),
-                depends_on=tunables_of(automaton, [formula]),
-            )
-            for name, formula in observer.constants.items()
-        )
+        more = rest_constants(automaton, observer, values)
         return dataclasses.replace(built, constants=(*built.constants, *more))
     return None
+
+
+def rest_constants(
+    automaton: Automaton, observer: Observer, values: Mapping[str, Scalar]
+) -> tuple[Constant, ...]:
+    """Return the constant parts of f and g."""
+    return tuple(
+        Constant(
+            f"solved.{name}",
+            "solved",
+            constant_value(formula, automaton, values, "what remains"),
+            depends_on=tunables_of(automaton, [formula]),
+        )
+        for name, formula in observer.constants.items()
+    )
 
 
 def observer_variables(automaton: Automaton) -> list[Variable]:
@@ -118,8 +131,8 @@ def _built(
     numbers: Mapping[str, Matrix],
     given: tuple[Matrix, Matrix, Matrix, Matrix, Matrix],
 ) -> Kalman:
-    names = _Names(mode.name, observer)
-    depends_on = tunables_of(automaton, _formulas(observer))
+    names = SolvedNames(mode.name, observer)
+    depends_on = tunables_of(automaton, solved_formulas(observer))
     constants = names.constants(numbers, depends_on)
     prefix = f"{automaton.name} "
     info = ObserverInfo(
@@ -135,22 +148,24 @@ def _built(
         period=float(automaton.period or 0),
         solved={constant.name: constant.name for constant in constants},
     )
-    predict = _predict(observer, names, numbers, known[0], prefix)
+    predict = mean_ahead(observer, names, numbers, known[0], prefix)
     correct = _correct(observer, names, numbers, known[1])
     return Kalman(predict, correct, constants, info)
 
 
 @dataclass(frozen=True)
-class _Names:
+class SolvedNames:
     """Names of an observer's solved constants: `solved.<mode>_<letter>.<row>.<column>`."""
 
     mode: str
     observer: Observer
 
     def of(self, letter: str, row: str, column: str) -> str:
+        """Return the name of an entry."""
         return f"solved.{self.mode}_{letter}.{row}.{column}"
 
     def sides(self, letter: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """Return the names of the rows and columns of a matrix."""
         states, measures = self.observer.states, tuple(self.observer.measures)
         return {
             "Phi": (states, states),
@@ -158,11 +173,12 @@ class _Names:
             "G": (states, states),
             "L": (states, measures),
             "C": (measures, states),
-        }[letter]
+        }.get(letter, (states, states))
 
     def constants(
         self, numbers: Mapping[str, Matrix], depends_on: tuple[str, ...]
     ) -> tuple[Constant, ...]:
+        """Return the entries of some matrices that are not 0."""
         found = []
         for letter, matrix in numbers.items():
             rows, columns = self.sides(letter)
@@ -191,13 +207,14 @@ def _left_out(letter: str, column: str, observer: Observer) -> bool:
     return letter == "G" and column not in observer.f
 
 
-def _predict(
+def mean_ahead(
     observer: Observer,
-    names: _Names,
+    names: SolvedNames,
     numbers: Mapping[str, Matrix],
     before: Names,
     prefix: str,
 ) -> Block:
+    """Return the prediction of the states over a period."""
     state: dict[str, Expr] = {name: Ref(f"state.{name}") for name in observer.states}
     held = {name: before[name] for name in observer.inputs}
     ops: list[Op] = []
@@ -214,7 +231,9 @@ def _predict(
     return tuple(ops)
 
 
-def _correct(observer: Observer, names: _Names, numbers: Mapping[str, Matrix], now: Names) -> Block:
+def _correct(
+    observer: Observer, names: SolvedNames, numbers: Mapping[str, Matrix], now: Names
+) -> Block:
     state: dict[str, Expr] = {name: Ref(f"state.{name}") for name in observer.states}
     error: dict[str, Expr] = {name: Ref(f"innovation.{name}") for name in observer.measures}
     ops: list[Op] = []
@@ -223,7 +242,7 @@ def _correct(observer: Observer, names: _Names, numbers: Mapping[str, Matrix], n
         if name in observer.g:
             parts.append(expression(observer.g[name].tree, now))
         seen = total(parts)
-        fresh = Ref(f"is_new.{name}")
+        fresh = is_fresh(observer, name)
         value = Select(fresh, subtract(Ref(f"input.{name}"), seen), real(0.0))
         ops.append(Assign(f"innovation.{name}", value))
     for row in observer.states:
@@ -233,13 +252,22 @@ def _correct(observer: Observer, names: _Names, numbers: Mapping[str, Matrix], n
     return tuple(ops)
 
 
-def _formulas(observer: Observer) -> list[Formula]:
+def is_fresh(observer: Observer, measure: str) -> Expr:
+    """Return whether a tick has a new value of a measurement."""
+    fresh = Ref(f"is_new.{measure}")
+    if observer.correct is None:
+        return fresh
+    return Binary("and", fresh, Ref(f"input.{observer.correct}"))
+
+
+def solved_formulas(observer: Observer) -> list[Formula]:
+    """Return the formulas that the solved numbers of an observer come from."""
     rows = [*observer.a.values(), *observer.b.values(), *observer.c.values()]
     noise = [observer.process_noise, observer.measurement_noise]
     return [formula for row in [*rows, *noise] for formula in row.values()]
 
 
-def _matrix(
+def number_matrix(
     automaton: Automaton,
     values: Mapping[str, Scalar],
     entries: Mapping[str, Mapping[str, Formula]],
@@ -247,6 +275,8 @@ def _matrix(
     columns: tuple[str, ...],
     what: str,
 ) -> Matrix:
+    """Return a matrix of formulas in numbers, by row and column name."""
+
     def value(row: str, column: str) -> float:
         formula = entries.get(row, {}).get(column)
         return constant_value(formula, automaton, values, what) if formula else 0.0
@@ -254,22 +284,22 @@ def _matrix(
     return tuple(tuple(value(row, column) for column in columns) for row in rows)
 
 
-def _diagonal(
+def number_diagonal(
     automaton: Automaton,
     values: Mapping[str, Scalar],
     entries: Mapping[str, Formula],
     names: tuple[str, ...],
 ) -> Matrix:
+    """Return a diagonal matrix of formulas in numbers."""
     rows = {name: {name: formula} for name, formula in entries.items()}
-    return _matrix(automaton, values, rows, names, names, "noise")
+    return number_matrix(automaton, values, rows, names, names, "noise")
 
 
-def _output_matrix(
-    automaton: Automaton, values: Mapping[str, Scalar], observer: Observer
-) -> Matrix:
+def output_matrix(automaton: Automaton, values: Mapping[str, Scalar], observer: Observer) -> Matrix:
+    """Return C (measures, states)."""
     measures = tuple(observer.measures)
     if observer.c:
-        return _matrix(automaton, values, observer.c, measures, observer.states, "C")
+        return number_matrix(automaton, values, observer.c, measures, observer.states, "C")
     return tuple(
         tuple(1.0 if state == observer.measures[name] else 0.0 for state in observer.states)
         for name in measures

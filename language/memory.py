@@ -89,9 +89,11 @@ class Edge:
 
 
 def formulas(mode: Mode) -> Iterator[Formula]:
-    """Yield the equations, updates, guards and resets of a mode."""
+    """Yield the equations, updates, noises, guards and resets of a mode."""
     yield from mode.equations.values()
     yield from mode.update.values()
+    if mode.observer:
+        yield from mode.observer.process_noise.values()
     for transition in mode.transitions:
         yield transition.when
         yield from transition.reset.values()

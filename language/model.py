@@ -157,7 +157,8 @@ class Observer:
     """A Kalman filter: dx/dt = A x + B u + f, y = C x + g, by row and column name.
 
     `of` is the mode of the model that A, B, f, C and g are taken from, at the point `at`; f and g
-    read `constants` by their names.
+    read `constants` by their names. Where it `runs`, the run of its mode predicts the states.
+    `limits` are those of the variances; `correct` is an input: whether a tick has measurements.
     """
 
     states: tuple[str, ...]
@@ -176,6 +177,10 @@ class Observer:
     g: Mapping[str, Formula] = field(default_factory=dict)
     constants: Mapping[str, Formula] = field(default_factory=dict)
     runs: bool = False
+    gain: str = "steady"
+    covariance: str = "steady"
+    correct: str | None = None
+    limits: Mapping[str, tuple[Formula, Formula]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

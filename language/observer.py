@@ -12,7 +12,8 @@ if TYPE_CHECKING:
     from language.reader import Reader
 
 WRITTEN_KEYS = ("inputs", "A", "B", "C", "f")
-OBSERVER_KEYS = ("kalman", "of", "at", *WRITTEN_KEYS, "measures")
+OBSERVER_KEYS = ("kalman", "of", "at", *WRITTEN_KEYS, "measures", "predict", "correct")
+KALMAN_KEYS = ("states", "gain", "covariance", "covariance_range")
 NOISE_KEYS = ("process_noise", "measurement_noise")
 RUN_KEYS = ("of", "method", "substeps", "events", "follow", "linearise")
 METHODS = ("euler", "midpoint", "rk4", "exact", "exponential")
@@ -25,10 +26,18 @@ Matrix = dict[str, dict[str, Formula]]
 def read_observer(reader: Reader, node: Node, key: str, model: Automaton | None) -> Observer:
     """Read an observer of a mode of the model, or one with written matrices."""
     table = reader.table(node, key, (*OBSERVER_KEYS, *NOISE_KEYS))
-    kalman = reader.table(table.get("kalman"), f"{key}.kalman", ("states", "gain"))
+    kalman = reader.table(table.get("kalman"), f"{key}.kalman", KALMAN_KEYS)
     if "kalman" not in table.entries:
         reader.problems.error("missing", node.span, "`kalman: {states: [...]}` is missing")
-    reader.choice(kalman.get("gain"), "gain", ("steady",), "steady")
+    gain = reader.choice(kalman.get("gain"), "gain", ("steady", "recursive"), "steady")
+    for name in ("covariance", "covariance_range"):
+        if gain == "steady" and name in kalman.entries:
+            label = f"`{name}` belongs to `gain: recursive`"
+            reader.problems.error("observer", kalman.entries[name].span, label)
+    runs = reader.choice(table.get("predict"), "predict", ("matrix", "runs"), "matrix") == "runs"
+    if runs and gain == "steady":
+        label = "`predict: runs` needs `gain: recursive`: the run's mode changes the covariance"
+        reader.problems.error("observer", table.entries["predict"].span, label)
     states = tuple(item.text for item in reader.items(kalman.get("states"), "states"))
     measures = {}
     for entry in reader.named(table.get("measures"), f"{key}.measures"):
@@ -57,7 +66,32 @@ def read_observer(reader: Reader, node: Node, key: str, model: Automaton | None)
         span=of_node.span if of_node else node.span,
         of=of,
         at=_point(reader, table.get("at"), f"{key}.at", model),
+        runs=runs,
+        gain=gain,
+        covariance=reader.choice(
+            kalman.get("covariance"), "covariance", ("steady", "keep"), "steady"
+        ),
+        correct=reader.text(table.get("correct"), "correct", node.span)
+        if "correct" in table.entries
+        else None,
+        limits=_limits(reader, kalman.get("covariance_range"), f"{key}.covariance_range", rows),
     )
+
+
+def _limits(
+    reader: Reader, node: Node | None, key: str, names: set[str]
+) -> dict[str, tuple[Formula, Formula]]:
+    """Read the limits of variances: `{w_em: [low, high]}` in the square of the state's unit."""
+    found = {}
+    for entry in reader.table(node, key):
+        if not _known(reader, entry, key, names):
+            continue
+        bounds = [reader.expression(n, key, n.span) for n in reader.items(entry.node, entry.key)]
+        if len(bounds) == 2 and bounds[0] and bounds[1]:
+            found[entry.key] = (bounds[0], bounds[1])
+        else:
+            reader.problems.error("form", entry.span, "limits of a variance are `[low, high]`")
+    return found
 
 
 def _one_source(reader: Reader, table: Table) -> None:

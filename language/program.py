@@ -154,6 +154,7 @@ class ObserverInfo:
     measurement_noise: tuple[tuple[float, ...], ...]
     period: float
     solved: Mapping[str, str]
+    gain: str = "steady"
 
 
 @dataclass(frozen=True)

@@ -41,6 +41,7 @@ from language.program import (
     Program,
     Variable,
 )
+from language.recursive import COVARIANCE_RANGE, covariance_variables, recursive
 from language.region import fired_variable, in_modes, mode_variable
 from language.run import EVENT_LIMIT, run_block, run_motion, start_regions
 from language.transition import enter_run, sampled_commit, sampled_jump, transition_infos
@@ -172,6 +173,7 @@ class _Sampled:
                 about = f"ticks that the guard has been true, at most {info.ticks + 1}"
                 found.append(Variable(info.timer, "whole", about=about))
         found += observer_variables(automaton)
+        found += covariance_variables(automaton)
         found += memory_variables(automaton, self.delays)
         found += mode_and_fired(automaton, "tick")
         found.append(Variable("memory.started", "truth", about="the first tick is done"))
@@ -185,18 +187,25 @@ class _Sampled:
 
     def _advance(self, mode: Mode) -> dict[str, Block]:
         """What carries the states from the tick before to this one."""
+        found: dict[str, Block] = {}
+        if mode.run:
+            if mode.run.follow and EVENT_LIMIT not in self.faults:
+                self.faults.append(EVENT_LIMIT)
+            found[f"run_{mode.name}"] = run_block(self.automaton, mode.run)
         if mode.observer:
-            made = kalman(self.automaton, mode, self.before, self.now, self.values, self.problems)
+            make = recursive if mode.observer.gain == "recursive" else kalman
+            made = make(self.automaton, mode, self.before, self.now, self.values, self.problems)
             if made is None:
                 return {}
             self.observers[mode.name] = made
             self.constants += made.constants
-            return {f"predict_{mode.name}": made.predict, f"correct_{mode.name}": made.correct}
-        if mode.run:
-            if mode.run.follow and EVENT_LIMIT not in self.faults:
-                self.faults.append(EVENT_LIMIT)
-            return {f"run_{mode.name}": run_block(self.automaton, mode.run)}
-        return {}
+            found[f"predict_{mode.name}"] = made.predict
+            found[f"correct_{mode.name}"] = made.correct
+            if made.enter:
+                found[f"cover_{mode.name}"] = made.enter
+            if mode.observer.limits and COVARIANCE_RANGE not in self.faults:
+                self.faults.append(COVARIANCE_RANGE)
+        return found
 
     def _update(self, mode: Mode) -> Block:
         """The assignments of an update read the values of before this tick's updates."""
@@ -218,6 +227,9 @@ class _Sampled:
         ops.append(Assign("memory.started", Value(True)))
         ops += enter_run(self.automaton, initial)
         ops += entry(self.automaton, initial, self.now)
+        starts = [o.start for name, o in self.observers.items() if name == initial.name and o.start]
+        starts += [observer.start for observer in self.observers.values() if observer.start]
+        ops += starts[0] if starts else ()
         if initial.name in self.observers:
             ops.append(Run(f"correct_{initial.name}"))
         return tuple(ops)

@@ -21,6 +21,7 @@ from language.operation import (
     Expr,
     Op,
     Ref,
+    Run,
     whole,
 )
 from language.problem import Problems
@@ -120,11 +121,16 @@ def sampled_commit(automaton: Automaton, region: Region, infos: tuple[Transition
 
 
 def enter_run(automaton: Automaton, target: Mode) -> list[Op]:
-    """Return what starts the run of a mode that is entered."""
+    """Return what starts the run of a mode that is entered, and the covariance of its observer."""
+    ops: list[Op] = []
+    observer = target.observer
+    if observer and observer.gain == "recursive" and observer.covariance == "steady":
+        ops.append(Run(f"cover_{target.name}"))
     if target.run is None or automaton.model is None:
-        return []
+        return ops
     number = automaton.model.modes[target.run.mode].number
-    return [Assign("memory.run_mode", whole(number), f"{automaton.name} {target.run.key}")]
+    ops.append(Assign("memory.run_mode", whole(number), f"{automaton.name} {target.run.key}"))
+    return ops
 
 
 def _at_once(
