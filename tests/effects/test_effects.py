@@ -116,6 +116,15 @@ def test_a_lag_follows_a_step_exponentially(tmp_path: Path) -> None:
     assert np.max(np.abs(speed(found) - wanted)) < 1e-7
 
 
+def test_a_dead_time_shifts_what_is_delivered(tmp_path: Path) -> None:
+    given = {"T": "{start: 0 N*m, steps: {0.1 s: 6 N*m}}"}
+    found = ran(tmp_path, "rotor", "{actuator_delay@T: {values: {T_d: 50 ms}}}", given)
+    wanted = 6 / J * np.maximum(found.times - 0.15, 0)
+    # Between major steps (1 ms) the past is interpolated: a step comes out as a ramp of one.
+    assert np.max(np.abs(speed(found) - wanted)) < 6 / J * 0.001
+    assert np.max(np.abs(np.diff(speed(found)[17:]) - 6 / J * 0.01)) < EXACT
+
+
 def test_a_rate_limit_makes_a_ramp_of_a_step(tmp_path: Path) -> None:
     limit = "{torque_rate_limit@T: {values: {r_max: 100}}}"
     found = ran(tmp_path, "rotor", limit, {"T": "{start: 0 N*m, steps: {0.1 s: 30 N*m}}"})
@@ -322,6 +331,7 @@ SENSED: list[tuple[str, Callable[[Array], Array]]] = [
         "{sensor_lag@w: {values: {tau: 100 ms}}}",
         lambda t: 3 * (t - 0.1 * (1 - np.exp(-t / 0.1))),
     ),
+    ("{sensor_delay@w: {values: {T_d: 50 ms}}}", lambda t: 3 * np.maximum(t - 0.05, 0)),
     (
         "{sensor_eccentricity@w: {values: {ecc: 0.05, ph: 0.3 rad}}}",
         lambda t: 3 * t * (1 + 0.05 * np.sin(1.5 * t**2 + 0.3)),
