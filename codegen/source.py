@@ -35,7 +35,7 @@ from language.program import (
 )
 from language.wiring import reads, walk
 
-GROUPS = ("state", "discrete", "equation", "before", "innovation", "timer")
+GROUPS = ("state", "discrete", "latched", "equation", "before", "innovation", "timer")
 """Nested structs of the instance, in order."""
 ENTRIES = ("init", "derive", "step")
 INLINE = ("min", "max", "clip", "sign", "pow2", "whole", "lookup", "lookup2")

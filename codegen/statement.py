@@ -63,8 +63,10 @@ class Writer:
                 yield "}"
             case Count(timer, condition, limit, key):
                 yield from self._count(self.place(timer), condition, limit, key)
-            case FaultBit(fault):
+            case FaultBit(fault, _, True):
                 yield f"self->faults |= {self.program.name}_FAULT_{fault};"
+            case FaultBit(fault, _, _):
+                yield f"self->faults &= (uint32_t)~{self.program.name}_FAULT_{fault};"
             case Run(name):
                 yield f"{name}({', '.join(self.usages[name].parameters)});"
 

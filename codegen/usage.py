@@ -26,6 +26,7 @@ GROUP_OF = {
     "work": "work",
     "state": "self",
     "discrete": "self",
+    "latched": "self",
     "equation": "self",
     "before": "self",
     "innovation": "self",

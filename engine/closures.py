@@ -41,6 +41,7 @@ class Compiler:
     def __init__(self, program: Program, slots: Mapping[str, int]) -> None:
         self.slots = slots
         self.faults = {name: 1 << bit for bit, name in enumerate(program.faults)}
+        self.left: dict[str, None] = {}
         fixed = ("constant.", "solved.")
         self.arithmetic = ARITHMETIC[program.number]
         value = self.arithmetic.value
@@ -87,8 +88,11 @@ class Compiler:
                 return _loop(count, self.slots[index], self._block(body))
             case Count(timer, condition, limit, _):
                 return _count(self.slots[timer], self._read(condition), limit)
-            case FaultBit(fault):
-                return _fault(self.slots["memory.faults"], self.faults[fault])
+            case FaultBit(fault, signal, True):
+                slot, bit = self.slots["memory.faults"], self.faults[fault]
+                return _fault(slot, bit, signal, self.left)
+            case FaultBit(fault, _, _):
+                return _clear(self.slots["memory.faults"], self.faults[fault])
             case Run(name):
                 return _run(self.blocks[name])
 
@@ -266,9 +270,18 @@ def _count(slot: int, condition: Read, limit: int) -> Action:
     return act
 
 
-def _fault(slot: int, bit: int) -> Action:
+def _fault(slot: int, bit: int, signal: str, left: dict[str, None]) -> Action:
     def act(v: Frame) -> None:
         v[slot] |= bit
+        if signal:
+            left[signal] = None
+
+    return act
+
+
+def _clear(slot: int, bit: int) -> Action:
+    def act(v: Frame) -> None:
+        v[slot] &= ~bit
 
     return act
 

@@ -19,7 +19,7 @@ from engine.stimulus import resolved
 from engine.surroundings import Surroundings
 from engine.trajectory import Event, Trajectory, fault_names
 from language.model import CHART, Connection, Scenario, System
-from language.program import Program
+from language.program import Program, short
 
 Build = Callable[[Program], Stepper]
 Ticked = Callable[[str, Program, Stepper], None]
@@ -63,6 +63,12 @@ class _Simulation:
             for name, program in self.programs.items()
             for variable in program.variables
             if variable.name.startswith("is_new.")
+        }
+        self.limited = {
+            (name, short(variable.name))
+            for name, program in self.programs.items()
+            for variable in program.variables
+            if variable.name.startswith("latched.")
         }
         self.around: dict[str, Surroundings] = {}
         self.flows: dict[str, ContinuousRun] = {}
@@ -195,7 +201,7 @@ class _Simulation:
             before = stepper.get(f"input.{thing}")
             stepper.set(f"input.{thing}", value)
             now = stepper.get(f"input.{thing}")
-            if not math.isfinite(now):
+            if not math.isfinite(now) and (name, thing) not in self.limited:
                 raise Stopped(f"{self._where(name, time)}: input `{thing}` is {now}")
             changed = changed or now != before
         return changed

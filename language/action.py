@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
+from language.limit import stored
 from language.lower import (
     WHOLE_TYPES,
     Names,
@@ -49,7 +50,7 @@ def committing(automaton: Automaton, written: Iterable[str], verb: str = "reset"
     found: list[Op] = []
     for name in written:
         whole = automaton.carried[name].type in WHOLE_TYPES
-        found.append(Assign(place_of(automaton, name), Ref(f"work.{verb}_{name}", whole)))
+        found += stored(automaton, name, Ref(f"work.{verb}_{name}", whole))
     return found
 
 

@@ -12,12 +12,9 @@ from language.mode import ModeReader
 from language.model import (
     Automaton,
     Fitting,
-    Formula,
-    Input,
     Kind,
     Parameter,
     Range,
-    State,
 )
 from language.names import check_file_name
 from language.number import NUMBERS, NumberType
@@ -27,14 +24,15 @@ from language.problem import Problems, nearest
 from language.project import Project, expanded, read_document
 from language.reader import Reader
 from language.region import with_regions
-from language.syntax import Broken
 from language.table import TableReader, section
 from language.units import NO_UNIT, SECOND, Unit, fits, parse_unit
 from language.values import with_value
+from language.variable import VariableReader
 
 COMMON_KEYS = ("language", "automaton", "parameters", "inputs", "states", "discrete", "equations")
 LOGIC_KEYS = ("flow", "terms", "initial", "modes", "regions", "templates", "outputs")
 LAID_KEYS = ("elements", "places")
+FAULT_KEYS = ("faults", "fault_mode")
 CLOCK_KEYS = ("period", "step", "method", "numbers", "model")
 FITTING_KEYS = ("neutral", "starts", "per", "form")
 FORMS = ("constant", "constant_or_random_walk")
@@ -120,7 +118,7 @@ class _AutomatonReader(Reader):
     """The sections of an automaton, one method each."""
 
     def read(self, document: Document, tree: Table, model: Automaton | None) -> Automaton:
-        keys = (*COMMON_KEYS, *LOGIC_KEYS, *LAID_KEYS, *CLOCK_KEYS)
+        keys = (*COMMON_KEYS, *LOGIC_KEYS, *LAID_KEYS, *CLOCK_KEYS, *FAULT_KEYS)
         tree = self.table(tree, f"automaton {document.name}", keys)
         self.at = document.name_span
         check_file_name(document.name, document.name_span, self.problems)
@@ -132,6 +130,7 @@ class _AutomatonReader(Reader):
         own = {e.key: self._parameter(e) for e in self.named(tree.get("parameters"), "parameters")}
         chart, *beside = ModeReader(self.problems, model).regions(tree, self.at)
         laid_on = ElementReader(self.problems)
+        variables = VariableReader(self.problems, model, self.sampled, tree, chart.modes)
         outputs = laid_on.outputs(tree.get("outputs"))
         automaton = Automaton(
             name=document.name,
@@ -140,9 +139,9 @@ class _AutomatonReader(Reader):
             method=self.choice(tree.get("method"), "method", METHODS, "rk4"),
             model=model,
             parameters={**(model.parameters if model else {}), **own},
-            inputs={e.key: self._input(e) for e in self.named(tree.get("inputs"), "inputs")},
-            states=self._states(tree),
-            discrete=self._discrete(tree),
+            inputs=variables.inputs(tree.get("inputs")),
+            states=variables.states(tree.get("states")),
+            discrete=variables.discrete(tree.get("discrete")),
             modes=with_regions(chart.modes, tuple(beside)),
             initial=chart.initial,
             outputs=outputs.spans,
@@ -152,6 +151,8 @@ class _AutomatonReader(Reader):
             places=laid_on.places(tree.get("places")),
             regions=tuple(beside),
             numbers=numbers,
+            faults=variables.faults,
+            fault_mode=variables.fault_mode,
         )
         self._check_sections(tree)
         return automaton
@@ -164,7 +165,8 @@ class _AutomatonReader(Reader):
         return cast(NumberType, self.choice(node, "numbers", NUMBERS, "float64"))
 
     def _check_sections(self, tree: Table) -> None:
-        for key in ("flow", "terms", "step", "method") if self.sampled else ("model",):
+        first = ("flow", "terms", "step", "method")
+        for key in first if self.sampled else ("model", *FAULT_KEYS):
             node = tree.get(key)
             if node is not None:
                 other = "continuous" if self.sampled else "sampled"
@@ -256,53 +258,3 @@ class _AutomatonReader(Reader):
         per = self.choice(table.get("per"), "per", ("model", "recording"), "model")
         form = self.choice(table.get("form"), "form", FORMS, "constant")
         return Fitting(neutral, tuple(starts), cast(Per, per), cast(Form, form))
-
-    def _input(self, entry: Entry) -> Input:
-        keys = ("unit", "range", "default", "type", "values")
-        table = self.table(entry.node, f"inputs.{entry.key}", keys)
-        kind, values = self.typing(table, entry.key)
-        unit = self.unit(table.get("unit"))
-        default: Fraction | None = None
-        node = table.get("default")
-        if node is not None:
-            what = f"inputs.{entry.key}.default"
-            default = self.value(node, what, node.span, unit, kind, values)
-        limits = self.range(table.get("range"), unit)
-        if kind == "int":
-            limits = self.whole_range(limits, table.get("range"))
-        key = f"inputs.{entry.key}"
-        return Input(entry.key, unit, kind, default, limits, key, entry.span, values)
-
-    def _discrete(self, tree: Table) -> dict[str, State]:
-        found = {}
-        for entry in self.named(tree.get("discrete"), "discrete"):
-            key = f"discrete.{entry.key}"
-            table = self.table(entry.node, key, ("type", "values", "unit", "initial", "range"))
-            kind, values = self.typing(table, entry.key)
-            unit = self.unit(table.get("unit"))
-            initial = self.expression(table.get("initial"), f"{key}.initial", entry.span)
-            limits = self.range(table.get("range"), unit)
-            if kind == "int":
-                limits = self.whole_range(limits, table.get("range"))
-            if initial:
-                found[entry.key] = State(
-                    entry.key, unit, initial, limits, key, entry.span, kind, values
-                )
-        return found
-
-    def _states(self, tree: Table) -> dict[str, State]:
-        found = {}
-        for entry in self.named(tree.get("states"), "states"):
-            table = self.table(entry.node, f"states.{entry.key}", ("unit", "initial", "range"))
-            known = self.model.states.get(entry.key) if self.model else None
-            unit = (
-                known.unit
-                if known and "unit" not in table.entries
-                else self.unit(table.get("unit"))
-            )
-            key = f"states.{entry.key}"
-            initial = self.expression(table.get("initial"), f"{key}.initial", entry.span)
-            limits = self.range(table.get("range"), unit)
-            start = initial or Formula(Broken(entry.span), f"{key}.initial")
-            found[entry.key] = State(entry.key, unit, start, limits, key, entry.span)
-        return found

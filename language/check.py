@@ -21,6 +21,7 @@ from language.model import (
     LookupTable,
     Mode,
     Parameter,
+    Region,
     State,
     SystemInput,
 )
@@ -48,7 +49,7 @@ def check_automaton(automaton: Automaton, problems: Problems) -> Automaton:
     check_memory(checked, problems)
     problems.stop_if_any()
     for region in checked.all_regions:
-        for name in unreached(region.modes, region.initial):
+        for name in _never_entered(checked, region):
             label = f"mode `{name}` is never entered"
             problems.warning("unreached", region.modes[name].span, label)
     for mode in checked.all_modes:
@@ -397,6 +398,8 @@ class _Check:
             name = automaton.source_of(output)
             if name == "mode" or name in automaton.carried:
                 continue
+            if name == "faults" and automaton.is_sampled:
+                continue
             if name not in equations:
                 hint = nearest(name, [*equations, *automaton.carried, "mode"])
                 label = f"output `{name}` is not a state, an equation or `mode`"
@@ -431,6 +434,15 @@ def declared_kind(thing: Parameter | Input | State | SystemInput) -> Kind:
         limits = getattr(thing, "range", None)
         return Whole(int(limits[0]), int(limits[1])) if limits else Whole()
     return thing.unit.dimension
+
+
+def _never_entered(automaton: Automaton, region: Region) -> list[str]:
+    """Return the modes that neither the initial mode nor a fault leads to."""
+    found = unreached(region.modes, region.initial)
+    fault_mode = automaton.fault_mode
+    if fault_mode is not None and fault_mode in region.modes:
+        found = [name for name in found if name in unreached(region.modes, fault_mode)]
+    return found
 
 
 def _of_model(automaton: Automaton) -> Mapping[str, object]:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from language.constants import constant_value
 from language.derived import with_model
 from language.evaluate import Scalar
+from language.limit import stored
 from language.lower import Names, expression, tunables_of
 from language.matrix import Matrix, exponential, exponential_integral, multiply
 from language.model import Automaton, Formula, Mode, Observer
@@ -148,8 +149,8 @@ def _built(
         period=float(automaton.period or 0),
         solved={constant.name: constant.name for constant in constants},
     )
-    predict = mean_ahead(observer, names, numbers, known[0], prefix)
-    correct = _correct(observer, names, numbers, known[1])
+    predict = mean_ahead(automaton, observer, names, numbers, known[0], prefix)
+    correct = _correct(automaton, observer, names, numbers, known[1])
     return Kalman(predict, correct, constants, info)
 
 
@@ -208,6 +209,7 @@ def _left_out(letter: str, column: str, observer: Observer) -> bool:
 
 
 def mean_ahead(
+    automaton: Automaton,
     observer: Observer,
     names: SolvedNames,
     numbers: Mapping[str, Matrix],
@@ -227,12 +229,17 @@ def mean_ahead(
         parts += names.row("Gamma", numbers["Gamma"], row, held)
         parts += names.row("G", numbers["G"], row, free)
         ops.append(Assign(f"work.predicted_{row}", total(parts), prefix + observer.key))
-    ops += [Assign(f"state.{row}", Ref(f"work.predicted_{row}")) for row in observer.states]
+    for row in observer.states:
+        ops += stored(automaton, row, Ref(f"work.predicted_{row}"))
     return tuple(ops)
 
 
 def _correct(
-    observer: Observer, names: SolvedNames, numbers: Mapping[str, Matrix], now: Names
+    automaton: Automaton,
+    observer: Observer,
+    names: SolvedNames,
+    numbers: Mapping[str, Matrix],
+    now: Names,
 ) -> Block:
     state: dict[str, Expr] = {name: Ref(f"state.{name}") for name in observer.states}
     error: dict[str, Expr] = {name: Ref(f"innovation.{name}") for name in observer.measures}
@@ -243,12 +250,12 @@ def _correct(
             parts.append(expression(observer.g[name].tree, now))
         seen = total(parts)
         fresh = is_fresh(observer, name)
-        value = Select(fresh, subtract(Ref(f"input.{name}"), seen), real(0.0))
+        value = Select(fresh, subtract(now[name], seen), real(0.0))
         ops.append(Assign(f"innovation.{name}", value))
     for row in observer.states:
         parts = names.row("L", numbers["L"], row, error)
         if parts:
-            ops.append(Assign(f"state.{row}", add(Ref(f"state.{row}"), total(parts))))
+            ops += stored(automaton, row, add(Ref(f"state.{row}"), total(parts)))
     return tuple(ops)
 
 

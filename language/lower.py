@@ -8,6 +8,7 @@ from typing import Literal
 from language.balance import coefficient_of
 from language.graph import post_order
 from language.kind import Type
+from language.limit import is_limited
 from language.model import Automaton, Balance, Formula, Mode, Region
 from language.number import rounded
 from language.operation import (
@@ -229,7 +230,8 @@ def variable_names(automaton: Automaton, inputs: str) -> dict[str, Expr]:
     """Return inputs (of a group), states and discrete variables as what a Program reads."""
     found: dict[str, Expr] = {}
     for name, thing in automaton.inputs.items():
-        found[name] = Ref(f"{inputs}.{name}", thing.type in WHOLE_TYPES)
+        group = "latched" if inputs == "input" and is_limited(automaton, thing) else inputs
+        found[name] = Ref(f"{group}.{name}", thing.type in WHOLE_TYPES)
     found.update({name: Ref(f"state.{name}") for name in automaton.states})
     for name, variable in automaton.discrete.items():
         found[name] = Ref(f"discrete.{name}", variable.type in WHOLE_TYPES)

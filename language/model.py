@@ -94,6 +94,18 @@ class Parameter:
 
 
 @dataclass(frozen=True)
+class Limits:
+    """What becomes of a value outside its range (rule 18), and the fault bit that it sets.
+
+    `fallback` (a value in SI, or `hold`) is for a value that is not finite.
+    """
+
+    on_range: Literal["saturate", "hold", "fault"] = "saturate"
+    fallback: Fraction | Literal["hold"] | None = None
+    fault: str | None = None
+
+
+@dataclass(frozen=True)
 class Input:
     """A value from outside; `values` are those of an `enum`."""
 
@@ -105,6 +117,7 @@ class Input:
     key: str
     span: Span
     values: tuple[str, ...] = ()
+    limits: Limits = Limits()
 
     @property
     def truth(self) -> bool:
@@ -124,6 +137,7 @@ class State:
     span: Span
     type: Type = "real"
     values: tuple[str, ...] = ()
+    limits: Limits = Limits()
 
 
 @dataclass(frozen=True)
@@ -278,6 +292,8 @@ class Automaton:
     method: str = "rk4"
     dimensions: Mapping[str, Dimension] = field(default_factory=dict, repr=False)
     discrete: Mapping[str, State] = field(default_factory=dict)
+    faults: Mapping[str, bool] = field(default_factory=dict)
+    fault_mode: str | None = None
     kinds: Mapping[str, ValueKind] = field(default_factory=dict, repr=False)
     sources: Mapping[str, str] = field(default_factory=dict)
     elements: Mapping[str, Element] = field(default_factory=dict)

@@ -142,9 +142,11 @@ class Count:
 
 @dataclass(frozen=True, slots=True)
 class FaultBit:
-    """Set a latched fault bit."""
+    """Set a fault bit, for the range of a `signal`; or clear one that is not latched."""
 
     fault: str
+    signal: str = ""
+    value: bool = True
 
 
 @dataclass(frozen=True, slots=True)

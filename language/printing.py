@@ -88,8 +88,8 @@ def _op_lines(op: Op) -> Iterator[str]:
             yield from block_lines(body, 1)
         case Count(timer, condition, limit, key):
             yield f"count {timer} up to {limit} while {expr_text(condition)}{_cited(key)}"
-        case FaultBit(fault):
-            yield f"fault {fault}"
+        case FaultBit(fault, signal, value):
+            yield f"{'fault' if value else 'no fault'} {fault}{f' of {signal}' if signal else ''}"
         case Run(name):
             yield f"run {name}"
 

@@ -7,6 +7,7 @@ Names are `group.name`; the group says what a variable is and where a back end k
     input     of this tick               before       the inputs of the tick before
     state     carried over               equation     evaluated each tick
     discrete  carried over, frozen while the states flow
+    latched   inputs of this tick within their ranges
     memory    mode, fired, counters ...  work         lives within one call only
 """
 

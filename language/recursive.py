@@ -26,6 +26,7 @@ from language.kalman import (
     rest_constants,
     solved_formulas,
 )
+from language.limit import stored
 from language.lower import Names, constant_names, expression, tunables_of
 from language.matrix import (
     Matrix,
@@ -243,7 +244,9 @@ class _Recursive:
         more = {name: Ref(f"solved.{name}") for name in observer.constants}
         known = {**self.before, **more}
         prefix = f"{self.automaton.name} "
-        mean = mean_ahead(observer, solved, {**own.numbers, **numbers}, known, prefix)
+        mean = mean_ahead(
+            self.automaton, observer, solved, {**own.numbers, **numbers}, known, prefix
+        )
         return mean, solved.constants(numbers, self.depends_on)
 
     def _by_run(self, given: Observer) -> tuple[Block, tuple[Constant, ...]]:
@@ -318,7 +321,7 @@ class _Recursive:
         for k, name in enumerate(observer.measures):
             fresh = is_fresh(observer, name)
             seen = self._seen(observer, solved, c, name, known)
-            error = subtract(Ref(f"input.{name}"), seen)
+            error = subtract(known[name], seen)
             first.append(Branch(fresh, (Assign(f"innovation.{name}", error),)))
             second.append(Branch(fresh, self._one(observer, solved, c, k, error)))
         return (*first, *second)
@@ -348,7 +351,7 @@ class _Recursive:
         for row in states:
             ops.append(Assign(f"work.gain_{row}", divide(pc[row], Ref("work.spread"))))
             moved = times(Ref(f"work.gain_{row}"), Ref("work.residual"))
-            ops.append(Assign(f"state.{row}", add(Ref(f"state.{row}"), moved)))
+            ops += stored(self.automaton, row, add(Ref(f"state.{row}"), moved))
         for row, column in self._pairs():
             less_by = times(Ref(f"work.gain_{row}"), pc[column])
             old_entry = Ref(_entry(row, column))

@@ -20,6 +20,7 @@ from language.field import (
     switch,
 )
 from language.integration import method_of
+from language.limit import kept
 from language.linear import Point
 from language.linearised import linearised
 from language.lower import constant_names, typed, variable_names
@@ -130,7 +131,9 @@ def run_block(automaton: Automaton, run: ModelRun) -> Block:
         Assign("work.left", substep, f"{automaton.name} {run.key}"),
         Loop(run.events + 1, "work.event", (Branch(left, segment),)),
     )
-    return body if run.substeps == 1 else (Loop(run.substeps, "work.substep", body),)
+    before, after_all = kept(automaton, model.states)
+    moved: Block = body if run.substeps == 1 else (Loop(run.substeps, "work.substep", body),)
+    return (*before, *moved, *after_all)
 
 
 def _refuse_actions(automaton: Automaton, model: Automaton, problems: Problems) -> None:

@@ -9,11 +9,21 @@ of its model's field.
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 
 from language.action import action_variables, committing, discrete_variables, entry, reading
 from language.constants import derive_block, parameter_constants, values_of
 from language.evaluate import Scalar
+from language.fault import FAULT_GUARD, with_fault_transitions
 from language.kalman import Kalman, kalman, observer_variables
+from language.limit import (
+    HAPPENED,
+    MAX_FAULTS,
+    PENDING,
+    first_latched,
+    latch,
+    limit_variables,
+)
 from language.lower import constant_names, equation_names, equations, variable_names
 from language.memory import delays_of, keep_block, memory_variables, with_delays
 from language.model import CHART, Automaton, Mode, Region
@@ -54,6 +64,7 @@ from language.wiring import (
     mode_and_fired,
     none_fired,
     state_variables,
+    walk,
 )
 
 STALE_CALIBRATION = "stale_calibration"
@@ -73,6 +84,7 @@ class _Sampled:
     """Builds the blocks; one method per phase of the tick."""
 
     def __init__(self, automaton: Automaton, problems: Problems) -> None:
+        automaton = with_fault_transitions(automaton)
         self.automaton = automaton
         self.problems = problems
         self.prefix = f"{automaton.name} "
@@ -85,7 +97,7 @@ class _Sampled:
         self.motion: MotionInfo | None = None
         self.before = self._names("before")
         self.delays = delays_of(automaton)
-        names = {n: Ref(f"equation.{n}") for m in automaton.all_modes for n in m.equations}
+        names = equation_names(automaton.all_modes, "equation.")
         self.all = with_delays(self.delays, {**self._names("input"), **names})
         self.now = {name: value for name, value in self.all.items() if name not in names}
 
@@ -94,6 +106,7 @@ class _Sampled:
         known = dict(constant_names(automaton))
         known.update(variable_names(automaton, group))
         known.update(in_modes(automaton, "memory.mode"))
+        known[FAULT_GUARD] = Ref(HAPPENED)
         if automaton.model:
             known.update(in_modes(automaton.model, "memory.run_mode", f"{automaton.model.name}."))
             for mode in automaton.model.modes.values():
@@ -125,12 +138,24 @@ class _Sampled:
         program = assembled(automaton, blocks, self.constants, variables, self.transitions)
         program = dataclasses.replace(
             program,
-            faults=tuple(self.faults),
+            faults=self._fault_names(blocks),
             run_modes=self._run_modes() if runs else (),
             observers=tuple(observer.info for observer in self.observers.values()),
             motion=self.motion,
         )
         return finished(program, entries=("init", "derive", STAMPS, "step"))
+
+    def _fault_names(self, blocks: Mapping[str, Block]) -> tuple[str, ...]:
+        """The faults that are declared, then all others that something sets."""
+        ops = [op for block in blocks.values() for op in walk(block)]
+        named = [op.fault for op in ops if isinstance(op, FaultBit)]
+        found = tuple(dict.fromkeys([*self.automaton.faults, *self.faults, *named]))
+        if len(found) > MAX_FAULTS:
+            label = f"there are {len(found)} fault bits: {MAX_FAULTS} fit into one word"
+            hint = "give several ranges one bit: `fault: name` beside them"
+            self.problems.error("faults", self.automaton.span, label, hint)
+            self.problems.stop_if_any()
+        return found
 
     def _phases(self, mode: Mode) -> dict[str, Block]:
         """Equations, jump and update of one mode."""
@@ -150,7 +175,12 @@ class _Sampled:
         inputs, stamps = self.automaton.inputs, self._stamps()
         found: dict[str, Block] = {STAMPS: stamps} if stamps else {}
         return found | {
-            "remember": tuple(Assign(f"before.{n}", Ref(f"input.{n}")) for n in inputs),
+            "latch": latch(self.automaton),
+            "remember": tuple(
+                Assign(f"before.{n}", ref)
+                for n, ref in variable_names(self.automaton, "input").items()
+                if n in inputs
+            ),
             "keep": keep_block(self.automaton, self.delays, self.all),
             "start": self._start(),
             "derive": derive_block(self.automaton),
@@ -179,6 +209,7 @@ class _Sampled:
         found.append(Variable("memory.started", "truth", about="the first tick is done"))
         found.append(Variable("memory.faults", "whole", about="latched fault bits"))
         found += action_variables(automaton)
+        found += limit_variables(automaton)
         return list({variable.name: variable for variable in found}.values())
 
     def _run_modes(self) -> tuple[ModeInfo, ...]:
@@ -240,6 +271,7 @@ class _Sampled:
             Assign("memory.started", Value(False)),
             *enter_initial(self.automaton, "memory.mode"),
             Assign("memory.faults", whole(0)),
+            *first_latched(self.automaton),
         ]
         return (*ops, Run(STAMPS)) if stamps else tuple(ops)
 
@@ -269,12 +301,18 @@ class _Sampled:
         advance = [(mode.number, self._carried(mode)) for mode in modes]
         cases = tuple((number, block) for number, block in advance if block)
         ops: list[Op] = none_fired(self.automaton)
+        unlatched = [name for name, latched in self.automaton.faults.items() if not latched]
+        ops += [FaultBit(name, value=False) for name in unlatched]
+        if latch(self.automaton):
+            ops.append(Run("latch"))
         measured = {name: None for o in self.observers.values() for name in o.info.measures}
         ops += [Assign(f"innovation.{name}", real(0.0)) for name in measured]
         then: Block = (Choose("memory.mode", cases),) if cases else ()
         ops.append(Branch(Ref("memory.started"), then, (Run("start"),)))
         ops.append(self._each("equations"))
         regions = self.automaton.all_regions
+        if self.automaton.fault_mode:
+            ops += [Assign(HAPPENED, Ref(PENDING)), Assign(PENDING, Value(False))]
         ops += [self._in(region, "jump") for region in regions]
         if self.automaton.regions:
             ops += [Run(f"commit_{region.name}") for region in regions]

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from language.functions import FUNCTIONS_OF
 from language.graph import post_order
 from language.kind import Enumeration, Whole
+from language.limit import started
 from language.lower import WHOLE_TYPES, assigned, typed
 from language.model import CHART, Automaton, Region
 from language.number import NumberType, rounded
@@ -143,8 +144,7 @@ def initial_ops(automaton: Automaton, known: Mapping[str, Expr], prefix: str) ->
     for name in post_order({name: state.initial.reads for name, state in carried.items()}):
         state = carried[name]
         value = assigned(state.initial.tree, known, state.type in WHOLE_TYPES)
-        group = "discrete" if name in automaton.discrete else "state"
-        ops.append(Assign(f"{group}.{name}", value, prefix + state.initial.key))
+        ops += started(automaton, name, value, prefix + state.initial.key)
     return ops
 
 
