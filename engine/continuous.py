@@ -10,6 +10,7 @@ from typing import Protocol
 
 from engine.interpreter import Stepper
 from engine.keeping import Alarms, Records
+from engine.range_watch import RangeWatch
 from engine.trajectory import Event
 from language.motion import merge_time
 from language.program import Program, TransitionInfo, short
@@ -87,6 +88,7 @@ class ContinuousRun:
         states = tuple(v.name for v in program.variables if v.name.startswith("state."))
         self._states = states
         self._read_states = stepper.reader(states)
+        self._ranges = RangeWatch(name, program, stepper, log)
 
     def start(self) -> None:
         """Put the states where they start; `settle` enters the initial mode (rule 16)."""
@@ -131,6 +133,7 @@ class ContinuousRun:
         self.stepper.run("watch")
         self._start_timers()
         self.stepper.run("equations")
+        self._ranges.look(self.time)
         self._around.watch(self.time)
         self.is_settled = True
 
@@ -188,6 +191,7 @@ class ContinuousRun:
         elapsed = self.stepper.get("work.elapsed")
         at_end = not crossed or h - elapsed <= merge
         self.time = stop if at_end else self.time + Fraction(elapsed)
+        self._ranges.look(self.time)
         if self._looks and self._looks[0] < self.time:
             self._look_inside(start, stop, states)
         self._around.place(self.time)

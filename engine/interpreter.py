@@ -27,6 +27,9 @@ class Stepper(Protocol):
     def reader(self, names: tuple[str, ...]) -> Callable[[], tuple[Any, ...]]:
         """Return a function that returns the values of some variables."""
 
+    def left(self) -> tuple[str, ...]:
+        """Return the signals that left their range since this was asked last."""
+
 
 class Interpreter:
     """A Program with its frame of values. Variables start at 0 or false, `init` has run."""
@@ -46,6 +49,7 @@ class Interpreter:
         self._real += [constant.type == "real" for constant in program.constants]
         compiler = Compiler(program, self._slots)
         self._blocks = compiler.blocks
+        self._left = compiler.left
         for entry in ("derive", "init"):
             if entry in self._blocks and program.period is not None:
                 self.run(entry)
@@ -65,6 +69,12 @@ class Interpreter:
         """Set a variable; a real is rounded to the number type, once."""
         slot = self._slots[name]
         self._frame[slot] = self._arithmetic.real(value) if self._real[slot] else value
+
+    def left(self) -> tuple[str, ...]:
+        """Return the signals that left their range since this was asked last."""
+        found = tuple(self._left)
+        self._left.clear()
+        return found
 
     def has(self, name: str) -> bool:
         """Tell whether the Program has a variable or constant."""

@@ -91,6 +91,10 @@ class LibraryStepper:
         """Return a function that returns the values of some variables."""
         return self._inner.reader(names)
 
+    def left(self) -> tuple[str, ...]:
+        """Return nothing: a continuous automaton is never held in a range."""
+        return ()
+
     def run(self, block: str) -> None:
         """Run a block, `flow` by scipy."""
         if block == "flow":

@@ -11,6 +11,7 @@ from typing import Any
 from engine.continuous import ContinuousRun, Stopped
 from engine.interpreter import Interpreter, Stepper
 from engine.page import calibrate
+from engine.range_watch import left_range
 from engine.rows import Rows, recorded
 from engine.schedule import Schedule
 from engine.signals import Signals
@@ -64,6 +65,8 @@ class _Simulation:
             for variable in program.variables
             if variable.name.startswith("is_new.")
         }
+        self.left: set[tuple[str, str]] = set()
+        self.words: dict[str, int] = {}
         self.limited = {
             (name, short(variable.name))
             for name, program in self.programs.items()
@@ -249,9 +252,21 @@ class _Simulation:
                 self.events.append(
                     Event(float(time), 0, name, info.name, modes[0], modes[1], info.region)
                 )
+        self._note_ranges(name, time)
         if self.ticked:
             self.ticked(name, program, stepper)
         self._require_finite(name, time)
+
+    def _note_ranges(self, name: str, time: Fraction) -> None:
+        """Report each signal that was held in its range once, with time and mode (rule 18)."""
+        stepper, program = self.steppers[name], self.programs[name]
+        self.words[name] = self.words.get(name, 0) | stepper.get("memory.faults")
+        for signal in stepper.left():
+            if (name, signal) not in self.left:
+                self.left.add((name, signal))
+                mode = program.mode_name(stepper.get("memory.mode"))
+                text = f"`{signal}` was held in its range"
+                self.events.append(left_range(float(time), name, signal, mode, text))
 
     def _move_lags(self, sources: Sequence[str], time: Fraction) -> None:
         for run in self.signals.sensors.values():
@@ -288,6 +303,6 @@ class _Simulation:
                 fault
                 for name, program in self.programs.items()
                 if program.faults
-                for fault in fault_names(name, program, self.steppers[name].get("memory.faults"))
+                for fault in fault_names(name, program, self.words.get(name, 0))
             ),
         )

@@ -6,7 +6,7 @@ import csv
 import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,11 @@ TIME = "t [s]"
 
 @dataclass(frozen=True)
 class Event:
-    """A transition: time [s], micro-step at that instant, and what changed."""
+    """A transition: time [s], micro-step at that instant, and what changed.
+
+    Of another `kind` is a signal that left its range: `transition` names it, `message` says how,
+    `source` and `target` are both the mode that was active.
+    """
 
     time: float
     micro_step: int
@@ -34,6 +38,8 @@ class Event:
     source: str
     target: str
     region: str = CHART
+    kind: Literal["transition", "range"] = "transition"
+    message: str = ""
 
 
 @dataclass(frozen=True)

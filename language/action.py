@@ -19,6 +19,7 @@ from language.lower import (
 from language.model import Automaton, Formula, Mode
 from language.operation import Assign, Block, Op, Ref
 from language.program import Variable, value_type
+from language.wiring import watched_range
 
 
 def place_of(automaton: Automaton, name: str) -> str:
@@ -86,6 +87,7 @@ def discrete_variables(automaton: Automaton) -> list[Variable]:
             str(thing.unit.dimension),
             about=thing.key,
             values=thing.values,
+            range=watched_range(automaton, thing),
         )
         for name, thing in automaton.discrete.items()
     ]

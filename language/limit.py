@@ -28,6 +28,7 @@ from language.operation import (
     real,
     subtract,
 )
+from language.problem import Problems
 from language.program import Variable, value_type
 
 MAX_FAULTS = 32
@@ -136,6 +137,24 @@ def limited(
     return ops
 
 
+def limited_things(automaton: Automaton) -> list[Input | State]:
+    """Return all that may have a range: inputs, states, discrete variables."""
+    return [*automaton.inputs.values(), *automaton.carried.values()]
+
+
+def require_ranges(automaton: Automaton) -> None:
+    """Refuse an automaton for C in which a number has no range (rule 18). Raises SpecError."""
+    problems = Problems()
+    for thing in limited_things(automaton):
+        if thing.type in ("real", "int") and thing.range is None:
+            kind, _, name = thing.key.partition(".")
+            label = f"`{name}` has no `range`: in C every number of `{kind}` is held in one"
+            problems.error(
+                "range", thing.span, label, "add it in the unit of the value: `range: [0, 1]`"
+            )
+    problems.stop_if_any()
+
+
 def limit_variables(automaton: Automaton) -> list[Variable]:
     """Return the variables that ranges use."""
     found = [
@@ -156,26 +175,25 @@ def limit_variables(automaton: Automaton) -> list[Variable]:
 
 
 def _may_keep(thing: Input | State) -> bool:
-    return thing.limits.on_range in ("hold", "fault") or thing.limits.fallback == "hold"
+    keeps = thing.limits.on_range in ("hold", "fault") or thing.type == "enum"
+    return keeps or thing.limits.fallback == "hold"
 
 
 def _replaced(thing: Input | State, target: str, value: Expr) -> list[Op]:
     """Return what an impossible value becomes; nothing where the variable keeps its value."""
-    limits = thing.limits
-    if limits.on_range in ("hold", "fault") or (isinstance(thing, Input) and thing.type == "enum"):
-        if isinstance(limits.fallback, Fraction):
-            return [Assign(target, _literal(thing, limits.fallback))]
-        return []
-    low, high = bounds(thing)
-    nearest = Assign(target, _clipped(thing, value, low, high))
-    if limits.fallback is None:
-        return [nearest]
-    fallback: Block = ()
-    if isinstance(limits.fallback, Fraction):
-        fallback = (Assign(target, _literal(thing, limits.fallback)),)
-    if fallback:
-        return [Branch(_is_finite(thing, value), (nearest,), fallback)]
-    return [Branch(_is_finite(thing, value), (nearest,))]
+    fallback = thing.limits.fallback
+    keeps = thing.limits.on_range in ("hold", "fault") or thing.type == "enum"
+    near: Block = ()
+    if not keeps:
+        near = (Assign(target, _clipped(thing, value, *bounds(thing))),)
+    if fallback is None or (keeps and fallback == "hold"):
+        return list(near)
+    last: Block = () if fallback == "hold" else (Assign(target, _literal(thing, fallback)),)
+    if thing.type == "enum":
+        return list(last)
+    if not near:
+        return [Branch(Unary("not", _is_finite(thing, value)), last)]
+    return [Branch(_is_finite(thing, value), near, last)]
 
 
 def _pending(automaton: Automaton, thing: Input | State, value: Expr) -> list[Op]:

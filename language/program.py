@@ -29,7 +29,8 @@ ValueType = Literal["real", "truth", "whole"]
 class Variable:
     """A variable with its type; `size` is the length of an array, 0 for a scalar.
 
-    `values` are the names of the numbers 0, 1, ... of a whole one that is an enumeration.
+    `values` are the names of the numbers 0, 1, ... of a whole one that is an enumeration; `range`
+    is what an engine reports the leaving of (SI).
     """
 
     name: str
@@ -38,6 +39,7 @@ class Variable:
     size: int = 0
     about: str = ""
     values: tuple[str, ...] = ()
+    range: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)

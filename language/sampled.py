@@ -20,6 +20,8 @@ from language.limit import (
     HAPPENED,
     MAX_FAULTS,
     PENDING,
+    fault_of,
+    limited_things,
     first_latched,
     latch,
     limit_variables,
@@ -148,8 +150,10 @@ class _Sampled:
     def _fault_names(self, blocks: Mapping[str, Block]) -> tuple[str, ...]:
         """The faults that are declared, then all others that something sets."""
         ops = [op for block in blocks.values() for op in walk(block)]
-        named = [op.fault for op in ops if isinstance(op, FaultBit)]
-        found = tuple(dict.fromkeys([*self.automaton.faults, *self.faults, *named]))
+        named = {op.fault for op in ops if isinstance(op, FaultBit)}
+        automaton = self.automaton
+        own = [f for f in map(fault_of, limited_things(automaton)) if f in named]
+        found = tuple(dict.fromkeys([*automaton.faults, *self.faults, *own]))
         if len(found) > MAX_FAULTS:
             label = f"there are {len(found)} fault bits: {MAX_FAULTS} fit into one word"
             hint = "give several ranges one bit: `fault: name` beside them"

@@ -10,7 +10,7 @@ from language.graph import post_order
 from language.kind import Enumeration, Whole
 from language.limit import started
 from language.lower import WHOLE_TYPES, assigned, typed
-from language.model import CHART, Automaton, Region
+from language.model import CHART, Automaton, Region, State
 from language.number import NumberType, rounded
 from language.operation import (
     Assign,
@@ -66,10 +66,22 @@ def input_variables(automaton: Automaton, group: str) -> list[Variable]:
 def state_variables(automaton: Automaton) -> list[Variable]:
     """Return the states and equations of an automaton as variables."""
     found = [
-        Variable(f"state.{name}", "real", str(thing.unit.dimension))
+        Variable(
+            f"state.{name}",
+            "real",
+            str(thing.unit.dimension),
+            range=watched_range(automaton, thing),
+        )
         for name, thing in automaton.states.items()
     ]
     return [*found, *equation_variables(automaton, "equation.")]
+
+
+def watched_range(automaton: Automaton, thing: State) -> tuple[float, float] | None:
+    """Return the range whose leaving is an event: that of a continuous automaton's variable."""
+    if automaton.is_sampled or thing.range is None:
+        return None
+    return rounded(thing.range[0]), rounded(thing.range[1])
 
 
 def equation_variables(automaton: Automaton, group: str) -> list[Variable]:
@@ -95,6 +107,9 @@ def output_wires(automaton: Automaton) -> tuple[Wire, ...]:
     found = []
     for output in automaton.outputs:
         name = automaton.source_of(output)
+        if name == "faults":
+            found.append(Wire(output, "memory.faults", "whole", "1"))
+            continue
         if name == "mode":
             for region in automaton.all_regions:
                 variable = mode_variable("memory.mode", region.name)

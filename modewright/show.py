@@ -32,9 +32,10 @@ def events_table(events: Sequence[Event]) -> Table:
         escape("time [s]"), "automaton", "from", "to", box=None, pad_edge=False, header_style="bold"
     )
     for event in events[:MOST_EVENTS]:
-        table.add_row(
-            f"{event.time:.9f}", event.instance, event.transition, event.source, event.target
-        )
+        change = (event.source, event.target)
+        if event.kind != "transition":
+            change = (event.source, escape(event.message))
+        table.add_row(f"{event.time:.9f}", event.instance, event.transition, *change)
     if len(events) > MOST_EVENTS:
         table.add_row("...", f"{len(events) - MOST_EVENTS} more", "", "")
     return table

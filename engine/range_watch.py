@@ -1,0 +1,44 @@
+"""Range watch: leaving a declared range is a named event of the trajectory (rule 18)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from fractions import Fraction
+
+from engine.interpreter import Stepper
+from engine.trajectory import Event
+from language.program import Program, short
+
+SLACK = 1e-9
+"""Part of a range's width by which a state may pass a bound unreported: what a crossing of a guard
+on that bound is located within, over ten digits above the rounding of a double."""
+
+
+class RangeWatch:
+    """The ranges of one continuous automaton: never clamped, each leaving is reported once."""
+
+    def __init__(
+        self, name: str, program: Program, stepper: Stepper, log: Callable[[Event], None]
+    ) -> None:
+        """Watch the states and discrete variables that have a range."""
+        self._name, self._program, self._stepper, self._log = name, program, stepper, log
+        self._bounds = {v.name: v.range for v in program.variables if v.range is not None}
+        self._read = stepper.reader(tuple(self._bounds))
+        self._outside: set[str] = set()
+
+    def look(self, time: Fraction) -> None:
+        """Report what has left its range since the last look."""
+        for (variable, (low, high)), value in zip(self._bounds.items(), self._read(), strict=True):
+            slack = SLACK * (high - low)
+            if low - slack <= value <= high + slack:
+                self._outside.discard(variable)
+            elif variable not in self._outside:
+                self._outside.add(variable)
+                mode = self._program.mode_name(self._stepper.get("memory.mode"))
+                text = f"`{short(variable)}` = {value:.6g} is outside its range {low:g} .. {high:g}"
+                self._log(left_range(float(time), self._name, short(variable), mode, text))
+
+
+def left_range(time: float, instance: str, signal: str, mode: str, message: str) -> Event:
+    """Return the event of a signal that left its range, in a mode."""
+    return Event(time, 0, instance, f"range {signal}", mode, mode, kind="range", message=message)
