@@ -21,10 +21,10 @@ from language.limit import (
     MAX_FAULTS,
     PENDING,
     fault_of,
-    limited_things,
     first_latched,
     latch,
     limit_variables,
+    limited_things,
 )
 from language.lower import constant_names, equation_names, equations, variable_names
 from language.memory import delays_of, keep_block, memory_variables, with_delays

@@ -1,10 +1,9 @@
-"""Ranges: what a value outside its range becomes, against rule 18 written out; engine and C alike."""
+"""Ranges: what a value outside its range becomes, as rule 18 says; engine and C alike."""
 
 from __future__ import annotations
 
 import math
 import struct
-from pathlib import Path
 
 import pytest
 
