@@ -117,7 +117,6 @@ def generate(
         label = f"`{automaton.name}` is continuous: C is printed for sampled automata"
         problems.error("form", automaton.span, label, "give it a `period`")
         raise SpecError(problems.found)
-    require_ranges(automaton)
     return c_files(program_of(automaton))
 
 
