@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.trajectory import Event, Trajectory, Values
+from language.model import CHART
 
 Reals = NDArray[np.float64]
 
@@ -43,7 +44,7 @@ class ModeWindow:
 
 @dataclass(frozen=True)
 class ModeSequence:
-    """The transitions of one automaton in both runs.
+    """The transitions of one automaton, or of a region of it, in both runs.
 
     `parted` is the first position at which they are not the same (None: never); `apart` is the
     largest distance in time [s] of two that are the same, before that.
@@ -224,12 +225,15 @@ def _sequences(
     if not a.modes or not b.modes:
         return []  # samples alone: what is not known is not compared
     compared = {name.rpartition(".")[0] for name in common}
-    instances = dict.fromkeys(event.instance for event in (*a.events, *b.events))
+    parts = dict.fromkeys((event.instance, event.region) for event in (*a.events, *b.events))
     found = []
-    for instance in instances:
+    for instance, region in parts:
         if compared != {""} and instance not in compared:
             continue
-        ours, theirs = (_within(run.events_of(instance), span) for run in (a, b))
+        ours, theirs = (
+            [event for event in _within(run.events_of(instance), span) if event.region == region]
+            for run in (a, b)
+        )
         pairs = list(zip(ours, theirs, strict=False))
         same = next(
             (k for k, (x, y) in enumerate(pairs) if (x.source, x.target) != (y.source, y.target)),
@@ -237,7 +241,8 @@ def _sequences(
         )
         parted = None if same == len(ours) == len(theirs) else same
         apart = max((abs(x.time - y.time) for x, y in pairs[:same]), default=0.0)
-        found.append(ModeSequence(instance, len(ours), len(theirs), parted, apart))
+        name = instance if region == CHART else f"{instance}.{region}"
+        found.append(ModeSequence(name, len(ours), len(theirs), parted, apart))
     return found
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -80,6 +81,17 @@ def test_sequences_part_where_a_transition_is_missing() -> None:
     found = run_difference(run([0.0] * 4, [0, 1, 0, 1]), run([0.0] * 4, [0, 1, 0, 0]))
     (sequence,) = found.sequences
     assert (sequence.count_a, sequence.count_b, sequence.parted) == (3, 2, 2)
+
+
+def test_regions_beside_each_other_are_sequences_of_their_own() -> None:
+    first = Event(1.0, 0, "p", "b", "a", "b", "chart")
+    second = Event(1.0, 0, "p", "d", "c", "d", "gap")
+    a = replace(run([0.0] * 3), events=(first, second))
+    found = run_difference(a, replace(a, events=(second, first)))
+    assert [(each.instance, each.parted) for each in found.sequences] == [
+        ("p", None),
+        ("p.gap", None),
+    ]
 
 
 def test_samples_alone_are_compared_with_a_run_that_has_events() -> None:
