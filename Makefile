@@ -52,6 +52,7 @@ test: setup ## run the tests, the same way everywhere
 
 verify: setup ## measure every acceptance figure; with recordings: ARGS="--recordings DIR"
 	$(BIN)/python tests/verify/first_drive.py $(ARGS)
+	$(BIN)/python tests/verify/lockstep_bits.py
 	$(BIN)/python tests/verify/command_line.py
 
 check: check-lock check-format check-lint check-types ## run all checks

@@ -47,7 +47,8 @@ class Interpreter:
         self._frame += [self._constant(constant) for constant in program.constants]
         self._real = [v.type == "real" for v in program.variables]
         self._real += [constant.type == "real" for constant in program.constants]
-        compiler = Compiler(program, self._slots)
+        with self._arithmetic.quiet():
+            compiler = Compiler(program, self._slots)
         self._blocks = compiler.blocks
         self._left = compiler.left
         for entry in ("derive", "init"):
@@ -68,7 +69,10 @@ class Interpreter:
     def set(self, name: str, value: float | int | bool) -> None:
         """Set a variable; a real is rounded to the number type, once."""
         slot = self._slots[name]
-        self._frame[slot] = self._arithmetic.real(value) if self._real[slot] else value
+        if self._real[slot]:
+            with self._arithmetic.quiet():
+                value = self._arithmetic.real(value)
+        self._frame[slot] = value
 
     def left(self) -> tuple[str, ...]:
         """Return the signals that left their range since this was asked last."""

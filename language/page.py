@@ -52,8 +52,10 @@ class _PageReader(StimulusReader):
     def pages(self, node: Node | None) -> tuple[Page, ...]:
         found: list[Page] = []
         for entry in self.table(node, "pages"):
+            told = len(self.problems.found)
             time = self.time(Scalar(entry.key, entry.span), "the time of a page", entry.span)
-            if found and time <= found[-1].time and not self.problems.has_errors:
+            is_time = len(self.problems.found) == told
+            if is_time and found and time <= found[-1].time:
                 self.problems.error("order", entry.span, "pages are in the order of time")
             values: dict[tuple[str, str], Fraction] = {}
             for item in self.table(entry.node, f"pages.{entry.key}"):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from fractions import Fraction
 
+from language.number import NumberType
 from language.operation import (
     Assign,
     Block,
@@ -38,11 +39,15 @@ SIZE = 4
 """Length of the array `work.list`."""
 
 
-def assembled(blocks: dict[str, Block], values: tuple[float, float, float]) -> Program:
+def assembled(
+    blocks: dict[str, Block],
+    values: tuple[float, float, float],
+    number: NumberType = "float64",
+) -> Program:
     """Return the Program of some blocks, without the variables that they do not use."""
     program = Program(
         name="random",
-        number="float64",
+        number=number,
         period=PERIOD,
         major_step=PERIOD,
         constants=_constants(*values),

@@ -5,11 +5,14 @@ Each equation is an expression of its own, so that one compilation compares many
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
+from typing import TypeVar
 
 from hypothesis import strategies as st
 
 from engine.interpreter import Interpreter
+from language.number import NumberType
 from language.operation import (
     Assign,
     Block,
@@ -36,6 +39,8 @@ from tests.lockstep.assembly import CONDITIONS, EQUATIONS, INPUTS, MODES, SIZE, 
 from tests.lockstep.expressions import ANY, FINITE, Draw, Scope, reals, truths
 
 DEPTH = 3
+LARGEST = (2.0 - 2.0**-23) * 2.0**127
+"""The largest float32: a literal beyond it is refused before there is a Program."""
 TUNED = Scope(tuple(map(Ref, ("constant.a", "constant.b", "calibration.p"))))
 """What `derive` may read."""
 PLACE = Scope(
@@ -58,23 +63,42 @@ WIDE = Scope(
 """What they may read once the equations are known."""
 
 Tick = dict[str, float | bool]
+Part = TypeVar("Part")
+
+
+def narrowed(part: Part, number: NumberType) -> Part:
+    """Return a number, or operations, whose literals are within the range of a type."""
+    if number == "float64":
+        return part
+    if isinstance(part, float):
+        return max(-LARGEST, min(LARGEST, part))  # type: ignore[return-value]
+    if isinstance(part, tuple):
+        return tuple([narrowed(item, number) for item in part])  # type: ignore[return-value]
+    if dataclasses.is_dataclass(part) and not isinstance(part, type):
+        fields = [field.name for field in dataclasses.fields(part)]
+        changed = {name: narrowed(getattr(part, name), number) for name in fields}
+        return dataclasses.replace(part, **changed)
+    return part
 
 
 @st.composite
-def programs(draw: Draw) -> Program:
+def programs(draw: Draw, number: NumberType = "float64") -> Program:
     """Return a Program of three modes."""
     blocks = _Blocks(draw)
     made: dict[str, Block] = {"table": blocks.table(), "mix": blocks.mix()}
-    for number, mode in enumerate(MODES):
+    for place, mode in enumerate(MODES):
         made[f"advance_{mode}"] = blocks.advance(mode)
-        made[f"equations_{mode}"] = blocks.equations(number)
-        made[f"jump_{mode}"] = blocks.jump(number)
+        made[f"equations_{mode}"] = blocks.equations(place)
+        made[f"jump_{mode}"] = blocks.jump(place)
         if mode != "move":
             made[f"update_{mode}"] = blocks.together("next")
     made["remember"] = (Assign("before.u", Ref("input.u")),)
     made["start"] = blocks.start()
     made["derive"] = blocks.derive()
-    return assembled(made, (draw(FINITE), draw(FINITE), draw(FINITE)))
+    a, b, p = (narrowed(draw(FINITE), number) for _ in range(3))
+    return assembled(
+        {name: narrowed(block, number) for name, block in made.items()}, (a, b, p), number
+    )
 
 
 @st.composite

@@ -7,6 +7,7 @@ from fractions import Fraction
 
 from hypothesis import strategies as st
 
+from language.number import NUMBERS
 from tests.lockstep.expressions import Draw
 
 PERIOD_MS = 10
@@ -53,7 +54,7 @@ def specs(draw: Draw) -> Specs:
         "language: 1",
         "automaton: chance",
         f"period: {PERIOD_MS} ms",
-        "numbers: float64",
+        f"numbers: {draw(st.sampled_from(NUMBERS))}",
         "parameters:",
         f"  a: {{value: {draw(numbers())}}}",
         f"  b: {{value: {draw(numbers())}, tunable: true}}",

@@ -2,17 +2,29 @@
 
 from __future__ import annotations
 
+import dataclasses
 import platform
 import re
+import shutil
 import subprocess
 from pathlib import Path
 
 import pytest
 
-from codegen.build import FLAGS, WARNINGS, BuildError, compile_program, compiler, write_harness
+from codegen.build import (
+    FLAGS,
+    WARNINGS,
+    BuildError,
+    compile_program,
+    compiler,
+    optimised,
+    write_harness,
+)
 from codegen.source import c_files
 from engine.simulate import simulate
+from language.number import NUMBERS, NumberType, decimal
 from language.program import Program
+from language.system import in_numbers
 from lockstep.compare import Tape, compare
 from modewright.api import load, program
 from tests.lockstep.programs import taped
@@ -21,7 +33,11 @@ LEVELS = ("-O0", "-O2", "-O3", "-Os", "-O3 -march=native")
 """The optimisations that must not change a bit; the last one may use fused operations."""
 FUSED = re.compile(r"\bv?fn?m(?:add|sub|la|ls)", re.IGNORECASE)
 """Instructions that multiply and add with one rounding: x86 vfmadd, ARM fmadd and vfma."""
-EXACT = {"sqrt", "fabs", "memcpy", "memset"}
+TINY: dict[NumberType, float] = {"float64": 2.0**-30, "float32": 2.0**-12}
+"""(1 + tiny)^2 rounds to 1 + 2 tiny; what is lost is tiny^2."""
+LOST = {"float64": "0x3c30000000000000", "float32": "0x33800000"}
+NOTHING = {"float64": "0x0000000000000000", "float32": "0x00000000"}
+EXACT = {"sqrt", "fabs", "sqrtf", "fabsf", "floorf", "memcpy", "memset"}
 """What generated code may take from the C library: exact to the last bit, or no arithmetic."""
 PRODUCT = """\
 language: 1
@@ -35,25 +51,29 @@ outputs: [rest]
 """
 
 
-@pytest.fixture(scope="module")
-def tapes() -> dict[str, Tape]:
-    """Both estimators through the tip-out."""
+@pytest.fixture(scope="module", params=NUMBERS)
+def tapes(request: pytest.FixtureRequest) -> dict[str, Tape]:
+    """Both estimators through the tip-out, in a number type; the plant stays in float64."""
     loaded = load("ev_driveline", "tip_out")
+    narrow = in_numbers(loaded.system, request.param).instances
+    instances = {**narrow, "plant": loaded.system.instances["plant"]}
+    system = dataclasses.replace(loaded.system, instances=instances)
     found: dict[str, Tape] = {}
 
     def ticked(name: str, used: Program, stepper: object) -> None:
         found.setdefault(used.name, Tape(used, name)).record(stepper)  # type: ignore[arg-type]
 
-    simulate(loaded.system, loaded.scenario, ticked=ticked)
+    simulate(system, loaded.scenario, ticked=ticked)
     return found
 
 
-@pytest.fixture
-def product(tmp_path: Path) -> Tape:
+@pytest.fixture(params=NUMBERS)
+def product(tmp_path: Path, request: pytest.FixtureRequest) -> Tape:
     """u * u - v where the product is rounded to v: 0, or the rounding error if contracted."""
     spec = tmp_path / "product.yaml"
-    spec.write_text(PRODUCT)
-    return taped(program(str(spec)), [{"input.u": 1.0 + 2.0**-30, "input.v": 1.0 + 2.0**-29}])
+    spec.write_text(PRODUCT.replace("float64", request.param))
+    tiny = TINY[request.param]
+    return taped(program(str(spec)), [{"input.u": 1.0 + tiny, "input.v": 1.0 + 2.0 * tiny}])
 
 
 def has_fused_operations() -> bool:
@@ -84,8 +104,27 @@ def test_contraction_is_forbidden_and_would_be_found(product: Tape) -> None:
     assert verdict.is_equal == (not has_fused_operations())
     if verdict.first:
         assert verdict.first.signal == "rest"
-        assert verdict.first.engine == "0.0 (0x0000000000000000)"
-        assert verdict.first.compiled == f"{2.0**-60!r} (0x3c30000000000000)"
+        number = product.program.number
+        lost = decimal(TINY[number] ** 2, number)
+        assert verdict.first.engine == f"0.0 ({NOTHING[number]})"
+        assert verdict.first.compiled == f"{lost} ({LOST[number]})"
+
+
+def test_every_compiler_that_is_here_gives_the_same_bits(
+    tapes: dict[str, Tape], capsys: pytest.CaptureFixture[str]
+) -> None:
+    """gcc is needed; clang, where it is absent, is told and left out."""
+    compared = []
+    for named in ("gcc", "clang"):
+        if shutil.which(named) is None:
+            with capsys.disabled():
+                print(f"\n{named} is not installed: its bits were not compared")
+            continue
+        for level in ("O0", "O2", "O3"):
+            verdict = compare(tapes["estimator"], optimised(level), named)
+            assert verdict.is_equal, f"{named} -{level}: {verdict.first}"
+        compared.append(named)
+    assert "gcc" in compared
 
 
 @pytest.mark.parametrize("flag", ["-ffast-math", "-Ofast"])
@@ -112,7 +151,7 @@ def test_warnings_are_errors(tmp_path: Path) -> None:
     assert wanted <= {*WARNINGS}
 
 
-@pytest.mark.parametrize("name", ["estimator", "estimator_simple", "leaf"])
+@pytest.mark.parametrize("name", ["estimator", "estimator_simple", "leaf", "estimator_float32"])
 def test_objects_need_nothing_inexact_from_a_library(name: str, tmp_path: Path) -> None:
     for found in objects(name, tmp_path, FLAGS):
         lines = output("nm", "--undefined-only", str(found)).splitlines()

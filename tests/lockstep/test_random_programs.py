@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import get_args
 
-from hypothesis import HealthCheck, Phase, given, note, settings
+from hypothesis import HealthCheck, Phase, given, note, settings, strategies as st
 
 from language.evaluate import ELEMENTARY, OPERATIONS
 from language.functions import FUNCTIONS
+from language.number import NUMBERS
 from language.operation import Assign, Expr, Op
 from language.printing import expr_text
 from language.program import Program
@@ -25,7 +26,7 @@ def operations(program: Program) -> list[Op]:
 
 
 @settings(max_examples=settings().max_examples // SHARE, suppress_health_check=LARGE)
-@given(programs(), ticks())
+@given(st.sampled_from(NUMBERS).flatmap(programs), ticks())
 def test_interpreter_and_c_agree_on_every_bit(program: Program, inputs: list[Tick]) -> None:
     verdict = compare(taped(program, inputs))
     signal = verdict.first.signal if verdict.first else None

@@ -1,0 +1,119 @@
+"""The elementary functions in float32: stated errors against mpmath, symmetry, clamps, numbers."""
+
+from __future__ import annotations
+
+import math
+import random
+import re
+import struct
+
+import mpmath
+import pytest
+
+from language.evaluate import apply
+from language.functions import FUNCTIONS, FUNCTIONS_OF
+from language.number import single
+from language.operation import Assign, Value
+from language.wiring import walk
+
+POINTS = 3000
+SINGLES = FUNCTIONS_OF["float32"]
+BOUNDS = {
+    **dict.fromkeys(("sin", "cos", "tan"), (-1000.0, 1000.0)),
+    "exp": (-87.0, 88.0),
+    "tanh": (-12.0, 12.0),
+}
+WORST = {
+    "exp": float.fromhex("0x1.b68b6ep+4"),
+    "tanh": float.fromhex("0x1.411556p-1"),
+    "sin": float.fromhex("0x1.ce8e52p+8"),
+    "cos": float.fromhex("0x1.c26f2p+9"),
+}
+"""Where the error is largest among all float32 of the domain: all were tried once."""
+
+
+def error(name: str, *x: float) -> float:
+    """Return the error at x in ULP of float32 of the exact result."""
+    with mpmath.workdps(40):
+        exact = getattr(mpmath, name)(*(mpmath.mpf(value) for value in x))
+        result = float(apply(name, list(x), "float32"))
+        if exact == 0:
+            return 0.0 if result == 0.0 else math.inf
+        unit = max(int(mpmath.frexp(abs(exact))[1]) - 24, -149)
+        return float(abs(mpmath.ldexp(mpmath.mpf(result) - exact, -unit)))
+
+
+def stated(name: str) -> float:
+    found = re.fullmatch(r".*; error < ([0-9.]+) ULP", SINGLES[name].about)
+    assert found
+    return float(found[1])
+
+
+def anywhere(name: str, draw: random.Random) -> float:
+    low, high = BOUNDS[name]
+    choice = draw.randrange(3)
+    if choice == 0:
+        return single(draw.uniform(low, high))
+    if choice == 1:
+        size = 2.0 ** draw.uniform(-30.0, math.log2(high))
+        return max(low, single(draw.choice((-1.0, 1.0)) * size))
+    quarter = draw.randrange(-636, 637) * (math.pi / 2) if name in ("sin", "cos", "tan") else 0.6
+    return max(low, min(high, single(quarter * (1.0 + draw.uniform(-1e-6, 1e-6)))))
+
+
+@pytest.mark.parametrize("name", BOUNDS)
+def test_error_is_as_stated(name: str) -> None:
+    draw = random.Random(f"single {name}")
+    points = [anywhere(name, draw) for _ in range(POINTS)] + [*BOUNDS[name]]
+    points += [WORST[name]] if name in WORST else []
+    worst = max(points, key=lambda x: error(name, x))
+    assert error(name, worst) < stated(name), worst
+
+
+def test_the_angle_of_a_point_is_as_stated() -> None:
+    draw = random.Random("single atan2")
+    pairs = []
+    for _ in range(POINTS):
+        run = 2.0 ** draw.uniform(-140.0, 120.0)
+        rise = run * 2.0 ** draw.uniform(-3.0, 3.0)
+        pairs.append((draw.choice((1, -1)) * single(rise), draw.choice((1, -1)) * single(run)))
+    worst = max(pairs, key=lambda pair: error("atan2", *pair))
+    assert error("atan2", *worst) < stated("atan2"), worst
+
+
+@pytest.mark.parametrize(
+    ("rise", "run", "angle"),
+    [
+        (-0.0, 1.0, -0.0),
+        (0.0, -1.0, math.pi),
+        (1.0, 0.0, math.pi / 2),
+        (2.0**-149, 2.0**-149, math.pi / 4),
+        (3.4e38, 3.4e38, math.pi / 4),
+        (math.inf, -math.inf, 3 * math.pi / 4),
+    ],
+)
+def test_exact_angles(rise: float, run: float, angle: float) -> None:
+    found = apply("atan2", [single(rise), single(run)], "float32")
+    assert struct.pack("<f", found) == struct.pack("<f", angle)
+
+
+def test_symmetry_clamps_and_nan() -> None:
+    for name in ("sin", "tan", "tanh"):
+        for x in (0.0, 2.0**-149, 2.0**-13, 0.5, 3.0, 999.0):
+            plus, minus = (float(apply(name, [sign * x], "float32")) for sign in (1.0, -1.0))
+            assert struct.pack("<f", -plus) == struct.pack("<f", minus)
+    for name, (low, high) in BOUNDS.items():
+        if name != "tanh":
+            assert apply(name, [3e38], "float32") == apply(name, [high], "float32")
+            assert apply(name, [-math.inf], "float32") == apply(name, [low], "float32")
+        assert math.isnan(apply(name, [math.nan], "float32"))
+
+
+def test_both_types_have_the_same_functions_and_every_number_is_a_float32() -> None:
+    assert list(SINGLES) == list(FUNCTIONS)
+    for function in SINGLES.values():
+        for op in walk(function.body):
+            assert isinstance(op, Assign)
+            for text in re.findall(r"Value\(value=([^)]+)\)", repr(op.value)):
+                value = Value(float(text)).value
+                assert single(float(value)) == value, function.name
