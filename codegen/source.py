@@ -9,6 +9,7 @@ from typing import Any
 
 import jinja2
 
+from codegen.comment import comment as safe
 from codegen.expression import SUFFIX, c_expression, literal
 from codegen.names import (
     REAL,
@@ -176,7 +177,7 @@ def _field(variable: Variable, number: NumberType) -> Field:
     if variable.type == "real" and variable.about:
         comment = f"{variable.unit}; {variable.about}"
     member = c_member(variable.name)
-    return Field(c_type(variable, number), member, comment, size=variable.size)
+    return Field(c_type(variable, number), member, safe(comment), size=variable.size)
 
 
 def _constant(constant: Constant, number: NumberType) -> Field:
@@ -188,7 +189,8 @@ def _constant(constant: Constant, number: NumberType) -> Field:
     if constant.items:
         value = f"{{{', '.join(literal(item, number) for item in constant.items)}}}"
     kind = c_type(Variable(constant.name, constant.type, values=constant.values), number)
-    return Field(kind, c_member(constant.name), comment, value, len(constant.items))
+    comment = "; ".join(text for text in (comment, constant.about) if text)
+    return Field(kind, c_member(constant.name), safe(comment), value, len(constant.items))
 
 
 def _groups(program: Program) -> list[tuple[str, list[Field]]]:

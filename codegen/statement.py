@@ -7,6 +7,7 @@ import textwrap
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
+from codegen.comment import comment as safe
 from codegen.expression import Place, c_expression
 from codegen.usage import Usage
 from language.operation import (
@@ -112,7 +113,7 @@ class Writer:
 
 
 def _comment(key: str) -> str:
-    return f" /* {key} */" if key else ""
+    return f" /* {safe(key)} */" if key else ""
 
 
 def wrapped(left: str, text: str, key: str) -> Iterator[str]:
@@ -122,7 +123,7 @@ def wrapped(left: str, text: str, key: str) -> Iterator[str]:
         yield f"{left}{text};{comment}"
         return
     if key:
-        yield f"/* {key} */"
+        yield f"/* {safe(key)} */"
     if len(left) + len(text) <= WIDTH:
         yield f"{left}{text};"
         return

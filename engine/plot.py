@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 from engine.band import PALETTE, Band, draw_band
 from engine.trajectory import Trajectory
 from language.problem import nearest
+from language.text import visible
 
 QUANTITIES = {
     "1": "number", "A": "current", "K": "temperature", "N": "force", "N*m": "torque",
@@ -97,7 +98,7 @@ def picture(
         for start, end in shaded:
             axis.axvspan(start, end, color=PALETTE[1], alpha=0.2, lw=0, zorder=-1)
         axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=8, frameon=False)
-    axes[0].set_title(title, loc="left", fontsize=11)
+    axes[0].set_title(visible(title), loc="left", fontsize=11, parse_math=False)
     axes[-1].set_xlabel("time [s]")
     axes[-1].tick_params(labelbottom=True)
     axes[-1].set_xlim(*window)
@@ -218,7 +219,7 @@ def _panel(
             color=colour, lw=1.2, label=line.label, drawstyle=style,
         )  # fmt: skip
     _mark_events(axis, runs[0], window)
-    axis.set_ylabel(panel.title, fontsize=9)
+    axis.set_ylabel(visible(panel.title), fontsize=9, parse_math=False)
     axis.grid(alpha=0.3)
 
 

@@ -22,7 +22,7 @@ from language.observer import METHODS
 from language.overlay import lay, without
 from language.problem import Problems, nearest
 from language.project import Project, expanded, read_document
-from language.reader import Reader
+from language.reader import Reader, about_of
 from language.region import with_regions
 from language.table import TableReader, section
 from language.units import NO_UNIT, SECOND, Unit, fits, parse_unit
@@ -221,7 +221,18 @@ class _AutomatonReader(Reader):
         fitting = self._fitting(table, unit, limits)
         at = entry.span
         return Parameter(
-            entry.key, kind, unit, value, derived, limits, key, at, fitting, type_, values
+            entry.key,
+            kind,
+            unit,
+            value,
+            derived,
+            limits,
+            key,
+            at,
+            fitting,
+            type_,
+            values,
+            about=about_of(table),
         )
 
     def _table_parameter(self, entry: Entry, table: Table) -> Parameter:
@@ -238,7 +249,18 @@ class _AutomatonReader(Reader):
         reader = TableReader(self.problems)
         reader.declared = self.declared
         made = reader.lookup_table(body, f"{key}.table.points", limits)
-        return Parameter(entry.key, kind, unit, None, None, limits, key, entry.span, table=made)
+        return Parameter(
+            entry.key,
+            kind,
+            unit,
+            None,
+            None,
+            limits,
+            key,
+            entry.span,
+            table=made,
+            about=about_of(body),
+        )
 
     def _fitting(self, table: Table, unit: Unit, limits: Range | None) -> Fitting:
         node = table.get("neutral")

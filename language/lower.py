@@ -321,6 +321,7 @@ def constant_of(automaton: Automaton, name: str, kind: str, value: float) -> Con
         type=value_type(parameter.type),
         values=parameter.values,
         items=tuple(rounded(item) for item in parameter.table.values) if parameter.table else (),
+        about=parameter.about,
     )
 
 

@@ -91,6 +91,7 @@ class Parameter:
     type: Type = "real"
     values: tuple[str, ...] = ()
     table: LookupTable | None = None
+    about: str = ""
 
 
 @dataclass(frozen=True)
@@ -118,6 +119,7 @@ class Input:
     span: Span
     values: tuple[str, ...] = ()
     limits: Limits = Limits()
+    about: str = ""
 
     @property
     def truth(self) -> bool:
@@ -138,6 +140,7 @@ class State:
     type: Type = "real"
     values: tuple[str, ...] = ()
     limits: Limits = Limits()
+    about: str = ""
 
 
 @dataclass(frozen=True)

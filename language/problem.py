@@ -8,6 +8,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Literal
 
+from language.text import around, one_for_one, shortened, visible
+
+LONGEST_LABEL = 1000
+"""Characters of a message; a name of a million characters is quoted in part."""
 Severity = Literal["error", "warning"]
 
 NEAREST_CUTOFF = 0.6
@@ -114,13 +118,14 @@ def nearest(name: str, known: Iterable[str]) -> str:
 def render(problem: Problem) -> str:
     """Return the problem as `file:line:col: severity: label`, the line, carets and the help."""
     span = problem.span
-    rows = [f"{span}: {problem.severity}: {problem.label}"]
+    rows = [visible(f"{span}: {problem.severity}: {shortened(problem.label, LONGEST_LABEL)}")]
     if 1 <= span.line <= len(span.source.lines):
-        text = span.source.lines[span.line - 1]
-        width = max(1, min(span.width, len(text) - span.column + 1))
-        rows += [f"  {text}", "  " + " " * (span.column - 1) + "^" * width]
+        line = span.source.lines[span.line - 1]
+        width = max(1, min(span.width, len(line) - span.column + 1))
+        text, column, width = around(line, span.column, width)
+        rows += [f"  {one_for_one(text)}", "  " + " " * (column - 1) + "^" * width]
     if problem.help:
-        rows.append(f"help: {problem.help}")
+        rows.append(visible(f"help: {shortened(problem.help, LONGEST_LABEL)}"))
     if span.source.laid:
         rows.append(f"in {span.source.layer}, laid at {span.source.laid}")
     return "\n".join(rows)

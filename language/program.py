@@ -59,6 +59,7 @@ class Constant:
     type: ValueType = "real"
     values: tuple[str, ...] = ()
     items: tuple[float, ...] = ()
+    about: str = ""
 
 
 @dataclass(frozen=True)

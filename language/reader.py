@@ -244,3 +244,9 @@ def _literal(tree: Tree) -> tuple[Fraction, Unit] | None:
             return 2 * unit.offset - value if unit.offset else -value, unit
         case _:
             return None
+
+
+def about_of(table: Table) -> str:
+    """Return the text that says what a thing is."""
+    node = table.get("about")
+    return node.text if isinstance(node, Scalar) else ""

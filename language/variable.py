@@ -11,7 +11,7 @@ from language.kind import Type
 from language.limit import OWN_FAULTS
 from language.model import Automaton, Formula, Input, Limits, Range, State
 from language.problem import Problems, nearest
-from language.reader import Reader
+from language.reader import Reader, about_of
 from language.syntax import Broken
 from language.units import Unit
 
@@ -64,7 +64,8 @@ class VariableReader(Reader):
         key = f"inputs.{entry.key}"
         span = entry.span
         outside = self.limits(table, unit, kind, values, limits)
-        return Input(entry.key, unit, kind, default, limits, key, span, values, outside)
+        about = about_of(table)
+        return Input(entry.key, unit, kind, default, limits, key, span, values, outside, about)
 
     def states(self, node: Node | None) -> dict[str, State]:
         """Return the states by name."""
@@ -84,7 +85,14 @@ class VariableReader(Reader):
             start = initial or Formula(Broken(entry.span), f"{key}.initial")
             outside = self.limits(table, unit, "real", (), limits)
             found[entry.key] = State(
-                entry.key, unit, start, limits, key, entry.span, limits=outside
+                entry.key,
+                unit,
+                start,
+                limits,
+                key,
+                entry.span,
+                limits=outside,
+                about=about_of(table),
             )
         return found
 
@@ -112,6 +120,7 @@ class VariableReader(Reader):
                     kind,
                     values,
                     self.limits(table, unit, kind, values, limits),
+                    about_of(table),
                 )
         return found
 

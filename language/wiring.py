@@ -56,7 +56,7 @@ def input_variables(automaton: Automaton, group: str) -> list[Variable]:
             f"{group}.{name}",
             value_type(thing.type),
             str(thing.unit.dimension),
-            about=thing.key if group == "input" else "",
+            about="; ".join(filter(None, (thing.key, thing.about))) if group == "input" else "",
             values=thing.values,
         )
         for name, thing in automaton.inputs.items()
@@ -70,6 +70,7 @@ def state_variables(automaton: Automaton) -> list[Variable]:
             f"state.{name}",
             "real",
             str(thing.unit.dimension),
+            about=thing.about,
             range=watched_range(automaton, thing),
         )
         for name, thing in automaton.states.items()

@@ -14,7 +14,10 @@ from pathlib import Path
 from language.document import Document, Entry, Node, Scalar, Table
 from language.overlay import lay, without
 from language.problem import Problems
+from language.text import shortened, visible
 
+LONGEST = 1000
+"""Characters of a label; expressions are shorter, other texts are cut."""
 LABEL_WIDTH = 36
 """Longest line of a label [characters]."""
 MOST_LINES = 6
@@ -236,7 +239,8 @@ def _inside(node: Node) -> list[str]:
 def _wrapped(text: str) -> list[str]:
     """Return a text in lines, parted before `and` and `or` where that is enough."""
     lines: list[str] = []
-    for piece in re.split(r" (?=(?:and|or) )", text):
+    plain = visible(shortened(" ".join(text.split()), LONGEST))
+    for piece in re.split(r" (?=(?:and|or) )", plain):
         if lines and len(lines[-1]) + 1 + len(piece) <= LABEL_WIDTH:
             lines[-1] += " " + piece
         else:
@@ -249,7 +253,7 @@ def _wrapped(text: str) -> list[str]:
 
 def _text(node: Node | None) -> str:
     if isinstance(node, Scalar):
-        return " ".join(node.text.split())
+        return visible(" ".join(node.text.split()))
     if isinstance(node, Table):
         return ", ".join(f"{entry.key} {_text(entry.node)}" for entry in node)
     return ""

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 
+from language.text import visible
 from modewright.diagram import Arrow, Diagram, ModeBox, RegionBox, lifted
 from modewright.layers import Edge, Layout, Point, Size, layout
 
@@ -34,6 +35,10 @@ class _Drawn:
         return tuple(((x + dx, y + dy), text) for (dx, dy), text in self.parts)
 
 
+def _xml(text: str) -> str:
+    return escape(visible(text))
+
+
 def svg(diagram: Diagram) -> str:
     """Return the diagram as an SVG document."""
     drawn = _stacked(diagram.regions, diagram.arrows)
@@ -42,11 +47,11 @@ def svg(diagram: Diagram) -> str:
     rows = [
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:.0f}" height="{height:.0f}"'
         f' viewBox="0 0 {width:.0f} {height:.0f}">',
-        f"<title>{escape(diagram.name)}</title>",
+        f"<title>{_xml(diagram.name)}</title>",
         f"<style>{STYLE}</style>",
         "<defs>" + "".join(_marker(k, colour) for k, colour in enumerate(COLOURS)) + "</defs>",
         f'<rect width="{width:.0f}" height="{height:.0f}" fill="white"/>',
-        f'<text class="n" x="{PAD}" y="{PAD + 10}">{escape(diagram.name)}</text>',
+        f'<text class="n" x="{PAD}" y="{PAD + 10}">{_xml(diagram.name)}</text>',
     ]
     for (x, y), text in drawn.at(PAD, PAD + TITLE):
         rows.append(f'<g transform="translate({x:.1f} {y:.1f})">{text}</g>')
@@ -122,7 +127,7 @@ def _mode(mode: ModeBox, loops: Sequence[Arrow], arrows: Sequence[Arrow], number
     colour = COLOURS[number % len(COLOURS)]
     box = f'<rect width="{width:.1f}" height="{height:.1f}" rx="7" fill="{colour}"'
     box += f' fill-opacity="0.08" stroke="{colour}" stroke-width="1.6"/>'
-    box += f'<text class="n" x="{PAD}" y="16">{escape(mode.name)}</text>'
+    box += f'<text class="n" x="{PAD}" y="16">{_xml(mode.name)}</text>'
     box += _lines(mode.lines, PAD, TITLE + 10, "a")
     parts.append(((0.0, top), box))
     parts += inner.at(PAD, top + text + PAD / 2)
@@ -147,7 +152,7 @@ def _lines(lines: Sequence[str], x: float, y: float, name: str = "") -> str:
         text = line.lstrip()
         left = x + CHARACTER * (len(line) - len(text))
         found += f'<text{kind} x="{left:.1f}" y="{y + LINE * k:.1f}"'
-        found += f' textLength="{CHARACTER * len(text):.1f}">{escape(text)}</text>'
+        found += f' textLength="{CHARACTER * len(text):.1f}">{_xml(text)}</text>'
     return found
 
 
@@ -182,7 +187,7 @@ def _start() -> str:
 def _frame(width: float, height: float, name: str) -> str:
     return (
         f'<rect width="{width:.1f}" height="{height:.1f}" rx="4" fill="none" stroke="#888"'
-        f' stroke-dasharray="5 4"/><text class="n" x="{PAD}" y="15">{escape(name)}</text>'
+        f' stroke-dasharray="5 4"/><text class="n" x="{PAD}" y="15">{_xml(name)}</text>'
     )
 
 

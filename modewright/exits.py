@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import tempfile
 import traceback
@@ -16,6 +17,8 @@ from language.problem import SpecError, ordered, render_all
 from modewright.files import OutputError
 
 DONE, PROBLEMS, USAGE, TOOL, DEFECT, INTERRUPTED = 0, 1, 2, 3, 4, 130
+MOST_SHOWN = 100
+"""Problems that are shown to a person; `check --json` has all of them."""
 USAGE_ERROR: Any = typer.BadParameter.__mro__[1]
 """The class of all usage errors; typer brings its own copy of click's."""
 EXIT_CODES = """Exit codes: 0 done; 1 the spec or data has problems, a check failed, lock-step
@@ -27,6 +30,7 @@ def exit_code(run: Callable[[], object]) -> int:
     """Run a command line and return its exit code; every message goes to stderr."""
     try:
         code = run()
+        _flush()
         return code if isinstance(code, int) else DONE
     except USAGE_ERROR as error:
         error.show()
@@ -35,7 +39,7 @@ def exit_code(run: Callable[[], object]) -> int:
         print("interrupted", file=sys.stderr)
         return INTERRUPTED
     except typer.Exit as error:
-        return error.exit_code
+        return _flushed(error.exit_code)
     except SpecError as error:
         report(error)
         return PROBLEMS
@@ -46,19 +50,39 @@ def exit_code(run: Callable[[], object]) -> int:
         print(f"error: {error}", file=sys.stderr)
         return TOOL
     except BrokenPipeError:
-        sys.stderr.close()
-        return DONE
+        return _unread()
     except Exception as error:
         print(f"error: a defect of modewright: {_first_line(error)}", file=sys.stderr)
         print(f"a report is in {_write_report()}", file=sys.stderr)
         return DEFECT
 
 
+def _flush() -> None:
+    if sys.stdout is not None:
+        sys.stdout.flush()
+
+
+def _flushed(code: int) -> int:
+    try:
+        _flush()
+    except BrokenPipeError:
+        return _unread() or code
+    return code
+
+
+def _unread() -> int:
+    """Who reads our output has gone (`| head`): the rest goes nowhere, which is no failure."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return DONE
+
+
 def report(error: SpecError) -> None:
     """Print the problems and their number."""
     problems = ordered(error.problems)
     count = sum(problem.severity == "error" for problem in problems)
-    print(render_all(problems), file=sys.stderr)
+    print(render_all(problems[:MOST_SHOWN]), file=sys.stderr)
+    if len(problems) > MOST_SHOWN:
+        print(f"\n... and {len(problems) - MOST_SHOWN} more", file=sys.stderr)
     print(f"\n{count} {'problem' if count == 1 else 'problems'}", file=sys.stderr)
 
 

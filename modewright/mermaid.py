@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
+from language.text import visible
 from modewright.diagram import Arrow, Diagram, Key, ModeBox, RegionBox, lifted
 
 RESERVED = frozenset({"state", "note", "end", "direction", "class", "click", "hide", "scale", "as"})
@@ -16,7 +17,7 @@ def mermaid(diagram: Diagram) -> str:
     if len(diagram.regions) == 1:
         lines += _region_lines(diagram.regions[0], diagram.arrows, 1)
     else:
-        lines.append(f'    state "{diagram.name}" as {identifier((diagram.name,))}_ {{')
+        lines.append(f'    state "{_escaped(diagram.name)}" as {identifier((diagram.name,))}_ {{')
         lines += _parallel(diagram.regions, diagram.arrows, 2)
         lines.append("    }")
     return "\n".join(lines) + "\n"
@@ -24,7 +25,7 @@ def mermaid(diagram: Diagram) -> str:
 
 def identifier(path: Key) -> str:
     """Return the identifier of a mode: its path, not a word of Mermaid."""
-    name = "__".join(path)
+    name = re.sub(r"\W", "_", "__".join(path), flags=re.ASCII)
     return name + "_" if name in RESERVED else name
 
 
@@ -47,14 +48,14 @@ def _region_lines(region: RegionBox, arrows: tuple[Arrow, ...], depth: int) -> I
     place = region.modes[0].path[:-1] if region.modes else ()
     for arrow in map(lifted, arrows):
         if arrow.source[:-1] == place:
-            label = f" : {_escaped('<br/>'.join(arrow.lines))}" if arrow.lines else ""
+            label = f" : {'<br/>'.join(map(_escaped, arrow.lines))}" if arrow.lines else ""
             yield f"{indent}{identifier(arrow.source)} --> {identifier(arrow.target)}{label}"
 
 
 def _mode_lines(mode: ModeBox, arrows: tuple[Arrow, ...], depth: int) -> Iterator[str]:
     indent = "    " * depth
-    text = "<br/>".join((mode.name, *mode.lines)).replace('"', "'")
-    head = f'{indent}state "{_escaped(text)}" as {identifier(mode.path)}'
+    text = "<br/>".join(map(_escaped, (mode.name, *mode.lines)))
+    head = f'{indent}state "{text}" as {identifier(mode.path)}'
     if not mode.regions:
         yield head
         return
@@ -64,5 +65,6 @@ def _mode_lines(mode: ModeBox, arrows: tuple[Arrow, ...], depth: int) -> Iterato
 
 
 def _escaped(text: str) -> str:
-    """Return a text without the characters that end a label in some version of Mermaid."""
-    return re.sub("[#;:]", lambda match: f"#{ord(match[0])};", text)
+    """Return a text without what ends a label in some version of Mermaid, or is HTML."""
+    plain = visible(text).replace('"', "'")
+    return re.sub(r"[#;:]|<(?=[A-Za-z/!?])", lambda match: f"#{ord(match[0])};", plain)

@@ -11,7 +11,7 @@ import typer
 
 from modewright.commands.options import Json
 from modewright.console import console, counted
-from modewright.exits import PROBLEMS
+from modewright.exits import MOST_SHOWN, PROBLEMS
 
 
 def check(
@@ -39,7 +39,9 @@ def check(
         found = [checking.problem_json(problem) for problem in problems]
         print(json.dumps({"problems": found}, indent=2, allow_nan=False))
     elif problems:
-        print(render_all(problems), file=sys.stderr)
+        print(render_all(problems[:MOST_SHOWN]), file=sys.stderr)
+        if len(problems) > MOST_SHOWN:
+            print(f"\n... and {len(problems) - MOST_SHOWN} more: --json", file=sys.stderr)
     if not as_json:
         console().print(f"{counted(len(names), 'spec')} checked, {counted(len(errors), 'problem')}")
     if errors:

@@ -21,7 +21,7 @@ static const struct {
     double T_off;
     double t_tick;
 } constant = {
-    .k_P = 12.3, /* W/K; heater parameters.k_P */
+    .k_P = 12.3, /* W/K; heater parameters.k_P; heating power per kelvin */
     .P_loss = 7.0, /* W; heater parameters.P_loss */
     .T_on = 330.0, /* K; heater parameters.T_on */
     .T_off = 345.0, /* K; heater parameters.T_off */

@@ -1,0 +1,23 @@
+"""Comment: any text inside `/* ... */`: ASCII, one line, nothing that ends or continues it."""
+
+from __future__ import annotations
+
+import re
+
+from language.text import shortened, visible
+
+LONGEST = 120
+"""Longest text of a comment [characters]; `about` of a spec may be a paragraph."""
+
+
+def comment(text: str) -> str:
+    """Return a text that is safe in a C comment, whatever it holds.
+
+    Without `*/` and `/*`, without trigraphs (`??/` is a backslash: C99 5.2.1.1), without a
+    backslash at its end, without line ends; other alphabets are written as escapes.
+    """
+    line = " ".join(visible(" ".join(text.split())).split())
+    ascii_line = line.encode("ascii", "backslashreplace").decode("ascii")
+    cut = shortened(ascii_line, LONGEST)
+    apart = re.sub(r"(?<=\*)(?=/)|(?<=/)(?=[*/])|(?<=\?)(?=\?)", " ", cut)
+    return apart.rstrip("\\ ")
