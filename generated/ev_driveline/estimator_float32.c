@@ -29,16 +29,16 @@ static const struct {
     float C_2;
     float g;
 } constant = {
-    .R = 8.1F, /* 1; driveline parameters.R */
+    .R = 8.1F, /* 1; driveline parameters.R; motor speed over wheel speed */
     .m = 1250.0F, /* kg; driveline parameters.m; 800.0 to 2500.0 */
     .r_w = 0.29F, /* m; driveline parameters.r_w */
-    .J_v = 107.924995F, /* kg*m^2; driveline parameters.J_v */
-    .k_hs = 4800.0F, /* N*m/rad; driveline parameters.k_hs; 1000.0 to 20000.0 */
+    .J_v = 107.924995F, /* kg*m^2; driveline parameters.J_v; vehicle, at the wheel */
+    .k_hs = 4800.0F, /* N*m/rad; driveline parameters.k_hs; 1000.0 to 20000.0; both half-shafts, at the wheel */
     .c_hs = 14.0F, /* N*m*s/rad; driveline parameters.c_hs; 1.0 to 200.0 */
-    .alpha = 0.0256F, /* rad; driveline parameters.alpha; 0.0 to 0.1 */
+    .alpha = 0.0256F, /* rad; driveline parameters.alpha; 0.0 to 0.1; half of the gap, at the wheel */
     .b_em = 0.002F, /* N*m*s/rad; driveline parameters.b_em */
     .b_w = 0.2F, /* N*m*s/rad; driveline parameters.b_w */
-    .a_aer = 0.378F, /* kg/m; driveline parameters.a_aer */
+    .a_aer = 0.378F, /* kg/m; driveline parameters.a_aer; half of air density times drag area */
     .C_0 = 0.01F, /* 1; driveline parameters.C_0 */
     .C_1 = 1e-05F, /* s/rad; driveline parameters.C_1 */
     .C_2 = 1e-07F, /* s^2/rad^2; driveline parameters.C_2 */

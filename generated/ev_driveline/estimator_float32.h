@@ -39,7 +39,7 @@ enum {
 
 /* Tunable parameters */
 typedef struct {
-    float J_em; /* kg*m^2; driveline parameters.J_em; 0.01 to 0.2 */
+    float J_em; /* kg*m^2; driveline parameters.J_em; 0.01 to 0.2; motor and gears, at the motor */
 } estimator_float32_Cal;
 
 /* What follows from tunable parameters: estimator_float32_Derive */
@@ -48,8 +48,8 @@ typedef struct {
 } estimator_float32_Derived;
 
 typedef struct {
-    float y_em; /* rad/s; inputs.y_em */
-    float y_w; /* rad/s; inputs.y_w */
+    float y_em; /* rad/s; inputs.y_em; measured motor speed */
+    float y_w; /* rad/s; inputs.y_w; measured mean speed of the driven wheels */
     float T_em; /* N*m; inputs.T_em */
     float T_br; /* N*m; inputs.T_br */
     struct {

@@ -20,11 +20,11 @@ static const struct {
     double c_hs;
     double alpha;
 } constant = {
-    .R = 8.1, /* 1; driveline parameters.R */
-    .J_v = 107.92499999999998, /* kg*m^2; driveline parameters.J_v */
-    .k_hs = 4800.0, /* N*m/rad; driveline parameters.k_hs; 1000.0 to 20000.0 */
+    .R = 8.1, /* 1; driveline parameters.R; motor speed over wheel speed */
+    .J_v = 107.92499999999998, /* kg*m^2; driveline parameters.J_v; vehicle, at the wheel */
+    .k_hs = 4800.0, /* N*m/rad; driveline parameters.k_hs; 1000.0 to 20000.0; both half-shafts, at the wheel */
     .c_hs = 14.0, /* N*m*s/rad; driveline parameters.c_hs; 1.0 to 200.0 */
-    .alpha = 0.0256, /* rad; driveline parameters.alpha; 0.0 to 0.1 */
+    .alpha = 0.0256, /* rad; driveline parameters.alpha; 0.0 to 0.1; half of the gap, at the wheel */
 };
 
 /* Numbers solved when the spec was checked: matrix exponentials, gains, stamps */

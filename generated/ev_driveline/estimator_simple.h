@@ -32,7 +32,7 @@ enum {
 
 /* Tunable parameters */
 typedef struct {
-    double J_em; /* kg*m^2; driveline parameters.J_em; 0.01 to 0.2 */
+    double J_em; /* kg*m^2; driveline parameters.J_em; 0.01 to 0.2; motor and gears, at the motor */
 } estimator_simple_Cal;
 
 /* What follows from tunable parameters: estimator_simple_Derive */
@@ -41,11 +41,11 @@ typedef struct {
 } estimator_simple_Derived;
 
 typedef struct {
-    double y_em; /* rad/s; inputs.y_em */
-    double y_w; /* rad/s; inputs.y_w */
+    double y_em; /* rad/s; inputs.y_em; measured motor speed */
+    double y_w; /* rad/s; inputs.y_w; measured mean speed of the driven wheels */
     double T_em; /* N*m; inputs.T_em */
     double T_br; /* N*m; inputs.T_br */
-    double T_req; /* N*m; inputs.T_req */
+    double T_req; /* N*m; inputs.T_req; torque request */
     struct {
         bool y_em; /* y_em is a new value in this tick */
         bool y_w; /* y_w is a new value in this tick */

@@ -39,7 +39,7 @@ enum {
 
 /* Tunable parameters */
 typedef struct {
-    double J_em; /* kg*m^2; driveline parameters.J_em; 0.01 to 0.2 */
+    double J_em; /* kg*m^2; driveline parameters.J_em; 0.01 to 0.2; motor and gears, at the motor */
 } estimator_written_Cal;
 
 /* What follows from tunable parameters: estimator_written_Derive */
@@ -48,8 +48,8 @@ typedef struct {
 } estimator_written_Derived;
 
 typedef struct {
-    double y_em; /* rad/s; inputs.y_em */
-    double y_w; /* rad/s; inputs.y_w */
+    double y_em; /* rad/s; inputs.y_em; measured motor speed */
+    double y_w; /* rad/s; inputs.y_w; measured mean speed of the driven wheels */
     double T_em; /* N*m; inputs.T_em */
     double T_br; /* N*m; inputs.T_br */
     struct {
