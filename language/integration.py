@@ -65,7 +65,9 @@ def method_of(
             value = limit.eigenvalue
             limits.append(MotionLimit(mode, limit.step, value, limit.term, limit.state))
     made = STAGES[name](field) if name in STAGES else SOLVED[name](field, solved, span, problems)
-    return made, MotionInfo(name, step, made.terms, dict(made.norms), tuple(limits))
+    return made, MotionInfo(
+        name, step, made.terms, dict(made.norms), tuple(limits), len(field.states)
+    )
 
 
 def _formulas(field: Field) -> list[Formula]:

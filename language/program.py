@@ -181,6 +181,7 @@ class MotionInfo:
     terms: int
     norms: Mapping[str, float]
     limits: tuple[MotionLimit, ...]
+    states: int
     events: int = 0
 
 

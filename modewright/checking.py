@@ -11,6 +11,7 @@ from language.document import Document, Scalar
 from language.effect import read_effect
 from language.load import automaton_of, program_of
 from language.map import read_map
+from language.numbers_text import motion_lines
 from language.problem import Problem, Problems, SpecError
 from language.project import Project, expanded, read_document, with_calibrations
 from language.scenario import read_scenario
@@ -41,6 +42,17 @@ def check(reference: str, root: Path | None = None) -> list[Problem]:
     except SpecError as error:
         return list(dict.fromkeys(error.problems))
     return list(dict.fromkeys(problems.found))
+
+
+def limits(reference: str, root: Path | None = None) -> list[str]:
+    """Return the largest stable step of each mode of an automaton, also where it holds."""
+    project = Project(root or Path())
+    document = read_document(project.path_of(reference))
+    if document.kind == "calibration" or expanded(document, project).kind != "automaton":
+        return []
+    motion = program_of(automaton_of(document, project)).motion
+    lines = list(motion_lines(motion)) if motion and motion.limits else []
+    return [f"{document.name}: {lines[0]}", *lines[1:]] if lines else []
 
 
 def _calibrated(

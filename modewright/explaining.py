@@ -12,13 +12,14 @@ from language.document import Document
 from language.load import automaton_of, command_line_value, program_of
 from language.lower import parameter_kinds
 from language.model_text import model_text
+from language.numbers_text import numbers_text
 from language.printing import program_text
 from language.problem import Problems, SpecError
 from language.project import Project, expanded, read_document, with_calibrations
 from language.provenance import Row, difference_text, differences, rows, spec_text
 from language.system import read_system
 
-Pass = Literal["document", "model", "program"]
+Pass = Literal["document", "model", "program", "numbers"]
 Values = Mapping[str, str]
 
 
@@ -32,7 +33,10 @@ def explained(spec: str, stage: Pass, values: Values, root: Path | None = None) 
         return _calibration_text(document, project)
     given = {name: command_line_value(text) for name, text in values.items()}
     automaton = automaton_of(document, project, given)
-    return model_text(automaton) if stage == "model" else program_text(program_of(automaton))
+    if stage == "model":
+        return model_text(automaton)
+    program = program_of(automaton)
+    return numbers_text(program) if stage == "numbers" else program_text(program)
 
 
 def _calibration_text(document: Document, project: Project) -> str:

@@ -46,3 +46,6 @@ def check(
         console().print(f"{counted(len(names), 'spec')} checked, {counted(len(errors), 'problem')}")
     if errors:
         raise typer.Exit(PROBLEMS)
+    for name in specs or [] if not as_json else ():
+        for line in checking.limits(name):
+            console().print(line, soft_wrap=True, highlight=False, markup=False)

@@ -9,7 +9,7 @@ import typer
 
 from modewright.commands.options import Json, Sets, values_of
 
-PASSES = ("document", "model", "program")
+PASSES = ("document", "model", "program", "numbers")
 
 
 def explain(
@@ -18,7 +18,7 @@ def explain(
         str | None, typer.Argument(help="a second one: what differs between the two")
     ] = None,
     stage: Annotated[
-        str, typer.Option("--pass", help="document (expanded), model (checked) or program")
+        str, typer.Option("--pass", help="document (expanded), model (checked), program or numbers")
     ] = "document",
     sets: Sets = None,
     as_json: Json = False,
@@ -29,6 +29,7 @@ def explain(
     modewright explain driveline_load
     modewright explain driveline driveline_load
     modewright explain estimator --pass program
+    modewright explain estimator --pass numbers
     """
     from modewright import explaining
 

@@ -114,3 +114,27 @@ def test_the_command_prints_one_or_two(
     assert len(capsys.readouterr().out.splitlines()) == 4
     app(["explain", "calm", "--pass", "program"], standalone_mode=False)
     assert capsys.readouterr().out.startswith("program calm")
+
+
+def test_the_numbers_of_a_run_and_its_observers_are_printed() -> None:
+    """K of a run, |A h|, its work; Phi, Gamma and L of an observer, as they stand in the C."""
+    text = explained("estimator", "numbers", {}, ROOT)
+    assert "method exponential, step 0.001 s, K = " in text
+    assert "mode no_contact: |A h| = 2.9" in text
+    assert "work: at most 4 events per substep, " in text
+    made = program_of(load_automaton("estimator", SHIPPED))
+    for constant in made.constants:
+        shown = ("drive_Phi.", "drive_Gamma.", "drive_L.")
+        if constant.name.removeprefix("solved.").startswith(shown):
+            assert f"{constant.value:.16g}" in text.partition("observer of mode coast")[0]
+
+
+def test_the_largest_stable_step_is_printed_where_it_holds(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(ROOT)
+    assert app(["check", "driveline"], standalone_mode=False) in (None, 0)
+    out = capsys.readouterr().out
+    assert "driveline: method rk4, step 0.00025 s" in out
+    assert "mode no_contact: largest stable step 0.0081237" in out
+    assert "of `k_hs / c_hs * (theta_d - theta_b)` in the rate of theta_b" in out

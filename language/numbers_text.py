@@ -1,0 +1,64 @@
+"""Numbers text: what was solved or bounded for a Program - its method, its limits, its gains."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from language.motion import RUN_HALVINGS
+from language.program import MotionInfo, ObserverInfo, Program
+
+LETTERS = {"Phi": "states", "Gamma": "inputs", "L": "measures"}
+"""Matrices of an observer that are shown, and what their columns are."""
+
+
+def numbers_text(program: Program) -> str:
+    """Return the method of a run or flow with K, |A h|, limits, work; matrices of observers."""
+    lines = [f"program {program.name}"]
+    if program.motion:
+        lines += motion_lines(program.motion)
+        lines += _work_lines(program, program.motion)
+    for observer in program.observers:
+        lines += _observer_lines(program, observer)
+    return "\n".join(lines) + "\n"
+
+
+def motion_lines(motion: MotionInfo) -> Iterator[str]:
+    """Yield the method, |A h| of each mode and the largest stable step of each mode."""
+    yield f"method {motion.method}, step {motion.step:.6g} s, K = {motion.terms}"
+    for mode, norm in motion.norms.items():
+        yield f"  mode {mode}: |A h| = {norm:.4g}, at most 4"
+    for limit in motion.limits:
+        value = limit.eigenvalue
+        turning = f" +- {abs(value.imag):.6g} i" if value.imag else ""
+        yield (
+            f"  mode {limit.mode}: largest stable step {limit.step:.6g} s, eigenvalue "
+            f"{value.real:.6g}{turning} 1/s of `{limit.term}` in the rate of {limit.state}"
+        )
+
+
+def _work_lines(program: Program, motion: MotionInfo) -> Iterator[str]:
+    """K products by A, then halvings that evaluate the polynomials: once for each event."""
+    if program.period is None or not motion.events:
+        return
+    n = motion.states
+    once = motion.terms * n * n + RUN_HALVINGS * motion.terms * n
+    yield (
+        f"  work: at most {motion.events} events per substep, {motion.events * once} products and "
+        f"{motion.events * RUN_HALVINGS} looks at the guards"
+    )
+
+
+def _observer_lines(program: Program, observer: ObserverInfo) -> Iterator[str]:
+    yield f"observer of mode {observer.mode}: gain {observer.gain}"
+    values = {constant.name: constant.value for constant in program.constants}
+    for letter, what in LETTERS.items():
+        columns = getattr(observer, what)
+        rows = []
+        for row in observer.states:
+            names = [f"solved.{observer.mode}_{letter}.{row}.{column}" for column in columns]
+            rows.append([values.get(name, 0.0) for name in names])
+        if not columns or not any(any(row) for row in rows):
+            continue
+        yield f"  {letter} ({', '.join(observer.states)} by {', '.join(columns)})"
+        for numbers in rows:
+            yield "    " + " ".join(f"{number:>23.16g}" for number in numbers)
