@@ -9,10 +9,10 @@ rounding. Qd is linear in the spectral densities: a density that is not constant
 from __future__ import annotations
 
 import dataclasses
-import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 
 from language.constants import constant_value
+from language.covariance import Ahead, bounded, corrected, entry, pairs, spread
 from language.derived import with_model
 from language.evaluate import Scalar, evaluate
 from language.kalman import (
@@ -26,7 +26,6 @@ from language.kalman import (
     rest_constants,
     solved_formulas,
 )
-from language.limit import stored
 from language.lower import Names, constant_names, expression, tunables_of
 from language.matrix import (
     Matrix,
@@ -39,40 +38,21 @@ from language.matrix import (
 from language.model import Automaton, Formula, Mode, Observer
 from language.operation import (
     Assign,
-    Binary,
     Block,
     Branch,
-    Call,
     Choose,
-    Compare,
     Expr,
-    FaultBit,
     Op,
     Ref,
     Run,
-    Unary,
-    add,
-    divide,
-    multiply as times,
     real,
     subtract,
     total,
 )
 from language.problem import Problems
-from language.program import Constant, ObserverInfo, Variable
+from language.program import Constant, ObserverInfo
 from language.riccati import discrete_noise, steady_gain
 from language.syntax import Application, memory_key, names as names_of, walk
-
-COVARIANCE_RANGE = "covariance_range"
-
-
-@dataclasses.dataclass(frozen=True)
-class _Ahead:
-    """The numbers of one prediction: Phi, Qd of the constant densities, Qd per unit of others."""
-
-    tag: str
-    a: Matrix
-    numbers: Mapping[str, Matrix]
 
 
 def recursive(
@@ -89,34 +69,6 @@ def recursive(
         made = _Recursive(automaton, mode, (before, now), values, problems)
         return made.kalman()
     return None
-
-
-def covariance_variables(automaton: Automaton) -> list[Variable]:
-    """Return the variables of the recursive observers of an automaton."""
-    found: dict[str, Variable] = {}
-    for mode in automaton.modes.values():
-        observer = mode.observer
-        if observer is None or observer.gain != "recursive":
-            continue
-        units = {name: str(automaton.states[name].unit.dimension) for name in observer.states}
-        for i, row in enumerate(observer.states):
-            for j, column in enumerate(observer.states):
-                unit = f"({units[row]})*({units[column]})"
-                name = f"work.t_{row}__{column}"
-                found[name] = Variable(name, "real", unit)
-                if i <= j:
-                    name = _entry(row, column)
-                    about = f"covariance of {row} and {column}"
-                    found[name] = Variable(name, "real", unit, about=about)
-            for what in ("pc", "gain", "density"):
-                found[f"{what}{row}"] = Variable(f"work.{what}_{row}", "real")
-        for name in ("spread", "residual"):
-            found[name] = Variable(f"work.{name}", "real")
-    return list(found.values())
-
-
-def _entry(row: str, column: str) -> str:
-    return f"memory.P_{row}__{column}"
 
 
 class _Recursive:
@@ -147,6 +99,7 @@ class _Recursive:
         observer = with_model(self.automaton, self.mode.name, given, self.values, self.problems)
         if observer is None:
             return None
+        self._same_states()
         self.depends_on = tunables_of(self.automaton, solved_formulas(observer))
         c = output_matrix(self.automaton, self.values, observer)
         measured = tuple(observer.measures)
@@ -170,7 +123,16 @@ class _Recursive:
         correct = self._correct(observer, c)
         return Kalman(predict, correct, tuple(constants), info, start, enter)
 
-    def _ahead(self, observer: Observer, tag: str) -> _Ahead:
+    def _same_states(self) -> None:
+        """The covariance belongs to the automaton, as its states do."""
+        observers = [mode.observer for mode in self.automaton.modes.values()]
+        first = next(o for o in observers if o and o.gain == "recursive")
+        if self.states != first.states:
+            label = "recursive observers of an automaton have the same states in the same order"
+            assert self.mode.observer
+            self.problems.error("observer", self.mode.observer.span, label)
+
+    def _ahead(self, observer: Observer, tag: str) -> Ahead:
         """Return the numbers of a prediction by the matrix of an observer."""
         states, h = self.states, self.period
         a = number_matrix(self.automaton, self.values, observer.a, states, states, "A")
@@ -182,10 +144,10 @@ class _Recursive:
                 tuple(1.0 if row == column == name else 0.0 for column in states) for row in states
             )
             numbers[f"N_{name}"] = discrete_noise(a, one, h)
-        return _Ahead(tag, a, numbers)
+        return Ahead(tag, a, numbers)
 
     def _constants(
-        self, observer: Observer, ahead: _Ahead, c: Matrix, r: Matrix
+        self, observer: Observer, ahead: Ahead, c: Matrix, r: Matrix
     ) -> tuple[Constant, ...]:
         measured = {"C": c} if c else {}
         found = SolvedNames(ahead.tag, observer).constants(
@@ -198,7 +160,7 @@ class _Recursive:
         return (*found, *variances)
 
     def _steady(
-        self, observer: Observer, own: _Ahead, c: Matrix, r: Matrix
+        self, observer: Observer, own: Ahead, c: Matrix, r: Matrix
     ) -> tuple[Block, Block, tuple[Constant, ...]]:
         """Return what sets the steady covariance: before a correction, and after one.
 
@@ -227,15 +189,15 @@ class _Recursive:
         known = {constant.name for constant in constants}
         start, enter = (
             tuple(
-                Assign(_entry(i, j), Ref(name) if name in known else real(0.0))
-                for i, j in self._pairs()
+                Assign(entry(i, j), Ref(name) if name in known else real(0.0))
+                for i, j in pairs(self.states)
                 for name in [solved.of(letter, i, j)]
             )
             for letter in ("P", "Pe")
         )
         return start, enter if observer.covariance == "steady" else (), constants
 
-    def _mean(self, observer: Observer, own: _Ahead) -> tuple[Block, tuple[Constant, ...]]:
+    def _mean(self, observer: Observer, own: Ahead) -> tuple[Block, tuple[Constant, ...]]:
         states = self.states
         b = number_matrix(self.automaton, self.values, observer.b, states, observer.inputs, "B")
         held = exponential_integral(own.a, self.period)
@@ -271,45 +233,23 @@ class _Recursive:
             chosen = cases[0][1] if cases else ()
         return (*chosen, Run(f"run_{self.mode.name}")), constants
 
-    def _pairs(self) -> Iterator[tuple[str, str]]:
-        for i, row in enumerate(self.states):
-            for column in self.states[i:]:
-                yield row, column
-
-    def _covariance(self, row: str, column: str) -> Ref:
-        i, j = self.states.index(row), self.states.index(column)
-        return Ref(_entry(row, column) if i <= j else _entry(column, row))
-
-    def _spread(self, observer: Observer, ahead: _Ahead) -> Block:
-        """P = Phi P Phi' + Qd, through T = Phi P."""
-        solved, states = SolvedNames(ahead.tag, observer), self.states
-        ops: list[Op] = []
+    def _spread(self, observer: Observer, ahead: Ahead) -> Block:
+        """The densities of now, then the covariance over the period."""
+        ops = []
         for name, formula in self.varying.items():
             key = f"{self.automaton.name} {formula.key}"
             ops.append(Assign(f"work.density_{name}", expression(formula.tree, self.now), key))
-        phi = ahead.numbers["Phi"]
-        for row in states:
-            for column in states:
-                old: dict[str, Expr] = {name: self._covariance(name, column) for name in states}
-                parts = solved.row("Phi", phi, row, old)
-                ops.append(Assign(f"work.t_{row}__{column}", total(parts)))
-        for row, column in self._pairs():
-            half: dict[str, Expr] = {name: Ref(f"work.t_{row}__{name}") for name in states}
-            parts = solved.row("Phi", phi, column, half)
-            parts += self._noise(solved, ahead, row, column)
-            ops.append(Assign(_entry(row, column), total(parts)))
-        return (*ops, *self._bounded(observer))
+        return (*ops, *spread(SolvedNames(ahead.tag, observer), ahead), *self._bounded(observer))
 
-    def _noise(self, solved: SolvedNames, ahead: _Ahead, row: str, column: str) -> list[Expr]:
-        i, j = self.states.index(row), self.states.index(column)
-        parts: list[Expr] = []
-        if ahead.numbers["Qd"][i][j] != 0.0:
-            parts.append(Ref(solved.of("Qd", row, column)))
-        for name in self.varying:
-            if ahead.numbers[f"N_{name}"][i][j] != 0.0:
-                unit = Ref(solved.of(f"N_{name}", row, column))
-                parts.append(times(Ref(f"work.density_{name}"), unit))
-        return parts
+    def _bounded(self, observer: Observer) -> Block:
+        limits = {}
+        for name, pair in observer.limits.items():
+            if tunables_of(self.automaton, pair):
+                label = "the limits of a variance are made of fixed values"
+                self.problems.error("observer", pair[0].span, label)
+            low, high = (constant_value(f, self.automaton, self.values, "a limit") for f in pair)
+            limits[name] = (low, high)
+        return bounded(self.states, limits)
 
     def _correct(self, observer: Observer, c: Matrix) -> Block:
         """Innovations against the prediction, then one measurement at a time in their order."""
@@ -318,12 +258,13 @@ class _Recursive:
         known = {**self.now, **more}
         first: list[Op] = []
         second: list[Op] = []
-        for k, name in enumerate(observer.measures):
+        for name in observer.measures:
             fresh = is_fresh(observer, name)
             seen = self._seen(observer, solved, c, name, known)
             error = subtract(known[name], seen)
             first.append(Branch(fresh, (Assign(f"innovation.{name}", error),)))
-            second.append(Branch(fresh, self._one(observer, solved, c, k, error)))
+            one = (*corrected(self.automaton, solved, c, name, error), *self._bounded(observer))
+            second.append(Branch(fresh, one))
         return (*first, *second)
 
     def _seen(
@@ -334,51 +275,6 @@ class _Recursive:
         if name in observer.g:
             parts.append(expression(observer.g[name].tree, known))
         return total(parts)
-
-    def _one(
-        self, observer: Observer, solved: SolvedNames, c: Matrix, k: int, error: Expr
-    ) -> Block:
-        name = tuple(observer.measures)[k]
-        states = self.states
-        variance = Ref(solved.of("R", name, "").rstrip("."))
-        ops: list[Op] = [Assign("work.residual", error)]
-        for row in states:
-            old: dict[str, Expr] = {column: self._covariance(row, column) for column in states}
-            ops.append(Assign(f"work.pc_{row}", total(solved.row("C", c, name, old))))
-        pc: dict[str, Expr] = {row: Ref(f"work.pc_{row}") for row in states}
-        spread = add(total(solved.row("C", c, name, pc)), variance)
-        ops.append(Assign("work.spread", Call("max", (spread, variance))))
-        for row in states:
-            ops.append(Assign(f"work.gain_{row}", divide(pc[row], Ref("work.spread"))))
-            moved = times(Ref(f"work.gain_{row}"), Ref("work.residual"))
-            ops += stored(self.automaton, row, add(Ref(f"state.{row}"), moved))
-        for row, column in self._pairs():
-            less_by = times(Ref(f"work.gain_{row}"), pc[column])
-            old_entry = Ref(_entry(row, column))
-            ops.append(Assign(old_entry.name, subtract(old_entry, less_by)))
-        return (*ops, *self._bounded(observer))
-
-    def _bounded(self, observer: Observer) -> list[Op]:
-        """Variances within their limits, covariances within what these allow; else a fault bit."""
-        limits = {}
-        for name, pair in observer.limits.items():
-            low, high = (constant_value(f, self.automaton, self.values, "a limit") for f in pair)
-            limits[name] = (low, high)
-        ops: list[Op] = []
-        for row, column in self._pairs():
-            if row not in limits or column not in limits:
-                continue
-            high = math.sqrt(limits[row][1]) * math.sqrt(limits[column][1])
-            low = limits[row][0] if row == column else -high
-            if row == column:
-                high = limits[row][1]
-            entry = Ref(_entry(row, column))
-            inside = Binary(
-                "and", Compare(">=", entry, real(low)), Compare("<=", entry, real(high))
-            )
-            clipped = Assign(entry.name, Call("clip", (entry, real(low), real(high))))
-            ops.append(Branch(Unary("not", inside), (FaultBit(COVARIANCE_RANGE), clipped)))
-        return ops
 
 
 def _varies(automaton: Automaton, formula: Formula) -> bool:

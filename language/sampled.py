@@ -13,6 +13,7 @@ from collections.abc import Mapping
 
 from language.action import action_variables, committing, discrete_variables, entry, reading
 from language.constants import derive_block, parameter_constants, values_of
+from language.covariance import COVARIANCE_RANGE, covariance_variables
 from language.evaluate import Scalar
 from language.fault import FAULT_GUARD, with_fault_transitions
 from language.kalman import Kalman, kalman, observer_variables
@@ -53,7 +54,7 @@ from language.program import (
     Program,
     Variable,
 )
-from language.recursive import COVARIANCE_RANGE, covariance_variables, recursive
+from language.recursive import recursive
 from language.region import fired_variable, in_modes, mode_variable
 from language.run import EVENT_LIMIT, run_block, run_motion, start_regions
 from language.transition import enter_run, sampled_commit, sampled_jump, transition_infos

@@ -213,6 +213,15 @@ def test_engine_and_c_are_equal(numbers: str, noise: str) -> None:
     assert verdict.is_equal and verdict.transitions > 0, verdict
 
 
+OBSERVING = """  on_2:
+    observer:
+      kalman: {{states: {states}, gain: recursive, covariance: keep}}
+      A: {{x: {{v: 1}}, v: {{x: -4 1/s^2, v: -0.3 1/s, b: 1}}, b: {{b: -0.1 1/s}}}}
+      measures: {{y_x: x}}
+      process_noise: {{v: 0.5 1/s^3, b: 0.2 1/s^5}}
+      measurement_noise: {{y_x: 0.04}}
+"""
+
 # The run predicts.
 
 MODEL = """language: 1
@@ -301,3 +310,9 @@ def test_what_does_not_go_together_is_refused(tmp_path: Path) -> None:
     (line,) = told(lambda: made(("initial: on_1", "equations: {w: u * 1}\ninitial: on_1"),
                                 noise="0.2 1/s^5 + 0 1/s^3 * w"))  # fmt: skip
     assert line.endswith("`w` is an equation: an observer reads states and inputs")
+    other = OBSERVING.format(states="[v, x, b]")
+    (line,) = told(lambda: made(("  on_2: {}", other)))
+    assert line.endswith("observers of an automaton have the same states in the same order")
+    program(
+        SPEC.replace("NOISE", CONSTANT).replace("  on_2: {}", OBSERVING.format(states="[x, v, b]"))
+    )

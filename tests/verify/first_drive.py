@@ -191,13 +191,15 @@ def leaf(estimator: str, path: Path) -> Figure:
 
 def refused() -> Figure:
     """Specs that are refused with exactly the text beside them."""
+    book = (ROOT / "tests" / "refused").glob("*.yaml")
+    specs = [spec for spec in sorted(book) if not spec.stem.endswith(".repaired")]
     wrong = [
         spec.stem
-        for spec in sorted((ROOT / "tests" / "refused").glob("*.yaml"))
+        for spec in specs
         if mw.render_all(mw.check(str(spec.relative_to(ROOT)))) + "\n"
         != spec.with_suffix(".txt").read_text()
     ]
-    count = len(list((ROOT / "tests" / "refused").glob("*.yaml")))
+    count = len(specs)
     return {"met": count >= 10 and not wrong, "specs": count, "other_text": wrong}
 
 

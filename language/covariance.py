@@ -1,0 +1,166 @@
+"""Covariance: P of a recursive observer as operations - over a period, at a measurement, bounded.
+
+P is stored once per pair of states (`memory.P_<row>__<column>`), so it is symmetric whatever the
+rounding.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from language.kalman import SolvedNames
+from language.limit import stored
+from language.matrix import Matrix
+from language.model import Automaton
+from language.operation import (
+    Assign,
+    Binary,
+    Block,
+    Branch,
+    Call,
+    Compare,
+    Expr,
+    FaultBit,
+    Op,
+    Ref,
+    Unary,
+    add,
+    divide,
+    multiply as times,
+    real,
+    subtract,
+    total,
+)
+from language.program import Variable
+
+COVARIANCE_RANGE = "covariance_range"
+States = tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Ahead:
+    """The numbers of one prediction: Phi, Qd of constant densities, N_<state> per unit of others.
+
+    `tag` opens the names of its solved constants; A (n, n) [unit_i/(unit_j s)].
+    """
+
+    tag: str
+    a: Matrix
+    numbers: Mapping[str, Matrix]
+
+
+def covariance_variables(automaton: Automaton) -> list[Variable]:
+    """Return the variables of the recursive observers of an automaton."""
+    found: dict[str, Variable] = {}
+    for mode in automaton.modes.values():
+        observer = mode.observer
+        if observer is None or observer.gain != "recursive":
+            continue
+        units = {name: str(automaton.states[name].unit.dimension) for name in observer.states}
+        for i, row in enumerate(observer.states):
+            for j, column in enumerate(observer.states):
+                unit = f"({units[row]})*({units[column]})"
+                name = f"work.t_{row}__{column}"
+                found[name] = Variable(name, "real", unit)
+                if i <= j:
+                    name = entry(row, column)
+                    about = f"covariance of {row} and {column}"
+                    found[name] = Variable(name, "real", unit, about=about)
+            for what in ("pc", "gain", "density"):
+                found[f"{what}{row}"] = Variable(f"work.{what}_{row}", "real")
+        for name in ("spread", "residual"):
+            found[name] = Variable(f"work.{name}", "real")
+    return list(found.values())
+
+
+def entry(row: str, column: str) -> str:
+    """Return the variable of a covariance; the row stands before the column among the states."""
+    return f"memory.P_{row}__{column}"
+
+
+def pairs(states: States) -> Iterator[tuple[str, str]]:
+    """Yield the pairs of states whose covariance is stored."""
+    for i, row in enumerate(states):
+        for column in states[i:]:
+            yield row, column
+
+
+def spread(solved: SolvedNames, ahead: Ahead) -> Block:
+    """P = Phi P Phi' + Qd, through T = Phi P; `work.density_<state>` are the varying densities."""
+    states, phi = solved.observer.states, ahead.numbers["Phi"]
+    ops: list[Op] = []
+    for row in states:
+        for column in states:
+            old: dict[str, Expr] = {name: _of(states, name, column) for name in states}
+            parts = solved.row("Phi", phi, row, old)
+            ops.append(Assign(f"work.t_{row}__{column}", total(parts)))
+    for row, column in pairs(states):
+        half: dict[str, Expr] = {name: Ref(f"work.t_{row}__{name}") for name in states}
+        parts = solved.row("Phi", phi, column, half)
+        parts += _noise(solved, ahead, row, column)
+        ops.append(Assign(entry(row, column), total(parts)))
+    return tuple(ops)
+
+
+def corrected(
+    automaton: Automaton, solved: SolvedNames, c: Matrix, measure: str, error: Expr
+) -> Block:
+    """Correct states and P by one measurement; `error` is what it differs from its expectation.
+
+    The spread c P c' + r is at least r: where rounding takes it below, it is r.
+    """
+    states = solved.observer.states
+    variance = Ref(f"solved.{solved.mode}_R.{measure}")
+    ops: list[Op] = [Assign("work.residual", error)]
+    for row in states:
+        old: dict[str, Expr] = {column: _of(states, row, column) for column in states}
+        ops.append(Assign(f"work.pc_{row}", total(solved.row("C", c, measure, old))))
+    pc: dict[str, Expr] = {row: Ref(f"work.pc_{row}") for row in states}
+    size = add(total(solved.row("C", c, measure, pc)), variance)
+    ops.append(Assign("work.spread", Call("max", (size, variance))))
+    for row in states:
+        ops.append(Assign(f"work.gain_{row}", divide(pc[row], Ref("work.spread"))))
+        moved = times(Ref(f"work.gain_{row}"), Ref("work.residual"))
+        ops += stored(automaton, row, add(Ref(f"state.{row}"), moved))
+    for row, column in pairs(states):
+        before = Ref(entry(row, column))
+        less = times(Ref(f"work.gain_{row}"), pc[column])
+        ops.append(Assign(before.name, subtract(before, less)))
+    return tuple(ops)
+
+
+def bounded(states: States, limits: Mapping[str, tuple[float, float]]) -> Block:
+    """Keep variances within limits, covariances within what these allow; else set a fault bit."""
+    ops: list[Op] = []
+    for row, column in pairs(states):
+        if row not in limits or column not in limits:
+            continue
+        low, high = limits[row]
+        if row != column:
+            high = math.sqrt(limits[row][1]) * math.sqrt(limits[column][1])
+            low = -high
+        value = Ref(entry(row, column))
+        inside = Binary("and", Compare(">=", value, real(low)), Compare("<=", value, real(high)))
+        clipped = Assign(value.name, Call("clip", (value, real(low), real(high))))
+        ops.append(Branch(Unary("not", inside), (FaultBit(COVARIANCE_RANGE), clipped)))
+    return tuple(ops)
+
+
+def _of(states: States, row: str, column: str) -> Ref:
+    i, j = states.index(row), states.index(column)
+    return Ref(entry(row, column) if i <= j else entry(column, row))
+
+
+def _noise(solved: SolvedNames, ahead: Ahead, row: str, column: str) -> list[Expr]:
+    states = solved.observer.states
+    i, j = states.index(row), states.index(column)
+    parts: list[Expr] = []
+    if ahead.numbers["Qd"][i][j] != 0.0:
+        parts.append(Ref(solved.of("Qd", row, column)))
+    for name in states:
+        if f"N_{name}" in ahead.numbers and ahead.numbers[f"N_{name}"][i][j] != 0.0:
+            unit = Ref(solved.of(f"N_{name}", row, column))
+            parts.append(times(Ref(f"work.density_{name}"), unit))
+    return parts
