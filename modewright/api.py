@@ -15,6 +15,7 @@ from engine.replay import Replay, replay as replay_recording, used_columns
 from engine.simulate import simulate as simulate_system
 from engine.trajectory import Trajectory
 from language.document import Document, Scalar
+from language.limit import require_ranges
 from language.load import automaton_of, command_line_value, program_of
 from language.map import read_map
 from language.model import Automaton, RecordingMap, Scenario, System
@@ -117,6 +118,7 @@ def generate(
         label = f"`{automaton.name}` is continuous: C is printed for sampled automata"
         problems.error("form", automaton.span, label, "give it a `period`")
         raise SpecError(problems.found)
+    require_ranges(automaton)
     return c_files(program_of(automaton))
 
 
@@ -144,6 +146,9 @@ def lockstep(
     if changes:
         pages = pages_of(changes, loaded.system)
         loaded = Loaded(loaded.system, dataclasses.replace(loaded.scenario, pages=pages))
+    for instance in loaded.system.instances.values():
+        if instance.automaton.is_sampled:
+            require_ranges(instance.automaton)
     tapes: dict[str, Tape] = {}
 
     def ticked(name: str, used: Program, stepper: object) -> None:

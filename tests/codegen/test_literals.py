@@ -195,7 +195,7 @@ def spec_of(values: list[str], folder: Path) -> Path:
     path.write_text(
         "language: 1\nautomaton: many\nperiod: 1 ms\nnumbers: float64\nparameters:\n"
         + "\n".join(lines)
-        + '\ninputs: {u: {unit: "1"}}\nequations:\n'
+        + '\ninputs: {u: {unit: "1", range: [-9, 9]}}\nequations:\n'
         + "\n".join(f"  r{k}: u + p{k}" for k in range(len(values)))
         + "\nmodes: {only: {}}\noutputs: [r0]\n"
     )
