@@ -141,7 +141,7 @@ def test_an_error_while_it_is_used_leaves_nothing_either(temporary: Path) -> Non
 def test_all_that_an_instance_carries_is_observed() -> None:
     program = heater()
     groups = {item.name.partition(".")[0] for item in observed(program)}
-    assert groups == {"state", "equation", "timer", "memory"}
+    assert groups == {"state", "latched", "equation", "timer", "memory"}
     kinds = {item.name: item.kind for item in observed(program)}
     assert kinds["equation.P"] == "real"
     assert kinds["equation.low"] == kinds["memory.mode"] == kinds["timer.rest_heating"] == "whole"
