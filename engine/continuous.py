@@ -9,14 +9,11 @@ from fractions import Fraction
 from typing import Protocol
 
 from engine.interpreter import Stepper
-from engine.keeping import Alarms, Records
+from engine.keeping import Records
 from engine.range_watch import RangeWatch
 from engine.trajectory import Event
-from language.motion import merge_time
 from language.program import Program, TransitionInfo, short
-
-EVENTS_PER_STEP = 100
-"""More located events than this within one major step are Zeno behaviour (rule 12)."""
+from language.stepping import EVENTS_PER_STEP
 
 
 class Around(Protocol):
@@ -60,7 +57,10 @@ class Stopped(Exception):
 
 
 class ContinuousRun:
-    """One continuous automaton at one time: exact (a fraction of a second), with its timers."""
+    """One continuous automaton at one time: exact (a fraction of a second).
+
+    It runs the parts of the Program's `step` one by one, and sees each event.
+    """
 
     def __init__(
         self,
@@ -78,13 +78,10 @@ class ContinuousRun:
         self.stepper = stepper
         self.time = Fraction(0)
         self._log = log
-        self._due: dict[str, Fraction] = {}
         self._records = Records(program, stepper)
-        self._alarms = Alarms(program, stepper, self._due)
         self._in_step: list[TransitionInfo] = []
         self.is_settled = False
-        self._modes = program.mode_variables()
-        self._timed = [info for info in program.transitions if info.timer]
+        self._regions = tuple(program.mode_variables())
         states = tuple(v.name for v in program.variables if v.name.startswith("state."))
         self._states = states
         self._read_states = stepper.reader(states)
@@ -93,11 +90,9 @@ class ContinuousRun:
     def start(self) -> None:
         """Put the states where they start; `settle` enters the initial mode (rule 16)."""
         self._records.start()
-        self._records.age(self.time)
-        self.stepper.run("init")
+        self.stepper.run("latch")
+        self.stepper.run("start")
         self.stepper.run("equations")
-        for region, variable in self._modes.items():
-            self._alarms.enter(region, self.stepper.get(variable), self.time)
         self.is_settled = False
 
     def flow_to(self, time: Fraction, looks: Sequence[Fraction] = ()) -> None:
@@ -114,10 +109,10 @@ class ContinuousRun:
 
     def settle(self) -> None:
         """Jump before flow: micro-steps until no transition is enabled, then equations."""
-        bound = sum(len(self.program.modes_of(region)) for region in self._modes)
+        bound = sum(len(self.program.modes_of(region)) for region in self._regions)
+        self.stepper.run("latch")
         fired: list[TransitionInfo] = []
         for micro_step in range(bound + 1):
-            self._mark_due()
             self.stepper.run("jump")
             taken = self._taken()
             if not taken:
@@ -126,12 +121,9 @@ class ContinuousRun:
             if micro_step == bound:
                 raise Stopped(f"{self._here()}: {_fired(fired)} fire for ever at one instant")
             for info in taken:
-                self._forget(info)
-                self._alarms.enter(info.region, info.target, self.time)
                 self._log_event(info, micro_step)
         self._in_step += fired
         self.stepper.run("watch")
-        self._start_timers()
         self.stepper.run("equations")
         self._ranges.look(self.time)
         self._around.watch(self.time)
@@ -142,12 +134,6 @@ class ContinuousRun:
         numbers = [self.stepper.get(name) for name in self.program.fired_variables()]
         return [self.program.transitions[number - 1] for number in numbers if number]
 
-    def _forget(self, fired: TransitionInfo) -> None:
-        """The timers of a mode end when it is left (rule 4)."""
-        for info in self._timed:
-            if (info.region, info.source) == (fired.region, fired.source):
-                self._due.pop(info.key, None)
-
     def _log_event(self, info: TransitionInfo, micro_step: int) -> None:
         source = self.program.mode_name(info.source, info.region)
         target = self.program.mode_name(info.target, info.region)
@@ -155,67 +141,69 @@ class ContinuousRun:
         self._log(Event(float(self.time), micro_step, *place))
 
     def _major_step(self, end: Fraction, horizon: Fraction) -> None:
-        self._in_step, located = [], 0
-        while self.time < end:
-            due = min(self._due.values(), default=None)
-            stop = end if due is None else min(end, max(due, self.time))
-            crossed = self._flow(stop)
-            if not crossed and (due is None or self.time < due):
-                self._look_here(horizon)
-                continue
-            located += 1
-            if located > EVENTS_PER_STEP:
-                text = f"more than {EVENTS_PER_STEP} events in one step"
-                raise Stopped(f"{self._here()}: {text}: {_fired(self._in_step)}")
-            if self.time < horizon:
+        self._in_step = []
+        self.stepper.set("work.left", float(end - self.time))
+        for _ in range(EVENTS_PER_STEP + 1):
+            if self.time >= end:
+                return
+            is_event = self._segment(end)
+            if is_event and self.time < horizon:
                 self.settle()
-                self._look_here(horizon)
-            else:
-                self.is_settled = False
+            self.is_settled = self.is_settled and not (is_event and self.time == horizon)
+            self._look_here(horizon)
+        if self.time < end:
+            text = f"more than {EVENTS_PER_STEP} events in one step"
+            raise Stopped(f"{self._here()}: {text}: {_fired(self._in_step)}")
 
-    def _flow(self, stop: Fraction) -> bool:
-        """Flow up to `stop` or the first crossing before it; tell whether there was one."""
-        h = float(stop - self.time)
-        if h <= 0.0:
-            self.time = stop
-            return False
-        self.stepper.set("work.h", h)
-        merge = merge_time(self.program.number, self.program.major_step, stop)
-        self.stepper.set("work.merge", merge)
+    def _segment(self, end: Fraction) -> bool:
+        """Flow to the end of the step or the next event in it; tell whether there is one."""
+        stepper = self.stepper
+        stepper.run("limit")
+        h = stepper.get("work.h")
         start, states = self.time, self._read_states()
+        stop = end if h == stepper.get("work.left") else min(end, start + Fraction(h))
         self._records.leave(start)
+        age = self._records.age()
         self._around.aim(start, stop)
-        self.stepper.run("flow")
+        stepper.run("latch")
+        stepper.run("flow")
         self._require_finite()
-        crossed = bool(self.stepper.get("work.crossed"))
-        elapsed = self.stepper.get("work.elapsed")
-        at_end = not crossed or h - elapsed <= merge
-        self.time = stop if at_end else self.time + Fraction(elapsed)
+        stepper.run("elapse")
+        is_over = stepper.get("work.left") <= 0.0
+        self.time = end if is_over else start + Fraction(stepper.get("work.elapsed"))
         self._ranges.look(self.time)
         if self._looks and self._looks[0] < self.time:
-            self._look_inside(start, stop, states)
-        self._around.place(self.time)
-        self._records.age(self.time)
+            self._look_inside(start, stop, states, age)
+        self._place(self.time)
         if self._around.is_watching:
-            self.stepper.run("equations")
+            stepper.run("equations")
             self._around.watch(self.time)
-        return crossed
+        return bool(stepper.get("work.event"))
 
-    def _look_inside(self, start: Fraction, stop: Fraction, states: Sequence[float]) -> None:
+    def _place(self, time: Fraction) -> None:
+        self._around.place(time)
+        self.stepper.run("latch")
+
+    def _look_inside(
+        self, start: Fraction, stop: Fraction, states: Sequence[float], age: float
+    ) -> None:
         """Look at times inside the flow that was just done: from its start by the method alone.
 
         So what is recorded has no influence: states and inputs are put back as they were.
         """
-        ends = self._read_states()
+        ends, end_age = self._read_states(), self._records.age()
         while self._looks and self._looks[0] < self.time:
             time = self._looks.popleft()
             self._put(states)
             self._around.aim(start, stop)
-            self._records.age(start)
+            self.stepper.run("latch")
+            self._records.put_age(age)
             self.stepper.set("work.h", float(time - start))
             self.stepper.run("peek")
+            self._records.put_age(age + float(time - start))
             self._look(time)
         self._put(ends)
+        self._records.put_age(end_age)
 
     def _look_here(self, horizon: Fraction) -> None:
         """Look at the present time if it was asked for, after all its jumps."""
@@ -224,35 +212,13 @@ class ContinuousRun:
             self._look(self.time)
 
     def _look(self, time: Fraction) -> None:
-        self._around.place(time)
-        self._records.age(time)
+        self._place(time)
         self.stepper.run("equations")
         self._around.look(time)
 
     def _put(self, states: Sequence[float]) -> None:
         for name, value in zip(self._states, states, strict=True):
             self.stepper.set(name, value)
-
-    def _is_active(self, info: TransitionInfo) -> bool:
-        return bool(self.stepper.get(self._modes[info.region]) == info.source)
-
-    def _mark_due(self) -> None:
-        self._alarms.ring(self.time)
-        for info in self._timed:
-            if self._is_active(info):
-                due = self._due.get(info.key)
-                is_due = due is not None and due <= self.time
-                self.stepper.set(f"memory.due_{info.slot}", is_due)
-
-    def _start_timers(self) -> None:
-        """A wait is a time event at t0 + d, cancelled if the guard turns false (rule 4)."""
-        for info in self._timed:
-            if not self._is_active(info):
-                continue
-            if not self.stepper.get(f"memory.armed_{info.slot}"):
-                self._due.pop(info.key, None)
-            elif info.key not in self._due:
-                self._due[info.key] = self.time + info.wait
 
     def _require_finite(self) -> None:
         for name, value in zip(self._states, self._read_states(), strict=True):

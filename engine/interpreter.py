@@ -52,10 +52,8 @@ class Interpreter:
         self._blocks = compiler.blocks
         self._left = compiler.left
         for entry in ("derive", "init"):
-            if entry in self._blocks and program.period is not None:
+            if entry in self._blocks:
                 self.run(entry)
-        if program.period is None and "derive" in self._blocks:
-            self.run("derive")
 
     def _constant(self, constant: Constant) -> Any:
         if constant.items:

@@ -29,7 +29,7 @@ Path = Callable[[float], Point]
 """The states in SI at a time [s] since the start of a flow."""
 Reals = NDArray[np.float64]
 
-OWN_MOTION = ("flow", "peek", "point", "move_", "step_", "series_", "locate_")
+OWN_MOTION = ("flow", "peek", "point", "move_", "step", "series_", "locate_", "segment", "settle")
 """What the blocks that integrate or locate are named, or how their names begin."""
 RTOL = 1e-11
 """Local error per step over the largest value so far: 2^-53 with five digits for sums of steps."""

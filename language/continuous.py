@@ -1,11 +1,13 @@
 """Continuous: a continuous automaton as a Program that an engine moves from event to event.
 
-Entries: `init` (start values from the inputs), `equations` (the values of now), `watch` (what each
-guard is now), `jump` (one micro-step: `memory.fired` is the transition, 0 if none), `flow`
-(states over `work.h`, up to the first change of a guard, after `work.elapsed`) and `peek` (states
-over `work.h`, whatever the guards do: to look at a point inside a step without ending it).
+Entries: `step` is one major step (language/stepping.py) and what the C has, after `init`. An engine
+runs its parts: `start` (start values from the inputs), `equations` (the values of now), `watch`
+(what each guard is now), `jump` (one micro-step: `memory.fired` is the transition, 0 if none),
+`flow` (states over `work.h`, up to the first change of a guard, after `work.elapsed`); and `peek`
+(states over `work.h`, whatever the guards do: to look at a point inside a step without ending it).
 
-An input that varies inside a step is `input.u + s (work.rise_u + s work.bend_u)` at the time s of
+The inputs that hold are `before.u`: `latch` takes those of now, at the end of a step.
+An input that varies inside a step is `before.u + s (work.rise_u + s work.bend_u)` at the time s of
 the step: a parabola through its values at the ends and the middle, the times of RK4's stages.
 """
 
@@ -27,6 +29,7 @@ from language.field import (
     switch,
 )
 from language.history import (
+    AGE,
     History,
     alarm_names,
     alarms_of,
@@ -50,6 +53,7 @@ from language.operation import (
     Loop,
     Ref,
     Run,
+    Value,
     add,
     multiply,
     real,
@@ -59,6 +63,18 @@ from language.parallel import Selection, parallel_blocks, parallel_step
 from language.problem import Problems
 from language.program import Program, TransitionInfo, Variable
 from language.region import fired_variable, in_modes, slots
+from language.stepping import (
+    BETWEEN,
+    LIVELOCK,
+    ZENO,
+    Waits,
+    begun,
+    ended,
+    is_over,
+    stepping_blocks,
+    stepping_variables,
+    waits_of,
+)
 from language.transition import infos_of, transition_infos
 from language.wiring import (
     assembled,
@@ -71,9 +87,20 @@ from language.wiring import (
     state_variables,
 )
 
-BETWEEN = ("work.h", "work.merge", "work.elapsed", "work.crossed")
-"""What an engine sets before `flow` and reads after it."""
-ENTRIES = ("init", "derive", "equations", "watch", "jump", "flow", "peek", "record")
+ENTRIES = ("init", "derive", "step")
+PARTS = (
+    "latch",
+    "start",
+    "equations",
+    "watch",
+    "jump",
+    "limit",
+    "flow",
+    "elapse",
+    "peek",
+    "record",
+)
+"""What an engine runs one by one; of a Program with inputs that vary there is no `step`."""
 
 
 def continuous_program(
@@ -85,7 +112,7 @@ def continuous_program(
     """
     parameters = parameter_constants(automaton, problems)
     transitions = transition_infos(automaton, problems)
-    variables_known = variable_names(automaton, "input")
+    variables_known = variable_names(automaton, "before")
     inputs = {name: variables_known[name] for name in automaton.inputs}
     known = {
         **constant_names(automaton),
@@ -110,12 +137,17 @@ def continuous_program(
         automaton.method, field, flows, point, automaton.step, automaton.span, problems
     )
     armed = {slot: f"memory.armed_{slot}" for slot in field.slots}
-    selection = _selection(automaton, transitions)
+    alarms = alarms_of(automaton)
+    waits = waits_of(transitions, alarms)
+    selection = _selection(automaton, transitions, waits)
     halvings = FLOW_HALVINGS[automaton.numbers]
     blocks = {
         **flows,
         **method.blocks,
-        **motion_blocks(field, method, Ref("work.merge"), halvings, lambda mode: armed),
+        **motion_blocks(
+            field, method, Ref("work.merge"), halvings, lambda mode: armed, Ref("work.is_wait")
+        ),
+        **stepping_blocks(field, waits, (AGE.name,) if histories else ()),
     }
     for mode in automaton.modes.values():
         ops = equations(mode, dict(known), "equation.", field.prefix)
@@ -123,23 +155,24 @@ def continuous_program(
         blocks[f"jump_{mode.name}"] = _jump(field, mode, transitions, selection)
     if automaton.regions:
         blocks.update(parallel_blocks(field, selection))
-    blocks.update(_entries(automaton, field, known, histories))
+    blocks.update(_entries(field, known, waits, histories))
     problems.stop_if_any()
     constants = (*parameters.values(), *method.constants)
-    variables = [*_variables(automaton, field), *motion_variables(field, method)]
+    variables = [*_variables(automaton, field), *stepping_variables(field, waits)]
+    variables += motion_variables(field, method)
     variables += [Variable(name, "real") for name in _courses(varying)]
     variables += history_variables(histories)
-    alarms = alarms_of(automaton)
     variables += [Variable(alarm.variable, "truth") for alarm in alarms]
     program = assembled(automaton, blocks, constants, variables, transitions)
-    program = dataclasses.replace(program, motion=info, alarms=alarms)
-    return finished(program, ENTRIES, keep=(*BETWEEN, *_courses(varying)))
+    program = dataclasses.replace(program, motion=info, faults=(ZENO, LIVELOCK))
+    entries = (*(ENTRIES if not varying else ENTRIES[:2]), *PARTS)
+    return finished(program, entries, keep=(*BETWEEN, *_courses(varying)))
 
 
 def _parabola(name: str) -> Expr:
     s, bend = Ref("work.s"), Ref(f"work.bend_{name}")
     inner = add(Ref(f"work.rise_{name}"), multiply(s, bend))
-    return add(Ref(f"input.{name}"), multiply(s, inner))
+    return add(Ref(f"before.{name}"), multiply(s, inner))
 
 
 def _courses(varying: Collection[str]) -> list[str]:
@@ -150,27 +183,35 @@ def _variables(automaton: Automaton, field: Field) -> list[Variable]:
     return [
         *input_variables(automaton, "input"),
         *state_variables(automaton),
+        *input_variables(automaton, "before"),
         *mode_and_fired(automaton, "micro-step"),
         *(Variable(f"memory.armed_{slot}", "truth") for slot in field.slots),
-        *(Variable(f"memory.due_{slot}", "truth") for slot in field.slots),
         *discrete_variables(automaton),
         *field_variables(field),
         Variable("work.merge", "real", "s", about="what crosses within it is one instant"),
     ]
 
 
-def _selection(automaton: Automaton, infos: tuple[TransitionInfo, ...]) -> Selection:
+def _selection(automaton: Automaton, infos: tuple[TransitionInfo, ...], waits: Waits) -> Selection:
     by_key = {info.key: info for info in infos}
 
     def info_of(transition: Transition) -> TransitionInfo:
         return by_key[f"{automaton.name} {transition.key}"]
 
     def enabled(transition: Transition, slot: str) -> Expr:
-        guard = Ref(f"work.guard_{slot}")
-        due = Ref(f"memory.due_{slot}")
-        return Binary("and", guard, due) if info_of(transition).timer else guard
+        guard, info = Ref(f"work.guard_{slot}"), info_of(transition)
+        return Binary("and", guard, is_over(info)) if info.timer else guard
 
-    return Selection("jump", fired_variable, lambda transition: info_of(transition).number, enabled)
+    return Selection(
+        verb="jump",
+        taken=fired_variable,
+        number=lambda transition: info_of(transition).number,
+        enabled=enabled,
+        moved=lambda t: (
+            *ended(waits, automaton.source(t)),
+            *begun(waits, automaton.target(t)),
+        ),
+    )
 
 
 def _jump(
@@ -185,13 +226,17 @@ def _jump(
         zip(mode.transitions, infos_of(mode, infos), strict=True)
     ):
         enabled[k] = selection.enabled(transition, info.slot)
-        fired[k] = (Assign("memory.fired", whole(info.number), info.key),)
+        fired[k] = (
+            Assign("memory.fired", whole(info.number), info.key),
+            *selection.moved(transition),
+        )
     return (guards, *switch(field, mode, enabled, fired))
 
 
 def _entries(
-    automaton: Automaton, field: Field, known: dict[str, Expr], histories: tuple[History, ...]
+    field: Field, known: dict[str, Expr], waits: Waits, histories: tuple[History, ...]
 ) -> dict[str, Block]:
+    automaton = field.automaton
     now = (*at_state(field), *at_time(field, real(0.0)))
     ends = [Assign(f"state.{name}", Ref(f"work.end_{name}")) for name in field.states]
     at_start = at_time(field, real(0.0))
@@ -200,19 +245,30 @@ def _entries(
     # A delayed quantity may read another one: each round fills one more from what is inside it.
     rounds = (*evaluate, *fill_block(histories, whole_known))
     fill: Block = (Loop(len(histories), "work.round", rounds),) if histories else ()
-    record = {"record": (*evaluate, *record_block(histories, whole_known))} if histories else {}
+    keep: Block = (*evaluate, *record_block(histories, whole_known), Assign(AGE.name, real(0.0)))
+    record = {"record": keep} if histories else {}
     watch = tuple((mode.number, _watch(mode)) for mode in automaton.modes.values())
     return {
         "derive": derive_block(automaton),
         "init": (
+            Assign("memory.started", Value(False)),
+            *enter_initial(automaton, "memory.mode"),
+            Assign("memory.faults", whole(0)),
+        ),
+        "start": (
             *initial_ops(automaton, known, field.prefix),
             *enter_initial(automaton, "memory.mode"),
+            *(wait.load for wait in waits),
+            *(op for r in automaton.all_regions for op in begun(waits, r.modes[r.initial])),
+            *((Assign(AGE.name, real(0.0)),) if histories else ()),
+            Assign("memory.time", real(0.0)),
+            Assign("memory.started", Value(True)),
             *entered(field, automaton.modes[automaton.initial]),
             *fill,
         ),
         "equations": evaluate,
         **record,
-        "watch": (*now, Choose("memory.mode", watch)),
+        "watch": (*now, Choose("memory.mode", watch), Run("load")),
         "jump": (*none_fired(automaton), *now, by_mode(field, "jump")),
         "flow": (by_mode(field, "move"),),
         "peek": (by_mode(field, "step"), *ends),

@@ -76,16 +76,18 @@ def motion_blocks(
     merge: Expr,
     halvings: int,
     armed: Callable[[Mode], Armed | None],
+    is_wait: Expr | None = None,
 ) -> dict[str, Block]:
     """Return `point`, and `locate_<mode>` and `move_<mode>` of every mode.
 
-    What crosses within `merge` [s] is one instant; `armed` gives a mode's guards as they were.
+    What crosses within `merge` [s] is one instant; `armed` gives a mode's guards as they were;
+    `is_wait` is whether a wait ends with the step: what crosses just after it is at that instant.
     """
     blocks = {"point": _point(field, method.terms)}
     for mode in field.automaton.modes.values():
         crossed = any_guard(mode, armed(mode))
         blocks[f"locate_{mode.name}"] = _locate(field, mode, crossed, halvings, merge)
-        blocks[f"move_{mode.name}"] = _move(field, mode, crossed)
+        blocks[f"move_{mode.name}"] = _move(field, mode, crossed, merge, is_wait)
     return blocks
 
 
@@ -173,7 +175,7 @@ def _merged(field: Field, mode: Mode, merge: Expr) -> Block:
     )
 
 
-def _move(field: Field, mode: Mode, crossed: Expr) -> Block:
+def _move(field: Field, mode: Mode, crossed: Expr, merge: Expr, is_wait: Expr | None) -> Block:
     watched = slots(mode)
     ops: list[Op] = [Run(f"step_{mode.name}"), Assign("work.elapsed", Ref("work.h"))]
     if watched:
@@ -183,6 +185,15 @@ def _move(field: Field, mode: Mode, crossed: Expr) -> Block:
     ops.append(Assign("work.crossed", crossed if watched else Value(False)))
     if watched:
         found: Block = (Run(f"series_{mode.name}"), Run(f"locate_{mode.name}"))
-        ops.append(Branch(Ref("work.crossed"), found))
+        just_after = () if is_wait is None else _just_after(field, mode, crossed, merge, is_wait)
+        ops.append(Branch(Ref("work.crossed"), found, just_after))
     ops += [Assign(f"state.{name}", Ref(f"work.end_{name}")) for name in field.states]
     return tuple(ops)
+
+
+def _just_after(field: Field, mode: Mode, crossed: Expr, merge: Expr, is_wait: Expr) -> Block:
+    """A guard that changes within `merge` after the end of a wait changes at that instant."""
+    keep = [Assign(f"work.end_{name}", Ref(f"work.at_{name}")) for name in field.states]
+    look = (Run(f"series_{mode.name}"), *_look(mode, add(Ref("work.h"), merge)))
+    change = Branch(crossed, (Assign("work.crossed", Value(True)), *keep))
+    return (Branch(is_wait, (*look, change)),)

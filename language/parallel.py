@@ -20,13 +20,15 @@ from language.region import by_priority, slot
 class Selection:
     """How a micro-step names what it takes: the variable of a region, and each transition's number.
 
-    `enabled` is whether a transition may fire, given the ending of its guard's variables.
+    `enabled` is whether a transition may fire, given the ending of its guard's variables; `moved`
+    is what else happens when it has fired.
     """
 
     verb: str
     taken: Callable[[str], str]
     number: Callable[[Transition], int]
     enabled: Callable[[Transition, str], Expr]
+    moved: Callable[[Transition], Block]
 
 
 def parallel_blocks(field: Field, selection: Selection) -> dict[str, Block]:
@@ -79,6 +81,7 @@ def _commit(field: Field, region: Region, selection: Selection) -> Choose:
     cases = []
     for mode in region.modes.values():
         for transition in mode.transitions:
-            block = (*resets(field, transition)[1], enter(field, transition))
+            reset = resets(field, transition)[1]
+            block = (*reset, enter(field, transition), *selection.moved(transition))
             cases.append((selection.number(transition), block))
     return Choose(selection.taken(region.name), tuple(cases))

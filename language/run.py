@@ -192,10 +192,11 @@ def _switches(field: Field, problems: Problems) -> dict[str, Block]:
         return {f"switch_{mode.name}": _switch(field, mode) for mode in model.modes.values()}
     keys = [transition.key for mode in model.all_modes for transition in mode.transitions]
     selection = Selection(
-        "switch",
-        lambda region: f"work.taken_{region}",
-        lambda transition: keys.index(transition.key) + 1,
-        lambda transition, slot: Ref(f"work.guard_{slot}"),
+        verb="switch",
+        taken=lambda region: f"work.taken_{region}",
+        number=lambda transition: keys.index(transition.key) + 1,
+        enabled=lambda transition, slot: Ref(f"work.guard_{slot}"),
+        moved=lambda transition: (),
     )
     blocks = parallel_blocks(field, selection)
     for mode in model.modes.values():

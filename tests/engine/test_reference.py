@@ -227,7 +227,7 @@ def test_a_state_that_grows_without_bound_stops_the_run_with_its_place(alone: Al
 
 def test_a_start_that_is_not_finite_is_refused_by_name(alone: Alone) -> None:
     stepper = LibraryStepper(programs_of(*alone(BALL, "1 s"))["one"])
-    stepper.run("init")
+    stepper.run("start")
     stepper.set("state.v", math.nan)
     stepper.set("work.h", 1e-3)
     with pytest.raises(
@@ -242,8 +242,18 @@ def test_no_block_of_ours_that_integrates_or_locates_is_kept(
     program = programs_of(*tip_out)["plant"]
     kept = without_motion(program).blocks
     verbs = {name.partition("_")[0] for name in program.blocks if name not in kept}
-    assert verbs == {"flow", "peek", "point", "move", "step", "series", "locate"}
-    assert set(kept) >= {"init", "equations", "watch", "jump"}
+    assert verbs == {
+        "flow",
+        "peek",
+        "point",
+        "move",
+        "step",
+        "series",
+        "locate",
+        "segment",
+        "settle",
+    }
+    assert set(kept) >= {"init", "start", "equations", "watch", "jump"}
 
 
 def test_the_result_is_the_same_without_our_motion(

@@ -1,0 +1,254 @@
+"""Stepping: a continuous automaton over one major step, from event to event (rules 1, 4, 7-12).
+
+`step` is what X_Step is in C: the flow of the step under the inputs of the step before, then the
+inputs of now (`latch`) and what they make jump. An engine runs the same blocks one by one, so that
+it sees each event, and has the same bits:
+
+    limit   the next segment: `work.h` is the rest of the step, or less where a wait ends before
+    flow    (continuous.py) over `work.h`, or up to the first change of a guard
+    elapse  time passes: `work.left` and the waits become shorter; `work.event` if something is due
+    settle  micro-steps until no transition is enabled
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+
+from language.field import Field, by_mode
+from language.model import Mode
+from language.motion import merge_time
+from language.operation import (
+    Assign,
+    Binary,
+    Block,
+    Branch,
+    Call,
+    Choose,
+    Compare,
+    Expr,
+    FaultBit,
+    Loop,
+    Ref,
+    Run,
+    Unary,
+    Value,
+    add,
+    multiply,
+    real,
+    subtract,
+    whole,
+)
+from language.program import Alarm, TransitionInfo, Variable
+from language.region import fired_variable
+from language.wiring import none_fired
+
+EVENTS_PER_STEP = 100
+"""More located events than this within one major step are Zeno behaviour (rule 12)."""
+ZENO = "zeno"
+LIVELOCK = "livelock"
+BETWEEN = ("work.h", "work.left", "work.merge", "work.elapsed", "work.crossed", "work.event")
+"""What an engine sets before these blocks and reads after them."""
+
+
+@dataclass(frozen=True)
+class Wait:
+    """Something that is due a time after it began, while a mode of a region is active.
+
+    That of a transition begins when its guard turns true; an `after` when its mode is entered.
+    """
+
+    timer: str
+    time: Fraction
+    region: str
+    mode: int
+    is_running: Expr
+    end: Block
+    begin: Block
+    is_restarted: bool
+
+    @property
+    def load(self) -> Assign:
+        """What puts the timer at its start."""
+        return Assign(self.timer, real(self.time))
+
+
+Waits = tuple[Wait, ...]
+
+
+def waits_of(infos: tuple[TransitionInfo, ...], alarms: tuple[Alarm, ...]) -> Waits:
+    """Return the waits of transitions, and those of `after`."""
+    found = []
+    for info in infos:
+        if info.timer:
+            armed = Ref(f"memory.armed_{info.slot}")
+            place = (info.timer, info.wait, info.region, info.source)
+            found.append(Wait(*place, armed, (Assign(info.timer, real(0.0)),), (), True))
+    for number, alarm in enumerate(alarms, start=1):
+        rings, silent = Assign(alarm.variable, Value(True)), Assign(alarm.variable, Value(False))
+        place = (f"timer.after_{number}", alarm.time, alarm.region, alarm.mode)
+        found.append(Wait(*place, Unary("not", Ref(alarm.variable)), (rings,), (silent,), False))
+    return tuple(found)
+
+
+def begun(waits: Waits, mode: Mode) -> Block:
+    """Return what begins when a mode is entered; waits of transitions are at their start."""
+    own = [w for w in waits if (w.region, w.mode) == (mode.region, mode.number)]
+    return tuple(op for wait in own for op in (*wait.begin, wait.load))
+
+
+def ended(waits: Waits, mode: Mode) -> Block:
+    """Return what puts the waits of a mode that is left back to their start (rule 4)."""
+    own = [w for w in waits if (w.region, w.mode) == (mode.region, mode.number)]
+    return tuple(wait.load for wait in own if wait.is_restarted)
+
+
+def stepping_blocks(field: Field, waits: Waits, ages: tuple[str, ...]) -> dict[str, Block]:
+    """Return the blocks of the module's text; `ages` [s] are times since a major step's record."""
+    inputs = field.automaton.inputs
+    return {
+        "latch": tuple(Assign(f"before.{name}", Ref(f"input.{name}")) for name in inputs),
+        "limit": _limit(field, waits),
+        "elapse": _elapse(field, waits, ages),
+        "load": _each_wait(field, tuple(w for w in waits if w.is_restarted), _load),
+        "settle": _settle(field),
+        "segment": _segment(field),
+        "step": _step(field, bool(ages)),
+    }
+
+
+def stepping_variables(field: Field, waits: Waits) -> list[Variable]:
+    """Return the variables of these blocks."""
+    return [
+        *(Variable(wait.timer, "real", "s", about="rest of the wait") for wait in waits),
+        Variable("memory.started", "truth", about="the first step is done"),
+        Variable("memory.time", "real", "s", about="time since the start: for tolerances only"),
+        Variable("memory.faults", "whole", about="latched fault bits"),
+        Variable("work.left", "real", "s", about="rest of the major step"),
+        Variable("work.is_wait", "truth", about="a wait ends with the segment"),
+        Variable("work.event", "truth", about="a guard changed or a wait ended"),
+        Variable("work.is_settling", "truth"),
+        Variable("work.micro_step", "whole"),
+        Variable("work.segment", "whole"),
+    ]
+
+
+def is_over(info: TransitionInfo) -> Expr:
+    """Whether the wait of a transition is over."""
+    assert info.timer
+    return Compare("<=", Ref(info.timer), real(0.0))
+
+
+def _limit(field: Field, waits: Waits) -> Block:
+    h = Ref("work.h")
+
+    def shorter(wait: Wait) -> Block:
+        timer = Ref(wait.timer)
+        near = Compare("<=", timer, add(h, Ref("work.merge")))
+        ends = Binary("and", wait.is_running, near)
+        nearer = Assign(h.name, Call("min", (timer, h)))
+        return (Branch(ends, (nearer, Assign("work.is_wait", Value(True)))),)
+
+    return (
+        Assign(h.name, Ref("work.left")),
+        Assign("work.merge", _merge(field)),
+        Assign("work.is_wait", Value(False)),
+        *_each_wait(field, waits, shorter),
+    )
+
+
+def _merge(field: Field) -> Expr:
+    """What is one instant (language/motion.py): of a float32 it is a part of the step."""
+    step, numbers = field.automaton.step, field.automaton.numbers
+    if numbers == "float32":
+        return real(merge_time(numbers, step))
+    end = add(Ref("memory.time"), Ref("work.h"))
+    per_second = real(merge_time(numbers, Fraction(1)))
+    return multiply(per_second, Call("max", (end, real(step))))
+
+
+def _elapse(field: Field, waits: Waits, ages: tuple[str, ...]) -> Block:
+    """Time passes; what is nearer than `work.merge` is at the same instant (rule 10)."""
+    elapsed, left = Ref("work.elapsed"), Ref("work.left")
+    h, merge = Ref("work.h"), Ref("work.merge")
+    near = Binary("and", Ref("work.crossed"), Compare("<=", subtract(h, elapsed), merge))
+
+    def passes(wait: Wait) -> Block:
+        timer = Ref(wait.timer)
+        over = Branch(Compare("<=", timer, merge), (*wait.end, Assign("work.event", Value(True))))
+        return (Branch(wait.is_running, (Assign(timer.name, subtract(timer, elapsed)), over)),)
+
+    return (
+        Branch(near, (Assign("work.elapsed", h),)),
+        Assign("work.event", Ref("work.crossed")),
+        Assign(left.name, subtract(left, elapsed)),
+        Branch(Compare("<=", left, merge), (Assign(left.name, real(0.0)),)),
+        Assign("memory.time", add(Ref("memory.time"), elapsed)),
+        *(Assign(name, add(Ref(name), elapsed)) for name in ages),
+        *_each_wait(field, waits, passes),
+    )
+
+
+def _load(wait: Wait) -> Block:
+    """A wait is at its start while its guard is false (rule 4)."""
+    return (Branch(wait.is_running, (), (wait.load,)),)
+
+
+def _settle(field: Field) -> Block:
+    regions = field.automaton.all_regions
+    bound = sum(len(region.modes) for region in regions)
+    going = Ref("work.is_settling")
+    fired: Expr | None = None
+    for region in regions:
+        here = Compare("!=", Ref(fired_variable(region.name)), whole(0))
+        fired = here if fired is None else Binary("or", fired, here)
+    assert fired is not None
+    micro_step: Block = (Branch(going, (Run("jump"), Assign(going.name, fired))),)
+    return (
+        Assign(going.name, Value(True)),
+        Loop(bound + 1, "work.micro_step", micro_step),
+        Branch(going, (FaultBit(LIVELOCK), *none_fired(field.automaton))),
+        Run("watch"),
+    )
+
+
+def _segment(field: Field) -> Block:
+    inside = Binary("and", Ref("work.event"), Compare(">", Ref("work.left"), real(0.0)))
+    return (
+        Run("limit"),
+        by_mode(field, "move"),
+        Run("elapse"),
+        Branch(inside, (Run("settle"),)),
+    )
+
+
+def _step(field: Field, has_record: bool) -> Block:
+    left = Ref("work.left")
+    is_left = Compare(">", left, real(0.0))
+    segments = Loop(EVENTS_PER_STEP + 1, "work.segment", (Branch(is_left, (Run("segment"),)),))
+    flow: Block = (
+        *((Run("record"),) if has_record else ()),
+        Assign(left.name, real(field.automaton.step)),
+        segments,
+        Branch(is_left, (FaultBit(ZENO),)),
+        Run("latch"),
+    )
+    return (
+        Branch(Ref("memory.started"), flow, (Run("latch"), Run("start"))),
+        Run("settle"),
+        Run("equations"),
+    )
+
+
+def _each_wait(field: Field, waits: Waits, block: Callable[[Wait], Block]) -> tuple[Choose, ...]:
+    """Return a block for each wait of the active modes: one choice for each region that waits."""
+    found = []
+    for region in field.automaton.all_regions:
+        cases: dict[int, Block] = {}
+        for wait in waits:
+            if wait.region == region.name:
+                cases[wait.mode] = (*cases.get(wait.mode, ()), *block(wait))
+        if cases:
+            found.append(Choose(field.mode_of(region.name), tuple(cases.items())))
+    return tuple(found)
