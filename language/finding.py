@@ -11,6 +11,7 @@ from importlib import resources
 from pathlib import Path
 
 from language.document import Document, Scalar, Table, read_text
+from language.inside import exists, require_inside
 from language.problem import Problems, Source, Span, SpecError, nearest
 from language.yaml_tree import parse
 
@@ -63,7 +64,10 @@ class Project:
         if reference.endswith((".yaml", ".yml")) or os.sep in reference:
             base = Path(span.source.name).parent if span else Path()
             beside = base / reference
-            return beside if beside.exists() else Path(reference)
+            found = beside if exists(beside) else Path(reference)
+            if span:
+                require_inside(found, span, self.root)
+            return found
         place = span or Span(Source("command line", (reference,)), 1, 1, len(reference))
         return self._one_of(self.index, reference, place, "spec")
 
@@ -139,7 +143,7 @@ def _check_version(root: Table, problems: Problems) -> None:
 
 def _yaml_files(folder: Path) -> Iterator[Path]:
     if folder.is_dir():
-        yield from sorted(folder.rglob("*.yaml"))
+        yield from sorted(path for path in folder.rglob("*.yaml") if path.is_file())
 
 
 def _heads_in(path: Path) -> list[tuple[str, str]]:

@@ -8,6 +8,7 @@ from fractions import Fraction
 from pathlib import Path
 
 from language.document import Document, Scalar, Table
+from language.inside import RECORDINGS, exists, require_inside
 from language.literal import constant
 from language.map import MAP_KEYS, column_dimension, map_of
 from language.model import RecordingMap, Scenario, System
@@ -25,8 +26,6 @@ SCENARIO_KEYS = tuple(
 RECORDING_KEYS = ("file", "map", *(key for key in MAP_KEYS if key not in ("language", "map")))
 MAX_HORIZON = Fraction(86400)
 """Longest horizon: a day; longer is a mistake of the unit."""
-RECORDINGS = "MODEWRIGHT_RECORDINGS"
-"""The folder where recordings are looked for after those of the spec and of the command."""
 LARGEST_SEED = 2**31 - 1
 
 
@@ -111,7 +110,10 @@ class _ScenarioReader(StimulusReader):
         if file is None:
             return None
         folders = [Path(file.span.source.name).parent, Path(), Path(os.environ.get(RECORDINGS, ""))]
-        found = [folder / file.text for folder in folders if (folder / file.text).exists()]
+        found = [folder / file.text for folder in folders if exists(folder / file.text)]
+        with self.problems.collecting():
+            for path in found[:1]:
+                require_inside(path, file.span, self.project.root)
         return RecordingUse(found[0] if found else Path(file.text), mapping, file.span)
 
     def _signals(self, items: Sequence[Scalar]) -> tuple[str, ...]:

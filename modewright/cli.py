@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import io
+import os
 import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from language.inside import ALLOW_OUTSIDE
 from modewright.commands.check import check
 from modewright.commands.compare import compare
 from modewright.commands.demo import demo
@@ -45,10 +47,15 @@ def options(
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="tell problems only")] = False,
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="tell each step")] = False,
     log_file: Annotated[Path | None, typer.Option(help="append what is done to this file")] = None,
+    allow_outside: Annotated[
+        bool, typer.Option("--allow-outside", help="specs may name files outside of their project")
+    ] = False,
 ) -> None:
     """Hybrid automata in YAML: simulate them, print them as C, keep both in lock-step."""
     require_writable(log_file)
     configure(quiet, verbose, log_file)
+    if allow_outside:
+        os.environ[ALLOW_OUTSIDE] = "1"
 
 
 def main() -> None:

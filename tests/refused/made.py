@@ -85,10 +85,26 @@ def corner(folder: Path) -> Pair:
     return refused, neighbour
 
 
+def outside(folder: Path) -> Pair:
+    """A variant that lies inside a project and extends a file above it, by a link too."""
+    secret = folder / "secret.yaml"
+    secret.write_text(SPEC)
+    spec = folder / "project" / "spec"
+    spec.mkdir(parents=True)
+    (spec / "inside.yaml").write_text(SPEC)
+    (spec / "link.yaml").symlink_to(secret)
+    head = "language: 1\nvariant: over\nextends: "
+    refused, neighbour = spec / "refused.yaml", spec / "neighbour.yaml"
+    refused.write_text(f"{head}link.yaml\n")
+    neighbour.write_text(f"{head}../spec/inside.yaml\n")
+    return refused, neighbour
+
+
 MADE: dict[str, Callable[[Path], Pair]] = {
     "huge": huge,
     "absent": absent,
     "folder": folder_as_file,
     "deep": deep,
+    "outside": outside,
     "corner": corner,
 }
