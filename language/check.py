@@ -6,6 +6,7 @@ import dataclasses
 from collections.abc import Iterable, Mapping
 
 from language.balance import coefficient_of
+from language.check_domain import check_domains
 from language.check_element import check_laid_on
 from language.check_memory import check_memory
 from language.check_observer import check_observer
@@ -47,6 +48,7 @@ def check_automaton(automaton: Automaton, problems: Problems) -> Automaton:
     checked = _declared(automaton, problems)
     problems.stop_if_any()
     check_memory(checked, problems)
+    check_domains(checked, problems)
     problems.stop_if_any()
     for region in checked.all_regions:
         for name in _never_entered(checked, region):

@@ -1,0 +1,88 @@
+"""Check of domains: a divisor that may be 0, a square root of what may be below 0."""
+
+from __future__ import annotations
+
+from language.balance import coefficient_of
+from language.interval import ANYTHING, Interval, Ranging
+from language.memory import formulas
+from language.model import Automaton, Mode
+from language.problem import Problems, SpecError
+from language.region import sources
+from language.syntax import Tree
+
+HELP = {
+    "divisor": "exclude 0 by an enclosing `if`, or by `max(..., limit)`",
+    "root": "`sqrt(max(..., 0))`, or exclude it by an enclosing `if`",
+}
+
+
+def check_domains(automaton: Automaton, problems: Problems) -> None:
+    """Report divisors and roots whose declared ranges go beyond their domain."""
+    for mode in automaton.all_modes:
+        _ModeDomains(automaton, mode, problems).check()
+
+
+class _ModeDomains:
+    """The intervals of the names of one mode, each equation's found once."""
+
+    def __init__(self, automaton: Automaton, mode: Mode, problems: Problems) -> None:
+        self.automaton = automaton
+        self.mode = mode
+        self.problems = problems
+        self.formulas = sources(mode)
+        self.found: dict[str, Interval] = {}
+        self.quiet = Ranging(self._look, self._table, lambda what, tree, interval: None)
+
+    def check(self) -> None:
+        ranging = Ranging(self._look, self._table, self._report)
+        for formula in formulas(self.mode):
+            ranging.of(formula.tree)
+        for balance in self.mode.flow.values():
+            ranging.of(balance.right)
+            factor = coefficient_of(balance.left, balance.state)
+            if factor is not None and not isinstance(factor, SpecError):
+                interval = ranging.of(factor)
+                if interval.meets_zero:
+                    self._report("divisor", factor, interval)
+
+    def _look(self, name: str) -> Interval:
+        if name not in self.found:
+            self.found[name] = ANYTHING
+            self.found[name] = self._interval(name)
+        return self.found[name]
+
+    def _interval(self, name: str) -> Interval:
+        automaton = self.automaton
+        parameter = automaton.parameters.get(name)
+        if parameter is not None and parameter.derived:
+            return self.quiet.of(parameter.derived.tree)
+        if parameter is not None and parameter.kind == "fixed" and parameter.value is not None:
+            return Interval(float(parameter.value), float(parameter.value), True)
+        thing = parameter or automaton.inputs.get(name) or automaton.carried.get(name)
+        if thing is not None:
+            limits = thing.range
+            return Interval(float(limits[0]), float(limits[1]), True) if limits else ANYTHING
+        parts = [self.quiet.of(formula.tree) for formula in self.formulas.get(name, ())]
+        if not parts:
+            return ANYTHING
+        result = parts[0]
+        for part in parts[1:]:
+            result = result.joined(part)
+        return result
+
+    def _table(self, name: str) -> Interval:
+        parameter = self.automaton.parameters[name]
+        if parameter.kind == "tunable" or parameter.table is None:
+            limits = parameter.range
+            return Interval(float(limits[0]), float(limits[1]), True) if limits else ANYTHING
+        values = parameter.table.values
+        return Interval(float(min(values)), float(max(values)), True)
+
+    def _report(self, what: str, tree: Tree, interval: Interval) -> None:
+        if not interval.known:
+            return
+        span = f"{interval.low:.4g} to {interval.high:.4g}"
+        label = f"this divisor may be 0: it lies from {span}"
+        if what == "root":
+            label = f"this may be below 0, which has no square root: it lies from {span}"
+        self.problems.error("domain", tree.span, label, HELP[what])
