@@ -11,7 +11,7 @@ from tests.language.making import project_of
 ROTOR = """language: 1
 automaton: rotor
 about: one inertia, driven and loaded
-parameters: {J: {value: 2 kg*m^2}, W: {value: 10 rad/s}, G: {value: 30 N*m}}
+parameters: {J: {value: 2 kg*m^2}, w_t: {value: 10 rad/s}, G: {value: 30 N*m}}
 inputs: {T: {unit: N*m}, T_b: {unit: N*m, default: 0 N*m}}
 states: {w: {unit: rad/s, initial: 0 rad/s}, x: {unit: rad, initial: 0 rad}}
 equations: {T_l: G * 0, rate: w + 0 rad/s}
@@ -20,13 +20,13 @@ flow:
   x: der(x) = rate
 modes: {only: {}}
 elements: {body: {kind: inertia, speed: w, inertia: J, far: [T_l]}}
-places: {w: {weight: G, load: T, brake: T_b}, T: {angle_rate: W}}
+places: {w: {weight: G, load: T, brake: T_b}, T: {angle_rate: w_t}}
 outputs: [w, x, T_l]
 """
 SHAFT = """language: 1
 automaton: shaft
 about: a spring and damper, twisted at a given rate
-parameters: {k: {value: 400 N*m/rad}, c: {value: 20 N*m*s/rad}, W: {value: 10 rad/s}}
+parameters: {k: {value: 400 N*m/rad}, c: {value: 20 N*m*s/rad}, w_t: {value: 10 rad/s}}
 inputs: {v: {unit: rad/s}}
 states: {x: {unit: rad, initial: 0 rad}}
 equations: {rate: v + 0 rad/s, T_s: k * x + c * rate}
@@ -34,7 +34,7 @@ flow: {x: der(x) = rate}
 modes: {only: {}}
 elements:
   spring:
-    {kind: elastic, twist: x, rate: rate, torque: T_s, stiffness: k, damping: c, angle_rate: W}
+    {kind: elastic, twist: x, rate: rate, torque: T_s, stiffness: k, damping: c, angle_rate: w_t}
 outputs: [x, T_s, rate]
 """
 BASES = {"rotor": ROTOR, "shaft": SHAFT}

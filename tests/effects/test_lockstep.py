@@ -22,7 +22,10 @@ automaton: rider
 period: 1 ms
 numbers: float64
 model: worn
-inputs: {T_em: {unit: N*m}, T_br: {unit: N*m, default: 0 N*m}, slope: {unit: rad, default: 0 rad}}
+inputs:
+  T_em: {unit: N*m, range: [-400, 400]}
+  T_br: {unit: N*m, range: [0, 3000], default: 0 N*m}
+  slope: {unit: rad, range: [-1, 1], default: 0 rad}
 states:
   theta_d: {initial: 0.074 rad, range: [-1, 1]}
   theta_b: {initial: alpha, range: [-0.2, 0.2]}
