@@ -14,7 +14,7 @@ from pathlib import Path
 
 from codegen.cache import key_of, stored
 from codegen.names import REAL, CNames, c_member, c_type
-from codegen.source import c_files, render
+from codegen.source import c_files, render, stepped
 from language.missing import ToolMissing as ToolMissing
 from language.program import Constant, Program, Variable
 
@@ -80,10 +80,11 @@ def compiler_version(named: str | None = None) -> str:
 
 
 def observed(program: Program) -> tuple[Observed, ...]:
-    """Return what is compared after a tick: all that the instance carries.
+    """Return what is compared after a tick: all that the instance carries in C.
 
     What is in a ring is compared when it comes out of it.
     """
+    program = stepped(program)
     kinds = {"real": "real", "truth": "whole", "whole": "whole"}
     return tuple(
         Observed(variable.name, kinds[variable.type])
@@ -103,6 +104,7 @@ def fed(program: Program) -> tuple[Variable, ...]:
 
 def tunable(program: Program) -> tuple[Constant, ...]:
     """Return the parameters that a calibration page may change, in the order of its members."""
+    program = stepped(program)
     return tuple(
         constant
         for constant in program.constants
@@ -168,6 +170,7 @@ def _first_error(text: str) -> str:
 
 
 def _harness(program: Program) -> Mapping[str, object]:
+    program = stepped(program)
     place, real = CNames(program), REAL[program.number]
     inputs = [
         {"place": place(v.name).replace("in->", "in."), "type": c_type(v, program.number)}

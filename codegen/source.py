@@ -1,4 +1,4 @@
-"""Source: a sampled Program as C99 - header, source and the mathematics that they use."""
+"""Source: a Program as C99 - header, source and the mathematics that they use."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from language.program import (
     Variable,
     short,
 )
-from language.wiring import reads, walk
+from language.wiring import finished, reads, walk
 
 GROUPS = ("state", "discrete", "latched", "equation", "before", "innovation", "timer")
 """Nested structs of the instance, in order."""
@@ -70,10 +70,13 @@ class Field:
 
 
 def c_files(program: Program) -> dict[str, str]:
-    """Return the generated files of a sampled Program by name."""
-    if program.period is None:
-        raise ValueError(f"{program.name} is continuous: C is generated for sampled automata")
-    context = _context(program)
+    """Return the generated files of a Program by name: one that has a `step`.
+
+    A continuous automaton has none where an input varies inside a step: then ValueError.
+    """
+    if "step" not in program.blocks:
+        raise ValueError(f"inputs of {program.name} vary inside a step: it has no C")
+    context = {**_context(stepped(program)), "digest": digest(program)}
     files = {
         f"{program.name}.h": render("module.h.jinja", context),
         f"{program.name}.c": render("module.c.jinja", context),
@@ -81,6 +84,11 @@ def c_files(program: Program) -> dict[str, str]:
     if context["uses_math"]:
         files.update(math_files(program.number))
     return files
+
+
+def stepped(program: Program) -> Program:
+    """Return a Program with only what its `step` runs, as the C has it."""
+    return program if program.period is not None else finished(program, ENTRIES)
 
 
 def math_files(number: NumberType) -> dict[str, str]:
@@ -134,8 +142,8 @@ def _context(program: Program) -> dict[str, Any]:
         "name": program.name,
         "guard": f"{program.name.upper()}_H",
         "version": version(),
-        "digest": digest(program),
-        "period": f"{program.period} s",
+        "pace": _pace(program),
+        "step": _step(program),
         "modes": [(mode_constant(program, mode.number), mode.number) for mode in program.modes],
         "regions": [
             (
@@ -170,6 +178,20 @@ def _context(program: Program) -> dict[str, Any]:
         "uses_math": bool(called & {*FUNCTIONS_OF[number], *INLINE}),
         "uses_libm": bool(called & {"abs", "sqrt", "floor"}),
     }
+
+
+def _pace(program: Program) -> str:
+    if program.period is None:
+        return f"Major step: {program.major_step} s"
+    return f"Period: {program.period} s"
+
+
+def _step(program: Program) -> str:
+    if program.period is None:
+        return (
+            f"{program.major_step} s of flow under the inputs of the step before, then those of now"
+        )
+    return f"One tick of {program.period} s"
 
 
 def _field(variable: Variable, number: NumberType) -> Field:

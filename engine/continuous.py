@@ -70,7 +70,11 @@ class ContinuousRun:
         log: Callable[[Event], None],
         around: Around | None = None,
     ) -> None:
-        """Take the inputs from the stepper as they are; `start` enters the initial mode."""
+        """Take the inputs from the stepper as they are; `start` enters the initial mode.
+
+        `stepped` is called after each major step; `off_step` is the first time at which something
+        outside happened between two of them.
+        """
         self._around = around or Alone()
         self._looks: deque[Fraction] = deque()
         self.name = name
@@ -79,6 +83,8 @@ class ContinuousRun:
         self.time = Fraction(0)
         self._log = log
         self._records = Records(program, stepper)
+        self.stepped: Callable[[], None] | None = None
+        self.off_step: Fraction | None = None
         self._in_step: list[TransitionInfo] = []
         self.is_settled = False
         self._regions = tuple(program.mode_variables())
@@ -106,6 +112,16 @@ class ContinuousRun:
         while self.time < time:
             boundary = (self.time // step + 1) * step
             self._major_step(min(boundary, time), time)
+            if self.time < time:
+                self.end_step()
+        if time % step and self.off_step is None:
+            self.off_step = time
+
+    def end_step(self) -> None:
+        """Tell that a major step is done, when everything at its end has happened."""
+        if self.stepped and self.time % self.program.major_step == 0:
+            self.stepper.run("equations")
+            self.stepped()
 
     def settle(self) -> None:
         """Jump before flow: micro-steps until no transition is enabled, then equations."""

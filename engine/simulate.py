@@ -34,8 +34,9 @@ def simulate(
     """Return the trajectory of a system through a scenario.
 
     `build` makes the steppers (the interpreter, or a compiled one with the same protocol);
-    `ticked` is called after each tick of a sampled instance. Raises SpecError for what is wrong
-    with a recording.
+    `ticked` is called after each tick of a sampled instance, and after each major step of a
+    continuous one until something outside happens between two of them. Raises SpecError for what
+    is wrong with a recording.
     """
     return _Simulation(system, resolved(system, scenario), build, ticked).run()
 
@@ -84,6 +85,13 @@ class _Simulation:
         around = Surroundings(name, stepper, self.signals, self.wires[name], program)
         self.around[name] = around
         self.flows[name] = ContinuousRun(name, program, stepper, log, around)
+        if self.ticked:
+            self.flows[name].stepped = partial(self._stepped, name)
+
+    def _stepped(self, name: str) -> None:
+        has_step = "step" in self.programs[name].blocks
+        if self.ticked and has_step and self.flows[name].off_step is None:
+            self.ticked(name, self.programs[name], self.steppers[name])
 
     def run(self) -> Trajectory:
         """Run to the horizon, or until something stops the run: what was done is kept."""
@@ -147,7 +155,7 @@ class _Simulation:
     def _instant(self, time: Fraction) -> None:
         """Flow has ended: inputs take their new values, then jumps, then ticks in their order."""
         self.signals.read_inputs(time)
-        self._turn_pages(time)
+        self._turn_pages(time, continuous=False)
         for name in self.flows:
             if time > 0 or not self._is_controlled(name):
                 self._update_flow(name, time)
@@ -161,17 +169,20 @@ class _Simulation:
                 self._tick(name, time)
         for name in self.flows:
             self._update_flow(name, time)
+        for flow in self.flows.values():
+            flow.end_step()
+        self._turn_pages(time, continuous=True)
         for name in self.schedule.captured(time):
             self._capture(name, time)
 
-    def _turn_pages(self, time: Fraction) -> None:
-        """A change of the calibration is an event: what follows from it is derived anew."""
+    def _turn_pages(self, time: Fraction, continuous: bool) -> None:
+        """A new calibration holds from this tick or, if continuous, from the next step on."""
         for page in self.scenario.pages:
             if page.time == time:
                 for name, program in self.programs.items():
                     values = {p: v for (owner, p), v in page.values.items() if owner == name}
-                    if calibrate(self.steppers[name], program, values) and name in self.flows:
-                        self.flows[name].is_settled = False
+                    if (program.period is None) == continuous:
+                        calibrate(self.steppers[name], program, values)
 
     def _sample(self, name: str, time: Fraction) -> None:
         run = self.signals.sensors[name]

@@ -130,7 +130,7 @@ def stepping_variables(field: Field, waits: Waits) -> list[Variable]:
         Variable("work.event", "truth", about="a guard changed or a wait ended"),
         Variable("work.is_settling", "truth"),
         Variable("work.micro_step", "whole"),
-        Variable("work.segment", "whole"),
+        Variable("work.piece", "whole"),
     ]
 
 
@@ -226,7 +226,7 @@ def _segment(field: Field) -> Block:
 def _step(field: Field, has_record: bool) -> Block:
     left = Ref("work.left")
     is_left = Compare(">", left, real(0.0))
-    segments = Loop(EVENTS_PER_STEP + 1, "work.segment", (Branch(is_left, (Run("segment"),)),))
+    segments = Loop(EVENTS_PER_STEP + 1, "work.piece", (Branch(is_left, (Run("segment"),)),))
     flow: Block = (
         *((Run("record"),) if has_record else ()),
         Assign(left.name, real(field.automaton.step)),

@@ -38,7 +38,10 @@ class Difference:
 
 @dataclass(frozen=True)
 class Verdict:
-    """How many ticks and values were compared, how many differ, and the first that does."""
+    """How many ticks and values were compared, how many differ, and the first that does.
+
+    Of a continuous automaton a tick is a major step; `note` says what was not compared, and why.
+    """
 
     name: str
     program: str
@@ -47,6 +50,7 @@ class Verdict:
     differing: int
     transitions: int
     first: Difference | None
+    note: str = ""
 
     @property
     def is_equal(self) -> bool:
@@ -67,6 +71,7 @@ class Tape:
 
     def __post_init__(self) -> None:
         """Prepare the layout of the records."""
+        self._modes: tuple[int, ...] = ()
         self._fed = tuple(variable.name for variable in fed(self.program))
         self._observed = observed(self.program)
         self._names = tuple(item.name for item in self._observed)
@@ -90,7 +95,15 @@ class Tape:
             self._page = page
         self.inputs.append(record)
         self.values.append(self._value.pack(*[stepper.get(n) for n in self._names]))
-        self.transitions += stepper.get("memory.fired") != 0
+        self.transitions += self._has_moved(stepper)
+
+    def _has_moved(self, stepper: Stepper) -> bool:
+        """Tell whether a transition fired in the tick, or a mode is another than a step ago."""
+        if self.program.period is not None:
+            return any(stepper.get(name) for name in self.program.fired_variables())
+        before = self._modes
+        self._modes = tuple(stepper.get(name) for name in self.program.mode_variables().values())
+        return before not in ((), self._modes)
 
     def unpack(self, record: bytes) -> tuple[float | int, ...]:
         """Return the values of a record."""
@@ -141,6 +154,11 @@ def compare(tape: Tape, flags: Sequence[str] = FLAGS, compiler: str | None = Non
     )
 
 
+def not_compared(name: str, program: Program, why: str) -> Verdict:
+    """Return the verdict on an instance of which nothing can be compared."""
+    return Verdict(name, program.name, 0, 0, 0, 0, None, why)
+
+
 def _different(tape: Tape, ours: bytes, theirs: bytes) -> list[int]:
     """Return the positions that differ; all NaNs are one (codegen rule R10)."""
     pairs = zip(tape.unpack(ours), tape.unpack(theirs), strict=True)
@@ -155,7 +173,7 @@ def _difference(tape: Tape, tick: int, position: int, theirs: bytes) -> Differen
     ours = tape.values[tick]
     values, other = tape.unpack(ours), tape.unpack(theirs)
     mode = values[tape.names.index("memory.mode")]
-    period = float(tape.program.period or 0)
+    period = float(tape.program.period or tape.program.major_step)
     return Difference(
         tick=tick,
         time=tape.start + tick * period,

@@ -27,6 +27,7 @@ from language.project import Project, layered, read_document, with_calibrations
 from language.scenario import read_scenario
 from language.system import in_numbers, read_system
 from lockstep.compare import Tape, Verdict, compare
+from lockstep.coverage import noted
 from modewright.checking import check as check
 
 Values = Mapping[str, str]
@@ -109,16 +110,12 @@ def generate(
     root: Path | None = None,
     calibrations: Sequence[str] = (),
 ) -> dict[str, str]:
-    """Return the C files of a sampled automaton by name. Raises SpecError."""
+    """Return the C files of an automaton by name. Raises SpecError."""
     project = Project(root or Path())
     document = _document(reference, project, calibrations)
     automaton = automaton_of(document, project, _scalars(values))
-    if not automaton.is_sampled:
-        problems = Problems()
-        label = f"`{automaton.name}` is continuous: C is printed for sampled automata"
-        problems.error("form", automaton.span, label, "give it a `period`")
-        raise SpecError(problems.found)
-    require_ranges(automaton)
+    if automaton.is_sampled:
+        require_ranges(automaton)
     return c_files(program_of(automaton))
 
 
@@ -134,7 +131,7 @@ def lockstep(
     optimise: str = "O2",
     calibrations: Sequence[str] = (),
 ) -> tuple[Trajectory, list[Verdict]]:
-    """Simulate, then run the C of every sampled instance on the same inputs and compare bits.
+    """Simulate, then run the C of every instance on the same inputs and compare bits.
 
     `numbers` replaces the number type of every instance; `changes` are pages of the calibration
     like `1.5 s: k_hs = 6000 N*m/rad`, in place of those of the scenario.
@@ -159,7 +156,8 @@ def lockstep(
 
     trajectory = simulate_system(loaded.system, loaded.scenario, ticked=ticked)
     flags = optimised(optimise)
-    return trajectory, [compare(tape, flags, compiler) for tape in tapes.values()]
+    verdicts = [compare(tape, flags, compiler) for tape in tapes.values()]
+    return trajectory, noted(verdicts, loaded.system, loaded.scenario, trajectory)
 
 
 def replay(

@@ -21,8 +21,6 @@ def generated_files(root: Path) -> dict[Path, bytes]:
         if expanded(document, project).kind != "automaton":
             continue
         automaton = automaton_of(document, project)
-        if not automaton.is_sampled:
-            continue
         folder = root / "generated" / path.parent.relative_to(root / "spec")
         for name, text in c_files(program_of(automaton)).items():
             found[folder / name] = text.encode()

@@ -49,6 +49,7 @@ def verdict_table(verdicts: Iterable[Verdict]) -> Table:
     )  # fmt: skip
     for verdict in verdicts:
         word = "[green]equal, bit for bit[/]" if verdict.is_equal else "[red]DIFFERENT[/]"
+        word = word if verdict.ticks else "[yellow]not compared[/]"
         table.add_row(
             verdict.name,
             str(verdict.ticks),
@@ -64,6 +65,8 @@ def print_verdicts(console: Console, verdicts: Sequence[Verdict]) -> None:
     """Print the verdicts, and the first difference of each that has one."""
     console.print(verdict_table(verdicts))
     for verdict in verdicts:
+        if verdict.note:
+            console.print(f"{verdict.name}: {verdict.note}", soft_wrap=True, highlight=False)
         if verdict.first:
             console.print(f"first difference: {verdict.first}", soft_wrap=True, highlight=False)
 
@@ -95,6 +98,7 @@ def verdict_json(verdict: Verdict) -> dict[str, Any]:
         "differing": verdict.differing,
         "transitions": verdict.transitions,
         "first": vars(verdict.first) if verdict.first else None,
+        "note": verdict.note,
     }
 
 

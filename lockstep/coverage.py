@@ -1,0 +1,45 @@
+"""Coverage: what of a simulation was compared with C, and why the rest was not."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+from engine.starting import programs_of
+from engine.stimulus import resolved
+from engine.trajectory import Trajectory
+from language.model import Scenario, System
+from language.program import Program
+from lockstep.compare import Verdict, not_compared
+
+
+def noted(
+    verdicts: Sequence[Verdict], system: System, scenario: Scenario, trajectory: Trajectory
+) -> list[Verdict]:
+    """Return the verdicts with notes, and one on each instance that has none."""
+    scenario = resolved(system, scenario)
+    found = {verdict.name: verdict for verdict in verdicts}
+    for name, program in programs_of(system, scenario).items():
+        if name not in found:
+            found[name] = not_compared(name, program, _reason(program))
+        elif program.period is None and trajectory.stopped is None:
+            found[name] = _with_end(found[name], program, scenario)
+    return list(found.values())
+
+
+def _reason(program: Program) -> str:
+    if "step" not in program.blocks:
+        return "not compared: an input varies inside its major steps, which C cannot be given"
+    return "not compared: nothing happened to it at its own pace"
+
+
+def _with_end(verdict: Verdict, program: Program, scenario: Scenario) -> Verdict:
+    """A continuous instance is compared until something outside happens inside a major step."""
+    assert scenario.horizon is not None
+    steps = scenario.horizon // program.major_step + 1
+    if verdict.ticks >= steps:
+        return verdict
+    end = float((verdict.ticks - 1) * program.major_step)
+    note = f"compared up to {end:.9g} s: then an input steps, or something reads or samples it, "
+    note += f"between two of its major steps of {float(program.major_step):.9g} s"
+    return dataclasses.replace(verdict, note=note)
