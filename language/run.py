@@ -114,8 +114,17 @@ def run_block(automaton: Automaton, run: ModelRun) -> Block:
     model = automaton.model
     assert model and automaton.period is not None
     field = Field(model, {}, {}, MODE, "")
-    if not run.follow:
-        return _one_flow(automaton, field, run)
+    body = (
+        _through_events(automaton, field, run) if run.follow else _one_flow(automaton, field, run)
+    )
+    before, after = kept(automaton, model.states)
+    moved: Block = body if run.substeps == 1 else (Loop(run.substeps, "work.substep", body),)
+    return (*before, *moved, *after)
+
+
+def _through_events(automaton: Automaton, field: Field, run: ModelRun) -> Block:
+    """One substep, segment by segment, at most `events` jumps."""
+    assert automaton.period is not None
     may_jump = Compare("<", Ref("work.event"), whole(run.events))
     at_limit: Block = (FaultBit(EVENT_LIMIT), Assign("work.left", real(0.0)))
     after: Block = (Branch(may_jump, (by_mode(field, "switch"),), at_limit),)
@@ -127,13 +136,10 @@ def run_block(automaton: Automaton, run: ModelRun) -> Block:
     )
     left = Compare(">", Ref("work.left"), real(0.0))
     substep = real(automaton.period / run.substeps)
-    body: Block = (
+    return (
         Assign("work.left", substep, f"{automaton.name} {run.key}"),
         Loop(run.events + 1, "work.event", (Branch(left, segment),)),
     )
-    before, after_all = kept(automaton, model.states)
-    moved: Block = body if run.substeps == 1 else (Loop(run.substeps, "work.substep", body),)
-    return (*before, *moved, *after_all)
 
 
 def _refuse_actions(automaton: Automaton, model: Automaton, problems: Problems) -> None:
@@ -163,16 +169,12 @@ def _inputs(automaton: Automaton, problems: Problems) -> dict[str, Expr]:
 
 
 def _one_flow(automaton: Automaton, field: Field, run: ModelRun) -> Block:
-    """The whole period in the flow of one mode: no guard of the model is looked at."""
+    """One substep in the flow of one mode: no guard of the model is looked at."""
     assert automaton.period is not None
     substep = real(automaton.period / run.substeps)
     ends = [Assign(f"state.{name}", Ref(f"work.end_{name}")) for name in field.states]
-    body: Block = (
-        Assign("work.h", substep, f"{automaton.name} {run.key}"),
-        Run(f"step_{run.mode}"),
-        *ends,
-    )
-    return body if run.substeps == 1 else (Loop(run.substeps, "work.substep", body),)
+    step = Run(f"step_{run.mode}")
+    return (Assign("work.h", substep, f"{automaton.name} {run.key}"), step, *ends)
 
 
 def _way(run: ModelRun) -> tuple[object, ...]:

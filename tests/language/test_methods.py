@@ -177,6 +177,17 @@ def test_one_flow_passes_a_guard_of_the_model(tmp_path: Path, method: str) -> No
         assert inside.get("state.x") == pytest.approx(x, rel=1e-7)
 
 
+@pytest.mark.parametrize("more", ["", ", follow: false"])
+def test_a_run_ends_within_the_ranges_of_its_states(tmp_path: Path, more: str) -> None:
+    made = Flow(tmp_path, "x: der(x) = u", {"x": 0.0}).program(method=f"euler{more}", substeps=2)
+    inside = Interpreter(made)
+    inside.set("input.u", 4.0)
+    for x in (0.0, 4.0, 5.0, 5.0):
+        inside.run("step")
+        assert inside.get("state.x") == x
+    assert made.faults and inside.get("memory.faults") != 0
+
+
 def test_runs_of_one_automaton_share_their_method(tmp_path: Path) -> None:
     flow = Flow(tmp_path, "x: der(x) = u", {"x": 0.0})
     flow.program()
