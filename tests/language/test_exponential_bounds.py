@@ -160,11 +160,20 @@ def test_what_is_derived_from_a_tunable_follows_it_to_the_ends_of_its_range(tmp_
 
 
 @pytest.mark.parametrize(
-    "flow", ["x: der(x) = -x / (1 s - 1 s)", "x: der(x) = 1.0e6 1/s * x", "x: 0 s * der(x) = -x"]
+    "flow", ["x: der(x) = -x / gap", "x: der(x) = 1.0e6 1/s * x", "x: gap * der(x) = -x"]
 )
 def test_a_flow_that_is_far_too_fast_is_a_problem_not_a_crash(tmp_path: Path, flow: str) -> None:
-    (problem,) = refusal(Flow(tmp_path, flow, ONE).program)
+    gap = "gap: {value: 0 s, tunable: true}"
+    (problem,) = refusal(Flow(tmp_path, flow, ONE, parameters=gap).program)
     assert "is too fast for one step" in problem.label
+
+
+@pytest.mark.parametrize("flow", ["x: der(x) = -x / (1 s - 1 s)", "x: 0 s * der(x) = -x"])
+def test_a_divisor_that_is_0_is_told_before_the_step_is_looked_at(
+    tmp_path: Path, flow: str
+) -> None:
+    (problem,) = refusal(Flow(tmp_path, flow, ONE).program)
+    assert problem.label == "this divisor may be 0: it lies from 0 to 0"
 
 
 @pytest.mark.parametrize("place", ["m", "s"])
