@@ -67,12 +67,14 @@ def test_mermaid_has_as_many_lines_whatever_the_text(text: str) -> None:
 
 def test_c_with_hostile_texts_is_compiled_without_a_warning(tmp_path: Path) -> None:
     texts = {f"u_{k}": t for k, t in enumerate(HOSTILE.values()) if "\ud800" not in t}
-    inputs = "\n".join(f"  {name}: {{about: {json.dumps(t)}}}" for name, t in texts.items())
+    inputs = "\n".join(
+        f"  {name}: {{range: [-9, 9], about: {json.dumps(t)}}}" for name, t in texts.items()
+    )
     spec = tmp_path / "hostile.yaml"
     spec.write_text(
         "language: 1\nautomaton: hostile\nperiod: 1 ms\nnumbers: float64\n"
         f"inputs:\n{inputs}\nparameters: {{k: {{value: 2, about: {json.dumps('*/ x ??/')}}}}}\n"
-        f"states: {{x: {{initial: 0, about: {json.dumps('*/ x ??/')}}}}}\n"
+        f"states: {{x: {{initial: 0, range: [-9, 9], about: {json.dumps('*/ x ??/')}}}}}\n"
         f"modes: {{only: {{update: {{x: k + {' + '.join(texts)}}}}}}}\noutputs: [x]\n"
     )
     for name, text in mw.generate(str(spec)).items():
