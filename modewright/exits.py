@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 import tempfile
@@ -14,6 +15,7 @@ import typer
 
 from language.missing import ToolMissing
 from language.problem import SpecError, ordered, render_all
+from language.text import shortened, visible
 from modewright.files import OutputError
 
 DONE, PROBLEMS, USAGE, TOOL, DEFECT, INTERRUPTED = 0, 1, 2, 3, 4, 130
@@ -51,10 +53,21 @@ def exit_code(run: Callable[[], object]) -> int:
         return TOOL
     except BrokenPipeError:
         return _unread()
+    except OSError as error:
+        if error.errno not in NOT_OURS:
+            return _defect(error)
+        _unread()
+        where = f": {error.filename}" if error.filename else ""
+        print(f"error: {visible(shortened(str(error.strerror) + where))}", file=sys.stderr)
+        return PROBLEMS
     except Exception as error:
-        print(f"error: a defect of modewright: {_first_line(error)}", file=sys.stderr)
-        print(f"a report is in {_write_report()}", file=sys.stderr)
-        return DEFECT
+        return _defect(error)
+
+
+def _defect(error: Exception) -> int:
+    print(f"error: a defect of modewright: {_first_line(error)}", file=sys.stderr)
+    print(f"a report is in {_write_report()}", file=sys.stderr)
+    return DEFECT
 
 
 def _flush() -> None:
@@ -84,6 +97,10 @@ def report(error: SpecError) -> None:
     if len(problems) > MOST_SHOWN:
         print(f"\n... and {len(problems) - MOST_SHOWN} more", file=sys.stderr)
     print(f"\n{count} {'problem' if count == 1 else 'problems'}", file=sys.stderr)
+
+
+NOT_OURS = {errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.ENAMETOOLONG, errno.EIO}
+"""Errors of the system that the user can do something about: a full disk, a wrong path."""
 
 
 def _first_line(error: Exception) -> str:
