@@ -89,7 +89,8 @@ def observed(program: Program) -> tuple[Observed, ...]:
     return tuple(
         Observed(variable.name, kinds[variable.type])
         for variable in program.variables
-        if variable.name.partition(".")[0] not in ("work", "input", "is_new") and not variable.size
+        if variable.name.partition(".")[0] not in ("work", "input", "is_new", "check")
+        and not variable.size
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from importlib import metadata, resources
@@ -24,6 +25,7 @@ from codegen.names import (
 from codegen.statement import Writer, wrapped
 from codegen.usage import Usage, locals_of, usages
 from language.functions import FUNCTIONS_OF
+from language.invariant import GROUP, INVARIANTS
 from language.number import NumberType, decimal
 from language.operation import Assign, Run
 from language.printing import digest
@@ -87,8 +89,12 @@ def c_files(program: Program) -> dict[str, str]:
 
 
 def stepped(program: Program) -> Program:
-    """Return a Program with only what its `step` runs, as the C has it."""
-    return program if program.period is not None else finished(program, ENTRIES)
+    """Return a Program with only what its `step` runs, as the C has it: no invariants."""
+    if program.period is None:
+        return finished(program, ENTRIES)
+    blocks = {name: block for name, block in program.blocks.items() if name != INVARIANTS}
+    variables = tuple(v for v in program.variables if not v.name.startswith(GROUP))
+    return dataclasses.replace(program, blocks=blocks, variables=variables)
 
 
 def math_files(number: NumberType) -> dict[str, str]:

@@ -9,6 +9,7 @@ from fractions import Fraction
 from typing import Protocol
 
 from engine.interpreter import Stepper
+from engine.invariant_watch import InvariantWatch
 from engine.keeping import Records
 from engine.range_watch import RangeWatch
 from engine.trajectory import Event
@@ -92,6 +93,7 @@ class ContinuousRun:
         self._states = states
         self._read_states = stepper.reader(states)
         self._ranges = RangeWatch(name, program, stepper, log)
+        self._invariants = InvariantWatch(name, program, stepper, log)
 
     def start(self) -> None:
         """Put the states where they start; `settle` enters the initial mode (rule 16)."""
@@ -142,6 +144,7 @@ class ContinuousRun:
         self.stepper.run("watch")
         self.stepper.run("equations")
         self._ranges.look(self.time)
+        self._invariants.look(self.time)
         self._around.watch(self.time)
         self.is_settled = True
 
@@ -191,8 +194,10 @@ class ContinuousRun:
         if self._looks and self._looks[0] < self.time:
             self._look_inside(start, stop, states, age)
         self._place(self.time)
-        if self._around.is_watching:
+        if self._around.is_watching or self.program.invariants:
             stepper.run("equations")
+        self._invariants.look(self.time)
+        if self._around.is_watching:
             self._around.watch(self.time)
         return bool(stepper.get("work.event"))
 

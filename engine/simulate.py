@@ -10,6 +10,7 @@ from typing import Any
 
 from engine.continuous import ContinuousRun, Stopped
 from engine.interpreter import Interpreter, Stepper
+from engine.invariant_watch import InvariantWatch
 from engine.page import calibrate
 from engine.range_watch import left_range
 from engine.rows import Rows, recorded
@@ -67,6 +68,10 @@ class _Simulation:
             if variable.name.startswith("is_new.")
         }
         self.left: set[tuple[str, str]] = set()
+        self.invariants = {
+            name: InvariantWatch(name, program, self.steppers[name], self.events.append)
+            for name, program in self.programs.items()
+        }
         self.words: dict[str, int] = {}
         self.limited = {
             (name, short(variable.name))
@@ -264,6 +269,7 @@ class _Simulation:
                     Event(float(time), 0, name, info.name, modes[0], modes[1], info.region)
                 )
         self._note_ranges(name, time)
+        self.invariants[name].look(time)
         if self.ticked:
             self.ticked(name, program, stepper)
         self._require_finite(name, time)

@@ -27,8 +27,8 @@ TIME = "t [s]"
 class Event:
     """A transition: time [s], micro-step at that instant, and what changed.
 
-    Of another `kind` is a signal that left its range: `transition` names it, `message` says how,
-    `source` and `target` are both the mode that was active.
+    Of another `kind` is a signal that left its range, or an invariant that ceased to hold:
+    `transition` names it, `message` says how, `source` and `target` are both the mode.
     """
 
     time: float
@@ -38,7 +38,7 @@ class Event:
     source: str
     target: str
     region: str = CHART
-    kind: Literal["transition", "range"] = "transition"
+    kind: Literal["transition", "range", "invariant"] = "transition"
     message: str = ""
 
 

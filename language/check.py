@@ -25,6 +25,7 @@ from language.model import (
     Region,
     State,
     SystemInput,
+    Transition,
 )
 from language.names import report_case_twins
 from language.order import equation_order, report_circle, unreached
@@ -353,6 +354,24 @@ class _Check:
                 constant.quantity(transition.wait.tree, SECOND, "wait")
                 self._fixed_wait(transition.wait)
             self._assignments(transition.reset, check)
+            if transition.memory == "continue":
+                self._continued(transition)
+        for invariant in mode.invariants.values():
+            check.truth(invariant.that.tree, "that")
+
+    def _continued(self, transition: Transition) -> None:
+        """`memory: continue` keeps the wait counters of the target: there have to be some."""
+        modes = self.automaton.region(transition.region).modes
+        target = modes.get(transition.target)
+        if not self.automaton.is_sampled:
+            label = (
+                "`memory: continue` belongs to a sampled automaton: a continuous wait is an event"
+            )
+            self.problems.error("form", transition.span, label)
+        elif target and not any(other.wait for other in target.transitions):
+            label = f"`memory: continue` keeps wait counters: `{target.name}` has none"
+            hint = "states belong to the automaton and keep their values anyway"
+            self.problems.error("form", transition.span, label, hint)
 
     def _fixed_wait(self, wait: Formula) -> None:
         for read in names(wait.tree):

@@ -40,6 +40,7 @@ from language.history import (
     record_block,
 )
 from language.integration import method_of
+from language.invariant import INVARIANTS, invariant_block, invariant_variables
 from language.linear import Point
 from language.lower import constant_names, equation_names, equations, variable_names
 from language.model import Automaton, Mode, Transition
@@ -99,6 +100,7 @@ PARTS = (
     "elapse",
     "peek",
     "record",
+    INVARIANTS,
 )
 """What an engine runs one by one; of a Program with inputs that vary there is no `step`."""
 
@@ -155,6 +157,7 @@ def continuous_program(
         blocks[f"jump_{mode.name}"] = _jump(field, mode, transitions, selection)
     if automaton.regions:
         blocks.update(parallel_blocks(field, selection))
+    blocks.update(invariant_block(automaton, known))
     blocks.update(_entries(field, known, waits, histories))
     problems.stop_if_any()
     constants = (*parameters.values(), *method.constants)
@@ -187,6 +190,7 @@ def _variables(automaton: Automaton, field: Field) -> list[Variable]:
         *mode_and_fired(automaton, "micro-step"),
         *(Variable(f"memory.armed_{slot}", "truth") for slot in field.slots),
         *discrete_variables(automaton),
+        *invariant_variables(automaton),
         *field_variables(field),
         Variable("work.merge", "real", "s", about="what crosses within it is one instant"),
     ]

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Literal, cast
 
 from language.document import Entry, Node, Table
-from language.model import CHART, Automaton, Balance, Formula, Mode, Region, Transition
+from language.model import CHART, Automaton, Balance, Formula, Invariant, Mode, Region, Transition
 from language.observer import read_observer, read_run
 from language.overlay import lay, without
 from language.parse import parse_balance
@@ -17,8 +18,9 @@ MODE_KEYS = ("number", "equations", "flow", "terms", "update", "observer", "runs
 REGION_KEYS = ("initial", "modes")
 ALWAYS = "always"
 """The mode of an automaton that has none of its own."""
-ACTION_KEYS = ("entry", "exit")
-TRANSITION_KEYS = ("to", "when", "wait", "priority", "reset")
+ACTION_KEYS = ("entry", "exit", "invariant")
+TRANSITION_KEYS = ("to", "when", "wait", "priority", "reset", "memory")
+Keeping = Literal["reset", "continue"]
 
 
 class ModeReader(Reader):
@@ -122,6 +124,7 @@ class ModeReader(Reader):
             region=region,
             entry=self._formulas(table.get("entry"), f"{key}.entry"),
             exit=self._formulas(table.get("exit"), f"{key}.exit"),
+            invariants=self._invariants(table.get("invariant"), f"{key}.invariant"),
         )
 
     def _formulas(self, node: Node | None, key: str) -> dict[str, Formula]:
@@ -130,6 +133,17 @@ class ModeReader(Reader):
             formula = self.expression(entry.node, f"{key}.{entry.key}", entry.span)
             if formula:
                 found[entry.key] = formula
+        return found
+
+    def _invariants(self, node: Node | None, key: str) -> dict[str, Invariant]:
+        found = {}
+        for entry in self.named(node, key):
+            table = self.table(entry.node, f"{key}.{entry.key}", ("that", "message"))
+            that = self.expression(table.get("that"), f"{key}.{entry.key}.that", entry.span)
+            message = table.get("message")
+            text = self.text(message, "message", entry.span) if message else f"`{entry.key}`"
+            if that:
+                found[entry.key] = Invariant(that, text)
         return found
 
     def _flow(self, node: Node | None, key: str) -> dict[str, Balance]:
@@ -174,11 +188,23 @@ class ModeReader(Reader):
             priority_node = table.get("priority")
             priority = self.whole(priority_node, "priority", 0, 0, 1000) if priority_node else None
             reset = self._formulas(table.get("reset"), f"{key}.reset")
+            keeping = ("reset", "continue")
+            memory = cast(Keeping, self.choice(table.get("memory"), "memory", keeping, "reset"))
             if when:
                 at = to.span if to else entry.span
                 found.append(
                     Transition(
-                        entry.key, source, target, when, wait, priority, reset, key, at, region
+                        entry.key,
+                        source,
+                        target,
+                        when,
+                        wait,
+                        priority,
+                        reset,
+                        key,
+                        at,
+                        region,
+                        memory,
                     )
                 )
         return found

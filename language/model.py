@@ -154,6 +154,14 @@ class Balance:
 
 
 @dataclass(frozen=True)
+class Invariant:
+    """An assertion about a mode: what holds in it, and what is told where it does not."""
+
+    that: Formula
+    message: str
+
+
+@dataclass(frozen=True)
 class Transition:
     """From its mode to `target` when the guard held for `wait`, with resets."""
 
@@ -167,6 +175,7 @@ class Transition:
     key: str
     span: Span
     region: str = CHART
+    memory: Literal["reset", "continue"] = "reset"
 
 
 @dataclass(frozen=True)
@@ -240,6 +249,7 @@ class Mode:
     beside: tuple[Region, ...] = ()
     entry: Mapping[str, Formula] = field(default_factory=dict)
     exit: Mapping[str, Formula] = field(default_factory=dict)
+    invariants: Mapping[str, Invariant] = field(default_factory=dict)
 
     @property
     def label(self) -> str:

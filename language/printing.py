@@ -114,6 +114,8 @@ def _program_lines(program: Program) -> Iterator[str]:
         yield f"transition {t.number} {t.name}: {t.source} -> {t.target}{wait}"
     for alarm in program.alarms:
         yield f"alarm {alarm.variable}: {alarm.time} s in {alarm.region} mode {alarm.mode}"
+    for info in program.invariants:
+        yield f"invariant {info.name} of mode {info.mode} of {info.region}: {info.variable}"
     for bit, fault in enumerate(program.faults):
         yield f"fault {bit} {fault}"
     for constant in program.constants:

@@ -8,6 +8,7 @@ Names are `group.name`; the group says what a variable is and where a back end k
     state     carried over               equation     evaluated each tick
     discrete  carried over, frozen while the states flow
     latched   inputs of this tick within their ranges
+    check     whether an invariant holds; for the engine alone
     memory    mode, fired, counters ...  work         lives within one call only
 """
 
@@ -186,6 +187,17 @@ class MotionInfo:
 
 
 @dataclass(frozen=True)
+class InvariantInfo:
+    """An assertion about a mode: the variable that says whether it holds, and what is told."""
+
+    name: str
+    mode: int
+    region: str
+    variable: str
+    message: str
+
+
+@dataclass(frozen=True)
 class Program:
     """A checked automaton as operations. `blocks` are named; the order is that of printing.
 
@@ -210,6 +222,7 @@ class Program:
     motion: MotionInfo | None = None
     defaults: Mapping[str, float | bool] = field(default_factory=dict)
     regions: tuple[RegionInfo, ...] = ()
+    invariants: tuple[InvariantInfo, ...] = ()
     alarms: tuple[Alarm, ...] = ()
 
     @property

@@ -16,6 +16,7 @@ from language.constants import derive_block, parameter_constants, values_of
 from language.covariance import COVARIANCE_RANGE, covariance_variables
 from language.evaluate import Scalar
 from language.fault import FAULT_GUARD, with_fault_transitions
+from language.invariant import INVARIANTS, invariant_block, invariant_variables
 from language.kalman import Kalman, kalman, observer_variables
 from language.limit import (
     HAPPENED,
@@ -137,6 +138,7 @@ class _Sampled:
             commit = sampled_commit(automaton, region, self.transitions)
             blocks[f"commit_{region.name}"] = (commit,)
         blocks.update(self._entries())
+        blocks.update(invariant_block(automaton, self.now))
         self.problems.stop_if_any()
         program = assembled(automaton, blocks, self.constants, variables, self.transitions)
         program = dataclasses.replace(
@@ -146,7 +148,7 @@ class _Sampled:
             observers=tuple(observer.info for observer in self.observers.values()),
             motion=self.motion,
         )
-        return finished(program, entries=("init", "derive", STAMPS, "step"))
+        return finished(program, entries=("init", "derive", STAMPS, "step", INVARIANTS))
 
     def _fault_names(self, blocks: Mapping[str, Block]) -> tuple[str, ...]:
         """The faults that are declared, then all others that something sets."""
@@ -215,6 +217,7 @@ class _Sampled:
         found.append(Variable("memory.faults", "whole", about="latched fault bits"))
         found += action_variables(automaton)
         found += limit_variables(automaton)
+        found += invariant_variables(automaton)
         return list({variable.name: variable for variable in found}.values())
 
     def _run_modes(self) -> tuple[ModeInfo, ...]:

@@ -98,7 +98,7 @@ def sampled_jump(
             fire = reading(automaton, transition.reset, known)
         else:
             fire = _at_once(automaton, mode, transition, known)
-            fire += _taken(automaton, transition, own)
+            fire += _taken(automaton, transition, infos)
         fire.append(Assign(fired_variable(mode.region), whole(info.number), info.key))
         if not automaton.regions:
             target = automaton.target(transition)
@@ -114,7 +114,7 @@ def sampled_commit(automaton: Automaton, region: Region, infos: tuple[Transition
         own = infos_of(mode, infos)
         for transition, info in zip(mode.transitions, own, strict=True):
             ops = committing(automaton, transition.reset)
-            ops += _taken(automaton, transition, own)
+            ops += _taken(automaton, transition, infos)
             ops += enter_run(automaton, automaton.target(transition))
             cases.append((info.number, tuple(ops)))
     return Choose(fired_variable(region.name), tuple(cases))
@@ -140,10 +140,27 @@ def _at_once(
     return [*stage(automaton, mode.exit, known), *stage(automaton, transition.reset, known)]
 
 
-def _taken(automaton: Automaton, transition: Transition, own: list[TransitionInfo]) -> list[Op]:
-    """The counters of the source end; the target is entered."""
-    ops: list[Op] = [Assign(info.timer, whole(0)) for info in own if info.timer]
-    ops += leave(automaton, automaton.source(transition), automaton.target(transition))
+def _taken(
+    automaton: Automaton, transition: Transition, infos: tuple[TransitionInfo, ...]
+) -> list[Op]:
+    """The counters of the source end; the target is entered.
+
+    Those of a mode that some transition enters with `memory: continue` outlive it, and end where
+    another one enters it (rule 4).
+    """
+    source, target = automaton.source(transition), automaton.target(transition)
+    ending = [] if _is_continued(automaton, source) else infos_of(source, infos)
+    if transition.memory == "reset" and _is_continued(automaton, target):
+        ending += infos_of(target, infos)
+    ops: list[Op] = [Assign(info.timer, whole(0)) for info in ending if info.timer]
+    ops += leave(automaton, source, target)
     mode = mode_variable("memory.mode", transition.region)
     ops.append(Assign(mode, whole(automaton.target(transition).number)))
     return ops
+
+
+def _is_continued(automaton: Automaton, mode: Mode) -> bool:
+    """Tell whether some transition enters a mode with its counters as they were."""
+    others = automaton.region(mode.region).modes.values()
+    ways = [way for other in others for way in other.transitions]
+    return any(way.memory == "continue" and way.target == mode.name for way in ways)

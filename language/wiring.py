@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 
 from language.functions import FUNCTIONS_OF
 from language.graph import post_order
+from language.invariant import invariant_infos
 from language.kind import Enumeration, Whole
 from language.limit import started
 from language.lower import WHOLE_TYPES, assigned, typed
@@ -190,6 +191,7 @@ def assembled(
         variables=tuple({variable.name: variable for variable in variables}.values()),
         outputs=output_wires(automaton),
         modes=mode_infos(automaton.chart),
+        invariants=invariant_infos(automaton),
         regions=tuple(RegionInfo(r.name, mode_infos(r)) for r in automaton.regions),
         transitions=transitions,
         faults=(),

@@ -1,0 +1,39 @@
+"""Invariant watch: an assertion about a mode that does not hold is an event, never forced."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from fractions import Fraction
+
+from engine.interpreter import Stepper
+from engine.trajectory import Event
+from language.program import Program
+
+BLOCK = "invariants"
+
+
+class InvariantWatch:
+    """The invariants of one automaton; each is reported when it ceases to hold."""
+
+    def __init__(
+        self, name: str, program: Program, stepper: Stepper, log: Callable[[Event], None]
+    ) -> None:
+        """Look at the active modes whenever asked."""
+        self._name, self._program, self._stepper, self._log = name, program, stepper, log
+        self._regions = program.mode_variables()
+        self._broken: set[str] = set()
+
+    def look(self, time: Fraction) -> None:
+        """Report what has ceased to hold since the last look; equations are those of now."""
+        if not self._program.invariants:
+            return
+        self._stepper.run(BLOCK)
+        for info in self._program.invariants:
+            active = self._stepper.get(self._regions[info.region]) == info.mode
+            if not active or self._stepper.get(info.variable):
+                self._broken.discard(info.variable)
+            elif info.variable not in self._broken:
+                self._broken.add(info.variable)
+                mode = self._program.mode_name(info.mode, info.region)
+                place = (self._name, f"invariant {info.name}", mode, mode, info.region)
+                self._log(Event(float(time), 0, *place, kind="invariant", message=info.message))

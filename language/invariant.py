@@ -1,0 +1,58 @@
+"""Invariant: assertions about modes, which the engine checks and C leaves out (rule 11).
+
+Block `invariants` sets `check.<mode>_<name>` for those of the active modes; nothing reads them.
+"""
+
+from __future__ import annotations
+
+from language.lower import Names, equation_names, expression
+from language.model import Automaton
+from language.operation import Assign, Block, Choose
+from language.program import InvariantInfo, Variable
+from language.region import mode_variable
+
+INVARIANTS = "invariants"
+"""The block; generated code has it not."""
+GROUP = "check."
+
+
+def invariant_infos(automaton: Automaton) -> tuple[InvariantInfo, ...]:
+    """Return the invariants of all modes, in the order of the file."""
+    return tuple(
+        InvariantInfo(
+            name, mode.number, mode.region, f"{GROUP}{mode.label}_{name}", invariant.message
+        )
+        for mode in automaton.all_modes
+        for name, invariant in mode.invariants.items()
+    )
+
+
+def invariant_variables(automaton: Automaton) -> list[Variable]:
+    """Return what holds the truth of each invariant."""
+    return [
+        Variable(info.variable, "truth", about=info.name) for info in invariant_infos(automaton)
+    ]
+
+
+def invariant_block(automaton: Automaton, known: Names) -> dict[str, Block]:
+    """Return the block that looks at the active modes; nothing where there are no invariants."""
+    if not invariant_infos(automaton):
+        return {}
+    here = {**known, **equation_names(automaton.all_modes, "equation.")}
+    found: list[Choose] = []
+    for region in automaton.all_regions:
+        cases: list[tuple[int, Block]] = []
+        for mode in region.modes.values():
+            ops = tuple(
+                Assign(
+                    f"{GROUP}{mode.label}_{name}",
+                    expression(invariant.that.tree, here),
+                    f"{automaton.name} {invariant.that.key}",
+                )
+                for name, invariant in mode.invariants.items()
+            )
+            if ops:
+                cases.append((mode.number, ops))
+        if cases:
+            found.append(Choose(mode_variable("memory.mode", region.name), tuple(cases)))
+    return {INVARIANTS: tuple(found)}

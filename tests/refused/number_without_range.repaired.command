@@ -1,0 +1,1 @@
+generate tests/codegen/golden/heater.yaml
