@@ -48,7 +48,7 @@ REALS = (
     *("leaf", "+", "+", "-", "-", "*", "*", "/", "/", "negative", "select", "select"),
     *("sum of product", "sum of product", "sum of product"),
     *("abs", "sqrt", "min", "max", "clip", "sign", "sin", "cos", "exp", "tanh", "pow2", "count"),
-    *("floor", "tan", "atan2"),
+    *("floor", "tan", "atan2", "rounded"),
 )
 TRUTHS = ("leaf", "compare", "compare", "compare", "whole", "same", "not", "and", "or", "select")
 RELATIONS = ("<", "<=", ">", ">=", "==", "!=")
@@ -98,6 +98,8 @@ def reals(draw: Draw, scope: Scope, depth: int) -> Expr:
             # A whole number within its domain, as the functions of ha_math call it; NaN is low.
             bounded = Call("clip", (part(), real(-1022.0), real(1023.0)))
             return Call(kind, (nearest(bounded),))
+        case "rounded":
+            return Call("real", (Call("whole", (Call("floor", (part(),)),)),))
         case "count":
             return Call("real", (draw(wholes(scope)),))
         case _:
