@@ -1,4 +1,4 @@
-"""Verify lock-step: differing bits over a million ticks per number type, of each estimator.
+"""Verify lock-step: differing bits over a million steps per type, of plant and of estimators.
 
 Seeded torques and speeds swing the driveline through its gap. Resumable: a part that was run with
 the same Program is not run again; docs/evidence/lockstep.json holds every part.
@@ -7,22 +7,28 @@ the same Program is not run again; docs/evidence/lockstep.json holds every part.
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import json
 import math
 import os
 import random
 import sys
 from collections.abc import Iterator
+from fractions import Fraction
 from pathlib import Path
 
 from engine.interpreter import Interpreter
+from engine.simulate import simulate
+from engine.starting import programs_of
 from language.load import program_of
 from language.number import NUMBERS, NumberType
 from language.printing import digest
 from language.program import Program
-from language.system import in_numbers
+from language.signal import Stimulus
+from language.stimulus import held
+from language.system import around, in_numbers
 from lockstep.compare import Tape, compare
-from modewright.api import load
+from modewright.api import Loaded, load
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 EVIDENCE = ROOT / "docs" / "evidence" / "lockstep.json"
@@ -35,14 +41,14 @@ RATIO, STIFFNESS = 8.1, 4800.0
 def main() -> int:
     """Run the parts that are missing; return 0 if there are enough and no bit differs."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--ticks", type=int, default=1_000_000, help="per number type")
+    parser.add_argument("--ticks", type=int, default=1_000_000, help="per type, of each")
     ticks: int = parser.parse_args().ticks
     os.chdir(ROOT)
     found = json.loads(EVIDENCE.read_text()) if EVIDENCE.exists() else {}
     for number in NUMBERS:
-        programs = estimators(number)
-        parts = -(-ticks // (PART * len(programs)))
-        for program in programs:
+        sampled = estimators(number)
+        for program in [*sampled, plant(number)]:
+            parts = -(-ticks // (PART * (len(sampled) if program.period else 1)))
             kept = found.get(f"{program.name} {number}", {})
             if kept.get("digest") != digest(program):
                 kept = {"digest": digest(program), "parts": {}}
@@ -62,8 +68,60 @@ def estimators(number: NumberType) -> list[Program]:
     return [program_of(automaton) for automaton in automata if automaton.is_sampled]
 
 
+def plant(number: NumberType) -> Program:
+    """Return the continuous instance of the shipped system in a number type."""
+    loaded = driven(number, 0)
+    return programs_of(loaded.system, loaded.scenario)["driveline"]
+
+
+def driven(number: NumberType, part: int) -> Loaded:
+    """Return the plant alone with a torque that steps every 0.4 s, for as many steps as a part."""
+    loaded = load("ev_driveline", "tip_out")
+    automaton = in_numbers(loaded.system, number).instances["plant"].automaton
+    draw = random.Random(f"plant {part}")
+    horizon = automaton.step * PART
+    starts = [Fraction(2 * k, 5) for k in range(int(horizon * 5 / 2) + 1)]
+    torque = held([(start, Fraction(draw.randint(-60, 60))) for start in starts])
+    given = {
+        n: Stimulus(held([(Fraction(0), i.default or Fraction(0))]))
+        for n, i in automaton.inputs.items()
+    }
+    scenario = dataclasses.replace(
+        loaded.scenario,
+        of="driveline",
+        horizon=horizon,
+        initial={},
+        inputs={**given, "T_em": Stimulus(torque)},
+        every=Fraction(1),
+    )
+    return Loaded(around(automaton), scenario)
+
+
 def measured(program: Program, part: int) -> dict[str, int]:
     """Return what one tape gives."""
+    tape = estimated(program, part) if program.period else moved(program, part)
+    verdict = compare(tape)
+    return {
+        "ticks": verdict.ticks,
+        "values": verdict.values,
+        "differing": verdict.differing,
+        "transitions": verdict.transitions,
+    }
+
+
+def moved(program: Program, part: int) -> Tape:
+    """Return the tape of the plant, step by step."""
+    loaded, tape = driven(program.number, part), Tape(program, program.name)
+    run = simulate(
+        loaded.system, loaded.scenario, ticked=lambda name, used, stepper: tape.record(stepper)
+    )
+    if run.stopped:
+        raise RuntimeError(run.stopped)
+    return tape
+
+
+def estimated(program: Program, part: int) -> Tape:
+    """Return the tape of an estimator on seeded inputs."""
     stepper, tape = Interpreter(program), Tape(program, program.name)
     for variable in program.variables:
         if variable.name.startswith("is_new."):
@@ -73,13 +131,7 @@ def measured(program: Program, part: int) -> dict[str, int]:
             stepper.set(variable.name, values.get(variable.name, 0.0))
         stepper.run("step")
         tape.record(stepper)
-    verdict = compare(tape)
-    return {
-        "ticks": verdict.ticks,
-        "values": verdict.values,
-        "differing": verdict.differing,
-        "transitions": verdict.transitions,
-    }
+    return tape
 
 
 def drive(part: int, period: float) -> Iterator[dict[str, float]]:
@@ -108,11 +160,18 @@ def report(found: dict[str, dict[str, dict[str, dict[str, int]]]], ticks: int) -
     """Print the sums by number type; return 0 if every bar is met."""
     fine = True
     for number in NUMBERS:
-        parts = [p for key, k in found.items() if key.endswith(number) for p in k["parts"].values()]
-        total = {name: sum(part[name] for part in parts) for name in parts[0]}
-        met = total["ticks"] >= ticks and total["differing"] == 0 and total["transitions"] > 0
-        fine = fine and met
-        print(f"{'met ' if met else 'OPEN'} differing bits, {number}: {json.dumps(total)}")
+        for what, is_plant in (("estimators", False), ("plant", True)):
+            kept = [
+                k["parts"]
+                for key, k in found.items()
+                if key.endswith(number) and key.startswith("driveline ") == is_plant
+            ]
+            parts = [part for each in kept for part in each.values()]
+            total = {name: sum(part[name] for part in parts) for name in parts[0]}
+            met = total["ticks"] >= ticks and total["differing"] == 0 and total["transitions"] > 0
+            fine = fine and met
+            word = "met " if met else "OPEN"
+            print(f"{word} differing bits of the {what}, {number}: {json.dumps(total)}")
     return 0 if fine else 1
 
 
