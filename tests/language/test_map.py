@@ -97,7 +97,7 @@ def test_constants_feed_what_no_column_does() -> None:
         ("to: u, unit: furlong", "`furlong` is not a unit"),
         ("to: u, sign: 0", "`0` is not one of 1, -1"),
         ("to: u, sign: plus", "`plus` is not one of 1, -1"),
-        ("to: u, hold: linear", "`linear` is not one of previous"),
+        ("to: u, hold: cubic", "`cubic` is not one of previous, linear"),
         ("to: u, blank: fill", "`fill` is not one of refuse, skip"),
         ("to: u, delay: 3", "`delay` is a time of at least 0 s"),
         ("to: u, delay: -3 ms", "`delay` is a time of at least 0 s"),

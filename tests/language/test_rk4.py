@@ -103,7 +103,7 @@ outputs: [x]
 def prepared(text: str, h: float) -> Interpreter:
     """Return an automaton at its start that has taken one step, with its polynomial."""
     inside = stepper(text)
-    inside.run("init")
+    inside.run("start")
     inside.set("work.h", h)
     inside.run("step_only")
     inside.run("series_only")
