@@ -9,8 +9,6 @@ from __future__ import annotations
 import argparse
 import csv
 import gzip
-import hashlib
-import json
 import os
 import subprocess
 import sys
@@ -19,20 +17,16 @@ from collections.abc import Callable
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 import modewright as mw
+from tests.verify.store import ROOT, Figure, measured
 
-ROOT = Path(__file__).resolve().parent.parent.parent
 PAPER = ROOT / "tests" / "data" / "paper"
-EVIDENCE = ROOT / "docs" / "evidence" / "2.json"
-CODE = ("language", "engine", "codegen", "lockstep", "modewright", "spec")
 DRIVES = {"drive_eco": 20.151, "drive_2": 7.55}
 """When the torque report crosses zero [s]."""
 NUMBERS = {"drive": "1", "gap": "0", "coast": "-1"}
-Figure = dict[str, Any]
 
 
 def main() -> int:
@@ -41,37 +35,7 @@ def main() -> int:
     parser.add_argument("--recordings", default=os.environ.get("MODEWRIGHT_RECORDINGS"))
     named = parser.parse_args().recordings
     os.chdir(ROOT)
-    digest = code_digest()
-    old = json.loads(EVIDENCE.read_text()) if EVIDENCE.exists() else {}
-    kept = old.get("figures", {}) if old.get("code") == digest else {}
-    for name, measure in figures(Path(named) if named else None).items():
-        if name not in kept:
-            print(f"measuring {name} ...", flush=True)
-            kept[name] = measure()
-            write(digest, kept)
-    for name, figure in kept.items():
-        print(f"{'met ' if figure['met'] else 'OPEN'} {name}: {json.dumps(figure)}")
-    write(digest, kept)
-    return 0 if all(figure["met"] for figure in kept.values()) else 1
-
-
-def write(digest: str, figures_found: dict[str, Figure]) -> None:
-    """Write the evidence, whole or not at all."""
-    EVIDENCE.parent.mkdir(exist_ok=True)
-    text = json.dumps({"issue": 2, "code": digest, "figures": figures_found}, indent=1) + "\n"
-    temporary = EVIDENCE.with_suffix(".tmp")
-    temporary.write_text(text)
-    temporary.replace(EVIDENCE)
-
-
-def code_digest() -> str:
-    """Return the SHA-256 of all code and specs."""
-    total = hashlib.sha256()
-    for folder in CODE:
-        for path in sorted((ROOT / folder).rglob("*")):
-            if path.is_file() and path.suffix in (".py", ".yaml", ".lark", ".jinja"):
-                total.update(str(path.relative_to(ROOT)).encode() + b"\0" + path.read_bytes())
-    return total.hexdigest()
+    return measured(2, figures(Path(named) if named else None))
 
 
 def figures(recordings: Path | None) -> dict[str, Callable[[], Figure]]:

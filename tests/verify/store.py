@@ -1,0 +1,53 @@
+"""Store: figures of an issue with the digest of the code that they were measured with.
+
+Resumable: a figure that was measured with the same code is not measured again.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+CODE = ("language", "engine", "codegen", "lockstep", "modewright", "spec")
+SUFFIXES = (".py", ".yaml", ".lark", ".jinja", ".txt")
+Figure = dict[str, Any]
+
+
+def measured(issue: int, figures: Mapping[str, Callable[[], Figure]]) -> int:
+    """Measure what is not measured yet, keep and print all; return 0 if every bar is met."""
+    path = ROOT / "docs" / "evidence" / f"{issue}.json"
+    digest = code_digest()
+    old = json.loads(path.read_text()) if path.exists() else {}
+    kept: dict[str, Figure] = old.get("figures", {}) if old.get("code") == digest else {}
+    for name, measure in figures.items():
+        if name not in kept:
+            print(f"measuring {name} ...", flush=True)
+            kept[name] = measure()
+            _write(path, issue, digest, kept)
+    for name, figure in kept.items():
+        print(f"{'met ' if figure['met'] else 'OPEN'} {name}: {json.dumps(figure)}")
+    _write(path, issue, digest, kept)
+    return 0 if all(figure["met"] for figure in kept.values()) else 1
+
+
+def code_digest() -> str:
+    """Return the SHA-256 of all code and specs."""
+    total = hashlib.sha256()
+    for folder in CODE:
+        for path in sorted((ROOT / folder).rglob("*")):
+            if path.is_file() and path.suffix in SUFFIXES:
+                total.update(str(path.relative_to(ROOT)).encode() + b"\0" + path.read_bytes())
+    return total.hexdigest()
+
+
+def _write(path: Path, issue: int, digest: str, figures: Mapping[str, Figure]) -> None:
+    """Write the evidence, whole or not at all."""
+    path.parent.mkdir(exist_ok=True)
+    text = json.dumps({"issue": issue, "code": digest, "figures": figures}, indent=1) + "\n"
+    temporary = path.with_suffix(".tmp")
+    temporary.write_text(text)
+    temporary.replace(path)
