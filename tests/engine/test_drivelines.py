@@ -26,7 +26,8 @@ DRIVES = {
 """Scenario, and the events that there are at least."""
 WIDE = Fraction(8, 10_000)
 """Step [s] of scipy's methods: they choose their own inside it, and look at guards in quarters.
-The largest stable one of RK4 with a tenth of the damping is 0.812 ms: above it a spec is refused."""
+The largest stable one of RK4 with a tenth of the damping is 0.812 ms: above it a spec is
+refused."""
 EVENTS_WITHIN = 2e-7
 """Of RK4 at the step of the spec against orders 8 and 5 at a tolerance of 1e-11 [s]."""
 SIGNALS_WITHIN = {"two_gaps": 2e-6, "clutch": 2e-6, "light_damping": 1e-4}
