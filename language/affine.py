@@ -38,12 +38,16 @@ OTHER = Affine()
 """Something that is not affine, or not known before the program runs."""
 
 
-def jacobian(rates: Block, states: tuple[str, ...], constants: Mapping[str, Scalar]) -> Matrix:
+def jacobian(
+    rates: Block, states: tuple[str, ...], constants: Mapping[str, Scalar | tuple[float, ...]]
+) -> Matrix:
     """Return A (n, n) of the terms of `work.rate_<state>` linear in `work.at_<state>`.
 
     Entry i j in unit_i/(unit_j s). What is not linear, or has no constant coefficient, is left out.
     """
-    known: dict[str, Affine] = {name: Affine({}, float(value)) for name, value in constants.items()}
+    known: dict[str, Affine] = {}
+    for name, value in constants.items():
+        known[name] = OTHER if isinstance(value, tuple) else Affine({}, float(value))
     known.update({f"work.at_{name}": Affine({name: 1.0}, 0.0) for name in states})
     for op in rates:
         if isinstance(op, Choose):  # it depends on a region's mode: not known before

@@ -244,7 +244,7 @@ class _Check:
     def _beside(self, mode: Mode) -> None:
         """A mode of another region reads what every mode of the chart has."""
         automaton = self.automaton
-        groups = [automaton.parameters, automaton.inputs, automaton.states]
+        groups = [automaton.parameters, automaton.inputs, automaton.carried]
         known = dict(self._scope(groups, "").names)
         modes = [sources(other) for other in automaton.modes.values()]
         everywhere = [name for name in modes[0] if all(name in other for other in modes)]

@@ -76,7 +76,7 @@ def _spans_a_step(automaton: Automaton, time: Tree, value: Fraction, problems: P
 
 
 def _known_in_every_mode(automaton: Automaton, tree: Application, problems: Problems) -> None:
-    everywhere = {*automaton.parameters, *automaton.inputs, *automaton.states}
+    everywhere = {*automaton.parameters, *automaton.inputs, *automaton.carried}
     for read in names(tree.arguments[0]):
         modes = automaton.modes.values()
         lacking = [m.name for m in modes if read.path not in equation_names(m)]

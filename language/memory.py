@@ -89,9 +89,10 @@ class Edge:
 
 
 def formulas(mode: Mode) -> Iterator[Formula]:
-    """Yield the equations, updates, noises, guards and resets of a mode."""
+    """Yield the equations, updates, entries, exits, noises, guards and resets of a mode."""
     yield from mode.equations.values()
-    yield from mode.update.values()
+    for stage in (mode.update, mode.entry, mode.exit):
+        yield from stage.values()
     if mode.observer:
         yield from mode.observer.process_noise.values()
     for transition in mode.transitions:

@@ -130,7 +130,11 @@ def compare(tape: Tape, flags: Sequence[str] = FLAGS, compiler: str | None = Non
     Raises ToolMissing, BuildError.
     """
     with executable(tape.program, flags, compiler) as target:
-        output = run_executable(target, b"".join(tape.inputs))
+        return judged(tape, run_executable(target, b"".join(tape.inputs)))
+
+
+def judged(tape: Tape, output: bytes) -> Verdict:
+    """Return the verdict on what the C of the tape's program wrote for the tape's inputs."""
     size, ticks = tape.size, len(tape.values)
     differing, first = 0, None
     if len(output) != size * ticks:

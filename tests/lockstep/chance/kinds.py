@@ -1,0 +1,18 @@
+"""Kinds: which random specs there are - sampled automata of several flavours."""
+
+from __future__ import annotations
+
+from random import Random
+
+from tests.lockstep.chance.sampled import sampled
+from tests.lockstep.chance.spec import Spec
+
+
+def chance(number: int) -> Spec:
+    """Return the random spec of a number: always the same."""
+    return random_spec(Random(f"chance {number}"), f"chance_{number}")
+
+
+def random_spec(draw: Random, name: str) -> Spec:
+    """Return a random spec."""
+    return sampled(draw, name)

@@ -1,0 +1,60 @@
+"""Spec: one random spec - its texts, what its inputs are steered to - and its Program."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from language.limit import require_ranges
+from language.load import automaton_of, program_of
+from language.number import NumberType
+from language.program import Program
+from language.project import Project, read_document
+
+SHORT: Mapping[NumberType, str] = {"float64": "f64", "float32": "f32"}
+
+
+@dataclass(frozen=True)
+class Aim:
+    """An input: its type, its range, and the values at which something changes."""
+
+    name: str
+    type: str
+    low: float
+    high: float
+    levels: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Spec:
+    """The files of a random automaton by name; `waits` are in ticks (or major steps).
+
+    `guards` are the equations that a transition with a wait stands for, by its key path.
+    """
+
+    name: str
+    texts: Mapping[str, str]
+    aims: tuple[Aim, ...]
+    waits: tuple[int, ...]
+    guards: Mapping[str, str]
+
+    @property
+    def text(self) -> str:
+        """The text of the automaton itself."""
+        return self.texts[self.name]
+
+
+def program(spec: Spec, number: NumberType, folder: Path) -> Program:
+    """Return the Program of a spec through the whole front end; its name says the type too."""
+    home = folder / spec.name / "spec"
+    home.mkdir(parents=True, exist_ok=True)
+    for name, text in spec.texts.items():
+        (home / f"{name}.yaml").write_text(text)
+    project = Project(home.parent)
+    automaton = automaton_of(read_document(project.path_of(spec.name)), project)
+    if automaton.is_sampled:
+        require_ranges(automaton)
+    made = program_of(dataclasses.replace(automaton, numbers=number))
+    return dataclasses.replace(made, name=f"{spec.name}_{SHORT[number]}")
