@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
-from language.model import Column, RecordingMap
+from language.experiment import Column, RecordingMap
 from language.problem import Problems, Source, Span, nearest
 from language.project import shown
 

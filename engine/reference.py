@@ -20,7 +20,7 @@ from engine.interpreter import Interpreter, Stepper
 from engine.library_stepper import LibraryStepper, Method
 from engine.simulate import simulate
 from engine.trajectory import Trajectory
-from language.model import Scenario, System
+from language.experiment import Scenario, System
 from language.program import ObserverInfo, Program
 
 Reals = NDArray[np.float64]

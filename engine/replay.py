@@ -14,8 +14,9 @@ import numpy as np
 from engine.interpreter import Interpreter, Stepper
 from engine.recording import Channel, Recording
 from engine.trajectory import Event, Trajectory, Values, column_array, fault_names
+from language.experiment import Column, RecordingMap
 from language.map import column_dimension
-from language.model import Automaton, Column, RecordingMap
+from language.model import Automaton
 from language.problem import Problems, SpecError, nearest
 from language.program import Program
 from language.units import NUMBER, Dimension, fits

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.trajectory import Values, column_array
-from language.model import Formula, Scenario, System
+from language.declaration import Formula
+from language.experiment import Scenario, System
 from language.program import Program, ValueType
 from language.syntax import names
 from language.wires import output_block

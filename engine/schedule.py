@@ -7,7 +7,7 @@ import itertools
 from collections.abc import Iterator, Mapping
 from fractions import Fraction
 
-from language.model import Scenario, System
+from language.experiment import Scenario, System
 from language.problem import Problems, SpecError
 from language.program import Program
 from language.signal import Stimulus

@@ -10,7 +10,8 @@ from typing import Any
 from engine.interpreter import Interpreter, Stepper
 from engine.sensing import SensorRun
 from engine.stimulus import Course
-from language.model import Connection, Formula, Scenario, System
+from language.declaration import Formula
+from language.experiment import Connection, Scenario, System
 from language.program import Program
 from language.signal import Line
 from language.syntax import names

@@ -20,7 +20,8 @@ from engine.starting import programs_of
 from engine.stimulus import resolved
 from engine.surroundings import Surroundings
 from engine.trajectory import Event, Trajectory, fault_names
-from language.model import CHART, Connection, Scenario, System
+from language.experiment import Connection, Scenario, System
+from language.model import CHART
 from language.program import Program, short
 
 Build = Callable[[Program], Stepper]

@@ -6,8 +6,10 @@ import dataclasses
 from collections.abc import Mapping
 from fractions import Fraction
 
+from language.declaration import Formula
+from language.experiment import Scenario, System
 from language.load import program_of
-from language.model import Automaton, Formula, Scenario, System
+from language.model import Automaton
 from language.problem import Source, Span
 from language.program import Program
 from language.syntax import Number

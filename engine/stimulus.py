@@ -8,7 +8,7 @@ from collections.abc import Callable
 from fractions import Fraction
 
 from engine.recording import Channel, Recording, read_recording
-from language.model import Scenario, System
+from language.experiment import Scenario, System
 from language.problem import Problems, SpecError
 from language.signal import Stimulus
 from language.stimulus import held, linear

@@ -8,7 +8,7 @@ from typing import Any
 
 from engine.interpreter import Stepper
 from engine.signals import Signals
-from language.model import Connection
+from language.experiment import Connection
 from language.program import Program
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
+from language.declaration import Formula
 from language.limit import stored
 from language.lower import (
     WHOLE_TYPES,
@@ -16,7 +17,7 @@ from language.lower import (
     equations,
     reads_of,
 )
-from language.model import Automaton, Formula, Mode
+from language.model import Automaton, Mode
 from language.operation import Assign, Block, Op, Ref
 from language.program import Variable, value_type
 from language.wiring import watched_range

@@ -6,16 +6,11 @@ from collections.abc import Mapping
 from fractions import Fraction
 from typing import Literal, cast
 
+from language.declaration import Fitting, Kind, Parameter, Range
 from language.document import Document, Entry, Node, Scalar, Table
 from language.element import ElementReader
 from language.mode import ModeReader
-from language.model import (
-    Automaton,
-    Fitting,
-    Kind,
-    Parameter,
-    Range,
-)
+from language.model import Automaton
 from language.names import check_file_name
 from language.number import NUMBERS, NumberType
 from language.observer import METHODS

@@ -11,22 +11,13 @@ from language.check_element import check_laid_on
 from language.check_memory import check_memory
 from language.check_observer import check_observer
 from language.check_region import check_regions
+from language.declaration import Formula, Input, LookupTable, Parameter, State
 from language.dimension import DimensionCheck, Scope
+from language.experiment import SystemInput
 from language.guards import report_overlaps
 from language.kind import Enumeration, Kind, Whole
 from language.lower import parameter_kinds
-from language.model import (
-    Automaton,
-    Formula,
-    Input,
-    LookupTable,
-    Mode,
-    Parameter,
-    Region,
-    State,
-    SystemInput,
-    Transition,
-)
+from language.model import Automaton, Mode, Region, Transition
 from language.names import report_case_twins
 from language.order import equation_order, report_circle, unreached
 from language.problem import Problems, Span, SpecError, nearest

@@ -5,9 +5,10 @@ from __future__ import annotations
 from fractions import Fraction
 
 from language.constants import exact_value
+from language.declaration import Formula
 from language.lower import parameter_kinds
 from language.memory import MAX_DELAY, applications, formulas, type_of
-from language.model import Automaton, Formula, Transition
+from language.model import Automaton, Transition
 from language.problem import Problems
 from language.region import equation_names
 from language.syntax import EDGES, KEPT, Application, Tree, names, walk

@@ -8,7 +8,8 @@ import math
 from collections.abc import Iterator, Mapping
 from fractions import Fraction
 
-from language.model import Automaton, Input, Parameter
+from language.declaration import Input, Parameter
+from language.model import Automaton
 from language.number import rounded
 from language.problem import Problems, Span
 from language.syntax import Number

@@ -5,9 +5,10 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 
+from language.declaration import Formula
 from language.dimension import DimensionCheck
 from language.kind import Kind
-from language.model import Automaton, Formula, Observer
+from language.model import Automaton, Observer
 from language.problem import Problems, nearest
 from language.syntax import names as names_of
 from language.units import Dimension, fits, product

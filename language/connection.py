@@ -7,10 +7,11 @@ from collections.abc import Mapping
 from fractions import Fraction
 
 from language.check import declared_kind
+from language.declaration import Formula
 from language.dimension import DimensionCheck, Scope
 from language.document import Entry, Node, Scalar, Table
+from language.experiment import Connection, Instance, SystemInput
 from language.kind import Kind, Whole
-from language.model import Connection, Formula, Instance, SystemInput
 from language.problem import Problems, Span, nearest
 from language.reader import Reader
 from language.signal import Line, Sensor

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from fractions import Fraction
 from typing import Any
 
+from language.declaration import Formula
 from language.evaluate import Scalar, evaluate
 from language.lower import (
     assigned,
@@ -16,7 +17,7 @@ from language.lower import (
     parameter_kinds,
     parameter_order,
 )
-from language.model import Automaton, Formula
+from language.model import Automaton
 from language.number import rounded
 from language.operation import Assign, Block
 from language.problem import Problems, SpecError

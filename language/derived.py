@@ -6,9 +6,10 @@ import dataclasses
 from collections.abc import Mapping
 from contextlib import suppress
 
+from language.declaration import Formula
 from language.evaluate import Scalar
 from language.linear import Point, Rows, inlined, matrix, rates, remains, tangent
-from language.model import Automaton, Formula, Mode, Observer
+from language.model import Automaton, Mode, Observer
 from language.problem import Problems, SpecError, nearest
 from language.simplify import is_zero, number
 from language.syntax import Name, Number, Tree, Truth, names

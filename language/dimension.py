@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from language.call import WHERE, lookup_kind, memory_kind
+from language.declaration import LookupTable
 from language.kind import LARGEST_WHOLE, Enumeration, Kind, Truthful, Whole, combined
-from language.model import LookupTable
 from language.problem import Problems, Span, nearest
 from language.syntax import (
     MEMORY,

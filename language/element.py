@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal, cast
 
+from language.declaration import Formula
 from language.document import Entry, Items, Node, Scalar, Table
-from language.model import Element, Formula
+from language.model import Element
 from language.problem import Problems, Span
 from language.reader import Reader
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 
-from language.model import Automaton, Formula, Mode, Transition
+from language.declaration import Formula
+from language.model import Automaton, Mode, Transition
 from language.region import with_regions
 from language.syntax import Name
 

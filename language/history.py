@@ -14,9 +14,10 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from language.constants import exact_value
+from language.declaration import Formula
 from language.lower import Names, expression
 from language.memory import applications
-from language.model import Automaton, Formula, Mode
+from language.model import Automaton, Mode
 from language.operation import (
     Assign,
     Block,

@@ -7,6 +7,7 @@ from fractions import Fraction
 from itertools import product
 
 from language.constants import derive_block
+from language.declaration import Formula
 from language.euler import euler
 from language.evaluate import Scalar, evaluate
 from language.exact import exact
@@ -15,7 +16,7 @@ from language.field import Field
 from language.linear import Point
 from language.lower import tunables_of
 from language.midpoint import midpoint
-from language.model import Automaton, Formula
+from language.model import Automaton
 from language.motion import Method
 from language.number import rounded
 from language.operation import Assign, Block

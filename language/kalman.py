@@ -12,12 +12,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from language.constants import constant_value
+from language.declaration import Formula
 from language.derived import with_model
 from language.evaluate import Scalar
 from language.limit import stored
 from language.lower import Names, expression, tunables_of
 from language.matrix import Matrix, exponential, exponential_integral, multiply
-from language.model import Automaton, Formula, Mode, Observer
+from language.model import Automaton, Mode, Observer
 from language.operation import (
     Assign,
     Binary,

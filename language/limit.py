@@ -9,8 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from fractions import Fraction
 
+from language.declaration import Input, Range, State
 from language.evaluate import NO_NUMBER
-from language.model import Automaton, Input, Range, State
+from language.model import Automaton
 from language.operation import (
     Assign,
     Binary,

@@ -6,10 +6,11 @@ from collections.abc import Iterable, Mapping
 from typing import Literal
 
 from language.balance import coefficient_of
+from language.declaration import Formula
 from language.graph import post_order
 from language.kind import Type
 from language.limit import is_limited
-from language.model import Automaton, Balance, Formula, Mode, Region
+from language.model import Automaton, Balance, Mode, Region
 from language.number import rounded
 from language.operation import (
     Assign,

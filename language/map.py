@@ -6,8 +6,8 @@ from fractions import Fraction
 from typing import Literal, cast
 
 from language.document import Document, Entry, Items, Table
+from language.experiment import Column, RecordingMap
 from language.literal import constant
-from language.model import Column, RecordingMap
 from language.problem import Problems, Span
 from language.project import Project, expanded
 from language.reader import Reader

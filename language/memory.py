@@ -13,10 +13,11 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from language.constants import exact_value
+from language.declaration import Formula
 from language.dimension import DimensionCheck, Scope
 from language.kind import Enumeration, Whole
 from language.lower import Names, expression
-from language.model import Automaton, Formula, Mode
+from language.model import Automaton, Mode
 from language.operation import (
     Assign,
     Binary,

@@ -5,8 +5,9 @@ from __future__ import annotations
 import dataclasses
 from typing import Literal, cast
 
+from language.declaration import Formula
 from language.document import Entry, Node, Table
-from language.model import CHART, Automaton, Balance, Formula, Invariant, Mode, Region, Transition
+from language.model import CHART, Automaton, Balance, Invariant, Mode, Region, Transition
 from language.observer import read_observer, read_run
 from language.overlay import lay, without
 from language.parse import parse_balance

@@ -1,146 +1,26 @@
-"""Model: one checked thing of the language - an automaton, a system, a scenario or a map."""
+"""Model: a checked automaton - regions of modes with balances, transitions, observers and runs."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import cached_property
 from typing import Literal
 
-from language.kind import Kind as ValueKind, Type
+from language.declaration import (
+    Formula,
+    Input,
+    Parameter,
+    State,
+)
+from language.kind import Kind as ValueKind
 from language.number import NumberType
 from language.problem import Span
-from language.signal import Line, RecordingUse, Sensor, Stimulus
-from language.syntax import Tree, names
-from language.units import Dimension, Unit
+from language.syntax import Tree
+from language.units import Dimension
 
-Range = tuple[Fraction, Fraction]
-Kind = Literal["fixed", "tunable", "derived"]
 CHART = "chart"
 """The region of the modes at the root."""
-
-
-@dataclass(frozen=True)
-class Formula:
-    """An expression and the key path that it stands under; `whole`: its value is whole."""
-
-    tree: Tree
-    key: str
-    whole: bool = False
-
-    @cached_property
-    def reads(self) -> tuple[str, ...]:
-        """The names that the expression reads, from left to right."""
-        return tuple(name.path for name in names(self.tree))
-
-    @property
-    def span(self) -> Span:
-        """The place of the expression."""
-        return self.tree.span
-
-
-@dataclass(frozen=True)
-class Fitting:
-    """What a fit needs to know of a parameter (SI).
-
-    `neutral` is the value at which the effect that brought it vanishes, `absent` where there is
-    none; `starts` are values to start from; `per` is `recording` for one value each.
-    """
-
-    neutral: Fraction | Literal["absent"] | None = None
-    starts: tuple[Fraction, ...] = ()
-    per: Literal["model", "recording"] = "model"
-    form: Literal["constant", "constant_or_random_walk"] = "constant"
-
-
-@dataclass(frozen=True)
-class Axis:
-    """An axis of a table: its strictly ascending points in SI, exact."""
-
-    name: str
-    unit: Unit
-    points: tuple[Fraction, ...]
-
-
-@dataclass(frozen=True)
-class LookupTable:
-    """Values over one or two axes in SI, exact; the last axis varies fastest."""
-
-    axes: tuple[Axis, ...]
-    unit: Unit
-    values: tuple[Fraction, ...]
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """A value in SI (exact) or, if derived, an expression of other parameters.
-
-    The value of a `bool` is 0 or 1, that of an `enum` the place in `values`.
-    """
-
-    name: str
-    kind: Kind
-    unit: Unit
-    value: Fraction | None
-    derived: Formula | None
-    range: Range | None
-    key: str
-    span: Span
-    fitting: Fitting = Fitting()
-    type: Type = "real"
-    values: tuple[str, ...] = ()
-    table: LookupTable | None = None
-    about: str = ""
-
-
-@dataclass(frozen=True)
-class Limits:
-    """What becomes of a value outside its range (rule 18), and the fault bit that it sets.
-
-    `fallback` (a value in SI, or `hold`) is for a value that is not finite.
-    """
-
-    on_range: Literal["saturate", "hold", "fault"] = "saturate"
-    fallback: Fraction | Literal["hold"] | None = None
-    fault: str | None = None
-
-
-@dataclass(frozen=True)
-class Input:
-    """A value from outside; `values` are those of an `enum`."""
-
-    name: str
-    unit: Unit
-    type: Type
-    default: Fraction | None
-    range: Range | None
-    key: str
-    span: Span
-    values: tuple[str, ...] = ()
-    limits: Limits = Limits()
-    about: str = ""
-
-    @property
-    def truth(self) -> bool:
-        """Tell whether it is true or false."""
-        return self.type == "bool"
-
-
-@dataclass(frozen=True)
-class State:
-    """A continuous variable, or what a sampled automaton carries from tick to tick."""
-
-    name: str
-    unit: Unit
-    initial: Formula
-    range: Range | None
-    key: str
-    span: Span
-    type: Type = "real"
-    values: tuple[str, ...] = ()
-    limits: Limits = Limits()
-    about: str = ""
 
 
 @dataclass(frozen=True)
@@ -363,139 +243,3 @@ class Automaton:
         lists += [thing.values for thing in self.discrete.values()]
         own = {name: place for values in lists for place, name in enumerate(values)}
         return {**(self.model.literals if self.model else {}), **own}
-
-
-@dataclass(frozen=True)
-class Instance:
-    """A named use of an automaton in a system."""
-
-    name: str
-    automaton: Automaton
-    offset: Fraction
-    key: str
-    span: Span
-
-
-@dataclass(frozen=True)
-class SystemInput:
-    """An input of a system."""
-
-    name: str
-    unit: Unit
-    default: Fraction | None
-    span: Span
-    type: Type = "real"
-    values: tuple[str, ...] = ()
-
-    @property
-    def truth(self) -> bool:
-        """Tell whether it is true or false."""
-        return self.type == "bool"
-
-
-@dataclass(frozen=True)
-class Connection:
-    """What an input of an instance reads: a signal by name, a constant (SI) or an expression.
-
-    Signals are inputs of the system, its sensors and lines, and outputs `instance.output`.
-    """
-
-    target: tuple[str, str]
-    source: str | Fraction | Formula
-    span: Span
-
-    @property
-    def reads(self) -> tuple[str, ...]:
-        """The signals that are read."""
-        if isinstance(self.source, Formula):
-            return tuple(dict.fromkeys(name.path for name in names(self.source.tree)))
-        return (self.source,) if isinstance(self.source, str) else ()
-
-
-@dataclass(frozen=True)
-class System:
-    """Instances, how they are connected; `order`: how they and sensors run.
-
-    `dimensions` are those of the outputs that are expressions with a real value.
-
-    `alone` is the name of the one instance where the system was made around an automaton.
-    """
-
-    name: str
-    inputs: Mapping[str, SystemInput]
-    instances: Mapping[str, Instance]
-    connections: Mapping[tuple[str, str], Connection]
-    outputs: Mapping[str, str | Formula]
-    order: tuple[str, ...]
-    span: Span
-    sensors: Mapping[str, Sensor] = field(default_factory=dict)
-    lines: Mapping[str, Line] = field(default_factory=dict)
-    dimensions: Mapping[str, Dimension] = field(default_factory=dict)
-    alone: str | None = None
-
-    @property
-    def signals(self) -> tuple[str, ...]:
-        """What can be recorded: inputs, outputs of instances, sensors, outputs of the system."""
-        parts = [
-            f"{i.name}.{name}" for i in self.instances.values() for name in i.automaton.outputs
-        ]
-        return tuple(dict.fromkeys([*self.inputs, *parts, *self.sensors, *self.outputs]))
-
-
-@dataclass(frozen=True)
-class Page:
-    """A calibration from a time on: values [SI] of tunable parameters by instance and name."""
-
-    time: Fraction
-    values: Mapping[tuple[str, str], Fraction]
-
-
-@dataclass(frozen=True)
-class Scenario:
-    """Inputs, initial values, horizon of a system and what is recorded of it.
-
-    `horizon` is None where it is that of the recording; an initial value given as a text is the
-    first value of that column; `signals` is empty where everything is recorded.
-    """
-
-    name: str
-    of: str
-    horizon: Fraction | None
-    initial: Mapping[str, Fraction | str]
-    inputs: Mapping[str, Stimulus]
-    every: Fraction
-    span: Span
-    seed: int = 0
-    signals: tuple[str, ...] = ()
-    recording: RecordingUse | None = None
-    pages: tuple[Page, ...] = ()
-
-
-@dataclass(frozen=True)
-class Column:
-    """One signal of a recording: its columns (mean of them), target, unit and form."""
-
-    name: str
-    columns: tuple[str, ...]
-    to: str | None
-    compare: str | None
-    unit: Unit
-    scale: tuple[Fraction, Dimension]
-    sign: int
-    delay: Fraction
-    blank: Literal["refuse", "skip"]
-    time: str | None
-    span: Span
-    hold: Literal["previous", "linear"] = "previous"
-
-
-@dataclass(frozen=True)
-class RecordingMap:
-    """How the columns of a recording become signals."""
-
-    name: str
-    time: str
-    time_unit: Unit
-    columns: Mapping[str, Column]
-    constants: Mapping[str, tuple[Fraction, Dimension]]
-    span: Span

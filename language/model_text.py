@@ -6,7 +6,8 @@ import dataclasses
 from collections.abc import Iterator, Mapping
 from fractions import Fraction
 
-from language.model import Automaton, Balance, Formula
+from language.declaration import Formula
+from language.model import Automaton, Balance
 from language.problem import Span
 from language.syntax import (
     Application,

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from language.declaration import Formula
 from language.document import Entry, Node, Table
-from language.model import Automaton, Formula, Observer, Run
+from language.model import Automaton, Observer, Run
 from language.problem import Span, nearest
 
 if TYPE_CHECKING:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
+from language.declaration import Parameter
 from language.document import Entry, Node, Scalar, Table
-from language.model import Page, Parameter, System
+from language.experiment import Page, System
 from language.problem import Problems, Source, Span, nearest
 from language.stimulus import StimulusReader
 

@@ -7,9 +7,9 @@ from collections.abc import Iterable, Iterator, Sequence
 from fractions import Fraction
 from typing import cast
 
+from language.declaration import Formula, Range
 from language.document import Entry, Items, Node, Scalar, Table
 from language.kind import LARGEST_WHOLE, TYPES, Type
-from language.model import Formula, Range
 from language.names import COMMA_HINT, check_name
 from language.parse import parse_expression
 from language.problem import Problems, Source, Span, nearest

@@ -13,6 +13,7 @@ from collections.abc import Mapping
 
 from language.constants import constant_value
 from language.covariance import Ahead, bounded, corrected, entry, pairs, spread
+from language.declaration import Formula
 from language.derived import with_model
 from language.evaluate import Scalar, evaluate
 from language.kalman import (
@@ -35,7 +36,7 @@ from language.matrix import (
     multiply,
     subtract as less,
 )
-from language.model import Automaton, Formula, Mode, Observer
+from language.model import Automaton, Mode, Observer
 from language.operation import (
     Assign,
     Block,

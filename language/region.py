@@ -9,7 +9,8 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator, Mapping
 
-from language.model import CHART, Automaton, Balance, Formula, Mode, Region, Transition
+from language.declaration import Formula
+from language.model import CHART, Automaton, Balance, Mode, Region, Transition
 from language.operation import Compare, Expr, Ref, whole
 
 

@@ -8,10 +8,10 @@ from fractions import Fraction
 from pathlib import Path
 
 from language.document import Document, Scalar, Table
+from language.experiment import RecordingMap, Scenario, System
 from language.inside import RECORDINGS, exists, require_inside
 from language.literal import constant
 from language.map import MAP_KEYS, column_dimension, map_of
-from language.model import RecordingMap, Scenario, System
 from language.page import read_pages
 from language.problem import Problems, Span, nearest
 from language.project import Project, expanded, read_document

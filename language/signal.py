@@ -11,7 +11,8 @@ from language.problem import Span
 from language.units import Dimension
 
 if TYPE_CHECKING:
-    from language.model import Formula, RecordingMap
+    from language.declaration import Formula
+    from language.experiment import RecordingMap
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,10 @@ import math
 from collections.abc import Sequence
 from fractions import Fraction
 
+from language.declaration import Formula
 from language.dimension import DimensionCheck, Scope
 from language.document import Entry, Node, Scalar, Table
-from language.model import Formula, SystemInput
+from language.experiment import SystemInput
 from language.problem import Span
 from language.reader import Reader
 from language.signal import Piece, Stimulus

@@ -8,9 +8,10 @@ from fractions import Fraction
 
 from language.connection import ConnectionReader
 from language.document import Document, Entry, Scalar
+from language.experiment import Connection, Instance, System, SystemInput
 from language.graph import chain, circle, topological
 from language.load import automaton_of
-from language.model import Automaton, Connection, Instance, System, SystemInput
+from language.model import Automaton
 from language.number import NumberType
 from language.problem import Problems, Span, nearest
 from language.project import Project, expanded, read_document

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from fractions import Fraction
 
+from language.declaration import Axis, LookupTable, Range
 from language.document import Entry, Scalar, Table
-from language.model import Axis, LookupTable, Range
 from language.problem import Span
 from language.reader import Reader
 from language.units import NO_UNIT, Unit, UnitError, fits, parse_unit

@@ -6,10 +6,11 @@ from collections.abc import Collection, Sequence
 from fractions import Fraction
 from typing import Literal, cast
 
+from language.declaration import Formula, Input, Limits, Range, State
 from language.document import Entry, Node, Scalar, Table
 from language.kind import Type
 from language.limit import OWN_FAULTS
-from language.model import Automaton, Formula, Input, Limits, Range, State
+from language.model import Automaton
 from language.problem import Problems, nearest
 from language.reader import Reader, about_of
 from language.syntax import Broken

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from fractions import Fraction
 
+from language.declaration import Formula
+from language.experiment import Connection, Scenario, System
 from language.lower import expression
-from language.model import Connection, Formula, Scenario, System
 from language.operation import Assign, Block, Ref
 from language.program import Program, Variable
 from language.syntax import names

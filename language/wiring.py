@@ -5,13 +5,14 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Iterator, Mapping
 
+from language.declaration import State
 from language.functions import FUNCTIONS_OF
 from language.graph import post_order
 from language.invariant import invariant_infos
 from language.kind import Enumeration, Whole
 from language.limit import started
 from language.lower import WHOLE_TYPES, assigned, typed
-from language.model import CHART, Automaton, Region, State
+from language.model import CHART, Automaton, Region
 from language.number import NumberType, rounded
 from language.operation import (
     Assign,

@@ -13,9 +13,10 @@ from dataclasses import dataclass
 
 from language.action import place_of
 from language.constants import parameter_constants, values_of
+from language.declaration import Range
 from language.evaluate import Scalar, evaluate
 from language.lower import constant_names, equations, expression, variable_names
-from language.model import Automaton, Mode, Range, Transition
+from language.model import Automaton, Mode, Transition
 from language.operation import Assign, Expr
 from language.problem import Problems
 from language.region import one_configuration

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from engine.starting import programs_of
 from engine.stimulus import resolved
 from engine.trajectory import Trajectory
-from language.model import Scenario, System
+from language.experiment import Scenario, System
 from language.program import Program
 from lockstep.compare import Verdict, not_compared
 

@@ -15,10 +15,11 @@ from engine.replay import Replay, replay as replay_recording, used_columns
 from engine.simulate import simulate as simulate_system
 from engine.trajectory import Trajectory
 from language.document import Document, Scalar
+from language.experiment import RecordingMap, Scenario, System
 from language.limit import require_ranges
 from language.load import automaton_of, command_line_value, program_of
 from language.map import read_map
-from language.model import Automaton, RecordingMap, Scenario, System
+from language.model import Automaton
 from language.number import NumberType
 from language.page import pages_of
 from language.problem import Problems, SpecError

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from engine.recording import Channel, Recording, read_recording
+from language.experiment import RecordingMap
 from language.map import read_map
-from language.model import RecordingMap
 from language.problem import SpecError, render_all
 from language.project import Project, read_document
 

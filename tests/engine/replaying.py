@@ -12,9 +12,10 @@ from engine.interpreter import Stepper
 from engine.recording import Recording, read_recording
 from engine.replay import Replay, replay, used_columns
 from engine.trajectory import Event
+from language.experiment import RecordingMap
 from language.load import automaton_of, program_of
 from language.map import read_map
-from language.model import Automaton, RecordingMap
+from language.model import Automaton
 from language.problem import Problems
 from language.program import Program
 from language.project import Project, layered, read_document

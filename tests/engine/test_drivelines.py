@@ -13,7 +13,7 @@ import modewright as mw
 from engine.library_stepper import Method
 from engine.reference import by_method
 from engine.simulate import simulate
-from language.model import Instance, Scenario, System
+from language.experiment import Instance, Scenario, System
 from modewright.api import load
 from tests.language.making import ROOT
 

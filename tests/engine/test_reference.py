@@ -19,8 +19,9 @@ from engine.reference import library_numbers, reference, with_library_numbers
 from engine.simulate import simulate
 from engine.starting import programs_of
 from engine.trajectory import Event, Trajectory
+from language.experiment import Scenario, System
 from language.load import program_of
-from language.model import Automaton, Scenario, System
+from language.model import Automaton
 from language.program import Program
 from language.project import Project, read_document
 from language.scenario import read_scenario

@@ -10,8 +10,9 @@ from hypothesis import given, strategies as st
 
 from engine.interpreter import Interpreter
 from language.constants import constant_value, exact_value, parameter_constants, values_of
+from language.declaration import Formula
 from language.lower import parameter_kinds, parameter_order
-from language.model import Automaton, Formula
+from language.model import Automaton
 from language.number import rounded
 from language.operation import Assign
 from language.problem import Problems

@@ -6,8 +6,8 @@ from fractions import Fraction
 
 import pytest
 
+from language.experiment import Column, RecordingMap
 from language.map import column_dimension, read_map
-from language.model import Column, RecordingMap
 from language.project import read_document
 from tests.language.making import SHIPPED, dimension, document, refusal, told
 

@@ -8,8 +8,9 @@ from fractions import Fraction
 import pytest
 from hypothesis import given, strategies as st
 
+from language.declaration import Formula
 from language.graph import chain
-from language.model import Formula, Mode
+from language.model import Mode
 from language.operation import Assign
 from language.order import equation_order, report_circle
 from language.problem import Problems

@@ -12,7 +12,7 @@ import pytest
 from engine.interpreter import Interpreter
 from engine.simulate import simulate
 from engine.trajectory import Trajectory
-from language.model import Instance, Scenario, System
+from language.experiment import Instance, Scenario, System
 from language.rk4 import TERMS
 from tests.language.making import NOWHERE, automaton, program, stepper
 

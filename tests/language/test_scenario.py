@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from hypothesis import given, strategies as st
 
+from language.experiment import Scenario, System
 from language.literal import constant
-from language.model import Scenario, System
 from language.project import read_document
 from language.scenario import MAX_HORIZON, read_scenario
 from language.system import read_system

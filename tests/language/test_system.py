@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from language.document import Scalar
-from language.model import System
+from language.experiment import System
 from language.system import read_system
 from tests.language.making import document, project_of, refusal, told
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from language.model import System
+from language.experiment import System
 from language.project import read_document
 from language.system import read_system
 from tests.language.making import SHIPPED, project_of, refusal, scalar

@@ -1,0 +1,156 @@
+"""Experiment: a checked system with its connections, a scenario for it, and maps of recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Literal
+
+from language.declaration import (
+    Formula,
+)
+from language.kind import Type
+from language.model import (
+    Automaton,
+)
+from language.problem import Span
+from language.signal import Line, RecordingUse, Sensor, Stimulus
+from language.syntax import names
+from language.units import Dimension, Unit
+
+
+@dataclass(frozen=True)
+class Instance:
+    """A named use of an automaton in a system."""
+
+    name: str
+    automaton: Automaton
+    offset: Fraction
+    key: str
+    span: Span
+
+
+@dataclass(frozen=True)
+class SystemInput:
+    """An input of a system."""
+
+    name: str
+    unit: Unit
+    default: Fraction | None
+    span: Span
+    type: Type = "real"
+    values: tuple[str, ...] = ()
+
+    @property
+    def truth(self) -> bool:
+        """Tell whether it is true or false."""
+        return self.type == "bool"
+
+
+@dataclass(frozen=True)
+class Connection:
+    """What an input of an instance reads: a signal by name, a constant (SI) or an expression.
+
+    Signals are inputs of the system, its sensors and lines, and outputs `instance.output`.
+    """
+
+    target: tuple[str, str]
+    source: str | Fraction | Formula
+    span: Span
+
+    @property
+    def reads(self) -> tuple[str, ...]:
+        """The signals that are read."""
+        if isinstance(self.source, Formula):
+            return tuple(dict.fromkeys(name.path for name in names(self.source.tree)))
+        return (self.source,) if isinstance(self.source, str) else ()
+
+
+@dataclass(frozen=True)
+class System:
+    """Instances, how they are connected; `order`: how they and sensors run.
+
+    `dimensions` are those of the outputs that are expressions with a real value.
+
+    `alone` is the name of the one instance where the system was made around an automaton.
+    """
+
+    name: str
+    inputs: Mapping[str, SystemInput]
+    instances: Mapping[str, Instance]
+    connections: Mapping[tuple[str, str], Connection]
+    outputs: Mapping[str, str | Formula]
+    order: tuple[str, ...]
+    span: Span
+    sensors: Mapping[str, Sensor] = field(default_factory=dict)
+    lines: Mapping[str, Line] = field(default_factory=dict)
+    dimensions: Mapping[str, Dimension] = field(default_factory=dict)
+    alone: str | None = None
+
+    @property
+    def signals(self) -> tuple[str, ...]:
+        """What can be recorded: inputs, outputs of instances, sensors, outputs of the system."""
+        parts = [
+            f"{i.name}.{name}" for i in self.instances.values() for name in i.automaton.outputs
+        ]
+        return tuple(dict.fromkeys([*self.inputs, *parts, *self.sensors, *self.outputs]))
+
+
+@dataclass(frozen=True)
+class Page:
+    """A calibration from a time on: values [SI] of tunable parameters by instance and name."""
+
+    time: Fraction
+    values: Mapping[tuple[str, str], Fraction]
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """Inputs, initial values, horizon of a system and what is recorded of it.
+
+    `horizon` is None where it is that of the recording; an initial value given as a text is the
+    first value of that column; `signals` is empty where everything is recorded.
+    """
+
+    name: str
+    of: str
+    horizon: Fraction | None
+    initial: Mapping[str, Fraction | str]
+    inputs: Mapping[str, Stimulus]
+    every: Fraction
+    span: Span
+    seed: int = 0
+    signals: tuple[str, ...] = ()
+    recording: RecordingUse | None = None
+    pages: tuple[Page, ...] = ()
+
+
+@dataclass(frozen=True)
+class Column:
+    """One signal of a recording: its columns (mean of them), target, unit and form."""
+
+    name: str
+    columns: tuple[str, ...]
+    to: str | None
+    compare: str | None
+    unit: Unit
+    scale: tuple[Fraction, Dimension]
+    sign: int
+    delay: Fraction
+    blank: Literal["refuse", "skip"]
+    time: str | None
+    span: Span
+    hold: Literal["previous", "linear"] = "previous"
+
+
+@dataclass(frozen=True)
+class RecordingMap:
+    """How the columns of a recording become signals."""
+
+    name: str
+    time: str
+    time_unit: Unit
+    columns: Mapping[str, Column]
+    constants: Mapping[str, tuple[Fraction, Dimension]]
+    span: Span
