@@ -111,10 +111,10 @@ parameters:
   piece: {value: 2}
   elapsed: {value: 3, tunable: true}
   page: {value: 4}
-  constant: {value: 1}
+  settle: {value: 1}
 inputs: {is_new: {unit: "1"}, values: {unit: "1"}}
 states: {state: {unit: "1", initial: 0}, equation: {unit: "1", initial: 1}}
-equations: {started: is_new * piece * elapsed * page * constant, fired: values, record: values + 1}
+equations: {started: is_new * piece * elapsed * page * settle, fired: values, record: values + 1}
 modes: {only: {update: {state: state + 1, equation: state}}}
 outputs: [started, fired, state, equation, record]
 """,
