@@ -14,7 +14,8 @@ from pathlib import Path
 
 from codegen.cache import key_of, stored
 from codegen.names import REAL, CNames, c_member, c_type
-from codegen.source import c_files, render, stepped
+from codegen.rendering import render
+from codegen.source import c_files, stepped
 from language.missing import ToolMissing as ToolMissing
 from language.program import Constant, Program, Variable
 

@@ -5,13 +5,11 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from importlib import metadata, resources
 from typing import Any
 
-import jinja2
-
 from codegen.comment import comment as safe
-from codegen.expression import SUFFIX, c_expression, literal
+from codegen.expression import SUFFIX, literal
+from codegen.mathematics import math_files
 from codegen.names import (
     REAL,
     CNames,
@@ -22,42 +20,26 @@ from codegen.names import (
     run_mode_constant,
     value_constant,
 )
-from codegen.statement import Writer, wrapped
+from codegen.rendering import render, version
+from codegen.statement import Writer
 from codegen.usage import Usage, locals_of, usages
 from language.functions import FUNCTIONS_OF
 from language.invariant import GROUP, INVARIANTS
 from language.number import NumberType, decimal
-from language.operation import Assign, Run
+from language.operation import Run
 from language.printing import digest
 from language.program import (
     Constant,
-    Function,
     Program,
     Variable,
-    short,
 )
-from language.wiring import finished, reads, walk
+from language.traversal import reads, walk
+from language.wiring import finished
 
 GROUPS = ("state", "discrete", "latched", "equation", "before", "innovation", "timer")
 """Nested structs of the instance, in order."""
 ENTRIES = ("init", "derive", "step")
 INLINE = ("min", "max", "clip", "sign", "pow2", "whole", "lookup", "lookup2")
-
-
-@dataclass(frozen=True)
-class Layout:
-    """How IEEE 754 keeps a real: `bits` in all, `digits` after the point, exponents of 2."""
-
-    bits: int
-    digits: int
-    lowest: int
-    highest: int
-
-
-LAYOUT: Mapping[NumberType, Layout] = {
-    "float64": Layout(64, 52, -1022, 1023),
-    "float32": Layout(32, 23, -126, 127),
-}
 
 
 @dataclass(frozen=True)
@@ -95,45 +77,6 @@ def stepped(program: Program) -> Program:
     blocks = {name: block for name, block in program.blocks.items() if name != INVARIANTS}
     variables = tuple(v for v in program.variables if not v.name.startswith(GROUP))
     return dataclasses.replace(program, blocks=blocks, variables=variables)
-
-
-def math_files(number: NumberType) -> dict[str, str]:
-    """Return ha_math (ha_mathf for float32): functions without a library's bits (rule R6)."""
-    suffix = SUFFIX[number]
-    context = {
-        "functions": [_function(function, number) for function in FUNCTIONS_OF[number].values()],
-        "version": version(),
-        "real": REAL[number],
-        "suffix": suffix,
-        "zero": literal(0.0, number),
-        "one": literal(1.0, number),
-        "layout": LAYOUT[number],
-        "lowest": literal(float(LAYOUT[number].lowest), number),
-        "highest": literal(float(LAYOUT[number].highest), number),
-    }
-    return {
-        f"ha_math{suffix}.h": render("ha_math.h.jinja", context),
-        f"ha_math{suffix}.c": render("ha_math.c.jinja", context),
-    }
-
-
-def render(template: str, context: Mapping[str, Any]) -> str:
-    """Return a template filled in; a hole without a value is an error."""
-    folder = resources.files("codegen").joinpath("templates")
-    environment = jinja2.Environment(
-        loader=jinja2.FunctionLoader(lambda name: folder.joinpath(name).read_text("utf-8")),
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-        autoescape=False,
-    )
-    return environment.get_template(template).render(context)
-
-
-def version() -> str:
-    """Return the version of the product."""
-    return metadata.version("modewright")
 
 
 def _context(program: Program) -> dict[str, Any]:
@@ -301,28 +244,3 @@ def _callees_first(program: Program) -> list[str]:
 
 def _runs(program: Program, name: str) -> list[str]:
     return [op.block for op in walk(program.blocks[name]) if isinstance(op, Run)]
-
-
-@dataclass(frozen=True)
-class _FunctionNames:
-    """Inside a function of ha_math every variable is a local."""
-
-    number: NumberType
-
-    def __call__(self, name: str) -> str:
-        return short(name)
-
-    def whole(self, name: str, number: int) -> str:
-        return str(number)
-
-
-def _function(function: Function, number: NumberType) -> dict[str, Any]:
-    place = _FunctionNames(number)
-    lines: list[str] = []
-    for op in function.body:
-        assert isinstance(op, Assign)
-        left = "return " if op.target == "work.y" else f"const {REAL[number]} {place(op.target)} = "
-        lines += wrapped(left, c_expression(op.value, place), "")
-    parameters = ", ".join(f"{REAL[number]} {name}" for name in function.parameters)
-    about = function.about
-    return {"name": function.name, "parameters": parameters, "about": about, "lines": lines}

@@ -17,7 +17,7 @@ from language.operation import (
     Store,
 )
 from language.program import Program
-from language.wiring import expr_names, walk
+from language.traversal import expr_names, walk
 
 GROUP_OF = {
     "input": "in",

@@ -10,13 +10,7 @@ from collections.abc import Iterable, Mapping
 
 from language.declaration import Formula
 from language.limit import stored
-from language.lower import (
-    WHOLE_TYPES,
-    Names,
-    assigned,
-    equations,
-    reads_of,
-)
+from language.lower import WHOLE_TYPES, Names, assigned, equations, reads_of
 from language.model import Automaton, Mode
 from language.operation import Assign, Block, Op, Ref
 from language.program import Variable, value_type

@@ -16,10 +16,10 @@ from language.dimension import DimensionCheck, Scope
 from language.experiment import SystemInput
 from language.guards import report_overlaps
 from language.kind import Enumeration, Kind, Whole
-from language.lower import parameter_kinds
 from language.model import Automaton, Mode, Region, Transition
 from language.names import report_case_twins
 from language.order import equation_order, report_circle, unreached
+from language.parameter import parameter_kinds
 from language.problem import Problems, Span, SpecError, nearest
 from language.region import sources, with_regions
 from language.syntax import KEPT, MEMORY, Broken, Tree, names, whole_literal

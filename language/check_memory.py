@@ -6,9 +6,9 @@ from fractions import Fraction
 
 from language.constants import exact_value
 from language.declaration import Formula
-from language.lower import parameter_kinds
 from language.memory import MAX_DELAY, applications, formulas, type_of
 from language.model import Automaton, Transition
+from language.parameter import parameter_kinds
 from language.problem import Problems
 from language.region import equation_names
 from language.syntax import EDGES, KEPT, Application, Tree, names, walk

@@ -9,17 +9,11 @@ from typing import Any
 
 from language.declaration import Formula
 from language.evaluate import Scalar, evaluate
-from language.lower import (
-    assigned,
-    constant_names,
-    constant_of,
-    owner,
-    parameter_kinds,
-    parameter_order,
-)
+from language.lower import assigned
 from language.model import Automaton
 from language.number import rounded
 from language.operation import Assign, Block
+from language.parameter import constant_names, constant_of, owner, parameter_kinds, parameter_order
 from language.problem import Problems, SpecError
 from language.program import Constant
 from language.syntax import Arithmetic, Name, Negative, Number, Power, Tree

@@ -42,7 +42,7 @@ from language.history import (
 from language.integration import method_of
 from language.invariant import INVARIANTS, invariant_block, invariant_variables
 from language.linear import Point
-from language.lower import constant_names, equation_names, equations, variable_names
+from language.lower import equation_names, equations, variable_names
 from language.model import Automaton, Mode, Transition
 from language.motion import FLOW_HALVINGS, motion_blocks, motion_variables
 from language.operation import (
@@ -61,6 +61,7 @@ from language.operation import (
     whole,
 )
 from language.parallel import Selection, parallel_blocks, parallel_step
+from language.parameter import constant_names
 from language.problem import Problems
 from language.program import Program, TransitionInfo, Variable
 from language.region import fired_variable, in_modes, slots

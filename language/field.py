@@ -7,15 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from language.action import action_variables, committing, place_of, reading, stage
-from language.lower import (
-    Names,
-    choice,
-    equation_names,
-    equations,
-    expression,
-    rate,
-    reads_of,
-)
+from language.lower import Names, choice, equation_names, equations, expression, rate, reads_of
 from language.model import Automaton, Balance, Mode, Transition
 from language.operation import (
     Assign,

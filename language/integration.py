@@ -14,12 +14,12 @@ from language.exact import exact
 from language.exponential import Solved, exponential
 from language.field import Field
 from language.linear import Point
-from language.lower import tunables_of
 from language.midpoint import midpoint
 from language.model import Automaton
 from language.motion import Method
 from language.number import rounded
 from language.operation import Assign, Block
+from language.parameter import tunables_of
 from language.problem import Problems, Span
 from language.program import MotionInfo, MotionLimit
 from language.rk4 import rk4

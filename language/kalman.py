@@ -16,7 +16,7 @@ from language.declaration import Formula
 from language.derived import with_model
 from language.evaluate import Scalar
 from language.limit import stored
-from language.lower import Names, expression, tunables_of
+from language.lower import Names, expression
 from language.matrix import Matrix, exponential, exponential_integral, multiply
 from language.model import Automaton, Mode, Observer
 from language.operation import (
@@ -33,6 +33,7 @@ from language.operation import (
     subtract,
     total,
 )
+from language.parameter import tunables_of
 from language.problem import Problems
 from language.program import Constant, ObserverInfo, Variable
 from language.riccati import discrete_noise, steady_gain

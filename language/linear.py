@@ -9,9 +9,10 @@ from functools import reduce
 from language.balance import coefficient_of
 from language.derivative import SMOOTH, At, derivative, refused, taken
 from language.evaluate import Scalar, evaluate
-from language.lower import constant_names, expression
+from language.lower import expression
 from language.model import Automaton, Mode
 from language.order import equation_order
+from language.parameter import constant_names
 from language.problem import SpecError
 from language.simplify import is_zero, minus, negative, number, over, plus, replaced, times
 from language.syntax import Application, Arithmetic, Name, Negative, Power, Tree, names

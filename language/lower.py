@@ -7,11 +7,8 @@ from typing import Literal
 
 from language.balance import coefficient_of
 from language.declaration import Formula
-from language.graph import post_order
-from language.kind import Type
 from language.limit import is_limited
 from language.model import Automaton, Balance, Mode, Region
-from language.number import rounded
 from language.operation import (
     Assign,
     Binary,
@@ -32,7 +29,6 @@ from language.operation import (
 )
 from language.order import equation_order
 from language.problem import SpecError
-from language.program import Constant, value_type
 from language.region import region_of_equation, sources
 from language.syntax import (
     MEMORY,
@@ -53,7 +49,6 @@ from language.syntax import (
     names,
     whole_literal,
 )
-from language.units import Unit
 
 WHOLE_TYPES = ("int", "enum")
 Names = Mapping[str, Expr]
@@ -255,102 +250,3 @@ def closure(mode: Mode, wanted: Iterable[str]) -> set[str]:
 def reads_of(trees: Iterable[Tree]) -> list[str]:
     """Return the names read in some trees."""
     return [read.path for tree in trees for read in names(tree)]
-
-
-def constant_names(automaton: Automaton) -> dict[str, Expr]:
-    """Return the parameters, and the names of enumerations, as what a Program reads."""
-    groups = {"fixed": "constant", "tunable": "calibration", "derived": "derived"}
-    found: dict[str, Expr] = {name: Value(n) for name, n in automaton.literals.items()}
-    for name, kind in parameter_kinds(automaton).items():
-        is_whole = automaton.parameters[name].type in WHOLE_TYPES
-        found[name] = Ref(f"{groups[kind]}.{name}", is_whole)
-    for name, parameter in automaton.parameters.items():
-        for k, axis in enumerate(parameter.table.axes if parameter.table else (), start=1):
-            found[f"{name} axis {k}"] = Ref(f"axis.{name}_{k}")
-            found[f"{name} size {k}"] = Value(len(axis.points))
-    return found
-
-
-def parameter_kinds(automaton: Automaton) -> dict[str, str]:
-    """Return each parameter's kind: what is derived from fixed values alone is fixed."""
-    kinds: dict[str, str] = {}
-    for name in parameter_order(automaton):
-        parameter = automaton.parameters[name]
-        kinds[name] = parameter.kind
-        if parameter.derived:
-            reads = {kinds.get(read, "derived") for read in parameter.derived.reads}
-            kinds[name] = "fixed" if reads <= {"fixed"} else "derived"
-    return {name: kinds[name] for name in automaton.parameters}
-
-
-def parameter_order(automaton: Automaton) -> list[str]:
-    """Return the parameters so that each comes after those that it is derived from."""
-    parameters = automaton.parameters.items()
-    return post_order({name: p.derived.reads if p.derived else () for name, p in parameters})
-
-
-def tunables_of(automaton: Automaton, formulas: Iterable[Formula]) -> tuple[str, ...]:
-    """Return the tunable parameters that some formulas read, directly or through derived ones."""
-    found: dict[str, None] = {}
-    stack = reads_of(formula.tree for formula in formulas)
-    seen: set[str] = set()
-    while stack:
-        name = stack.pop()
-        parameter = automaton.parameters.get(name)
-        if parameter is None or name in seen:
-            continue
-        seen.add(name)
-        if parameter.kind == "tunable":
-            found[name] = None
-        if parameter.derived:
-            stack.extend(parameter.derived.reads)
-    return tuple(sorted(found))
-
-
-def constant_of(automaton: Automaton, name: str, kind: str, value: float) -> Constant:
-    """Return the Program's constant for a parameter."""
-    parameter = automaton.parameters[name]
-    groups = {"fixed": "constant", "tunable": "calibration", "derived": "derived"}
-    limits = parameter.range
-    return Constant(
-        name=f"{groups[kind]}.{name}",
-        kind=kind,  # type: ignore[arg-type]
-        value=typed(value, parameter.type),
-        unit=si_text(automaton, name),
-        key=f"{owner(automaton, name)} {parameter.key}",
-        range=(rounded(limits[0]), rounded(limits[1])) if limits else None,
-        type=value_type(parameter.type),
-        values=parameter.values,
-        items=tuple(rounded(item) for item in parameter.table.values) if parameter.table else (),
-        about=parameter.about,
-    )
-
-
-def typed(value: float, kind: Type) -> float | int | bool:
-    """Return a number as a value of a type."""
-    if kind == "real":
-        return value
-    return bool(value) if kind == "bool" else int(value)
-
-
-def owner(automaton: Automaton, name: str) -> str:
-    """Return the automaton that declares a parameter: the model, or this one."""
-    model = automaton.model
-    return model.name if model and name in model.parameters else automaton.name
-
-
-def si_text(automaton: Automaton, name: str) -> str:
-    """Return the SI unit of a name, for comments: the unit as written where it is SI."""
-    unit = _unit_of(automaton, name)
-    if unit and unit.factor == 1 and not unit.offset:
-        return unit.text
-    dimension = unit.dimension if unit else automaton.dimensions.get(name)
-    return str(dimension) if dimension else "1"
-
-
-def _unit_of(automaton: Automaton, name: str) -> Unit | None:
-    if name in automaton.parameters:
-        return automaton.parameters[name].unit
-    if name in automaton.inputs:
-        return automaton.inputs[name].unit
-    return automaton.carried[name].unit if name in automaton.carried else None

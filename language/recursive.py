@@ -27,7 +27,7 @@ from language.kalman import (
     rest_constants,
     solved_formulas,
 )
-from language.lower import Names, constant_names, expression, tunables_of
+from language.lower import Names, expression
 from language.matrix import (
     Matrix,
     exponential,
@@ -50,6 +50,7 @@ from language.operation import (
     subtract,
     total,
 )
+from language.parameter import constant_names, tunables_of
 from language.problem import Problems
 from language.program import Constant, ObserverInfo
 from language.riccati import discrete_noise, steady_gain

@@ -23,7 +23,7 @@ from language.integration import method_of
 from language.limit import kept
 from language.linear import Point
 from language.linearised import linearised
-from language.lower import constant_names, typed, variable_names
+from language.lower import variable_names
 from language.model import CHART, Automaton, Mode, Run as ModelRun
 from language.motion import RUN_HALVINGS, merge_time, motion_blocks, motion_variables
 from language.number import rounded
@@ -44,6 +44,7 @@ from language.operation import (
     whole,
 )
 from language.parallel import Selection, parallel_blocks, parallel_step
+from language.parameter import constant_names, typed
 from language.problem import Problems
 from language.program import Constant, MotionInfo, Variable
 from language.region import mode_variable

@@ -28,7 +28,7 @@ from language.limit import (
     limit_variables,
     limited_things,
 )
-from language.lower import constant_names, equation_names, equations, variable_names
+from language.lower import equation_names, equations, variable_names
 from language.memory import delays_of, keep_block, memory_variables, with_delays
 from language.model import CHART, Automaton, Mode, Region
 from language.operation import (
@@ -47,6 +47,7 @@ from language.operation import (
     real,
     whole,
 )
+from language.parameter import constant_names
 from language.problem import Problems
 from language.program import (
     Constant,
@@ -59,6 +60,7 @@ from language.recursive import recursive
 from language.region import fired_variable, in_modes, mode_variable
 from language.run import EVENT_LIMIT, run_block, run_motion, start_regions
 from language.transition import enter_run, sampled_commit, sampled_jump, transition_infos
+from language.traversal import walk
 from language.wiring import (
     assembled,
     enter_initial,
@@ -68,7 +70,6 @@ from language.wiring import (
     mode_and_fired,
     none_fired,
     state_variables,
-    walk,
 )
 
 STALE_CALIBRATION = "stale_calibration"

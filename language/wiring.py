@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 
 from language.declaration import State
 from language.functions import FUNCTIONS_OF
@@ -11,29 +11,18 @@ from language.graph import post_order
 from language.invariant import invariant_infos
 from language.kind import Enumeration, Whole
 from language.limit import started
-from language.lower import WHOLE_TYPES, assigned, typed
+from language.lower import WHOLE_TYPES, assigned
 from language.model import CHART, Automaton, Region
 from language.number import NumberType, rounded
 from language.operation import (
     Assign,
-    Binary,
     Block,
-    Branch,
-    Call,
-    Choose,
-    Compare,
-    Count,
     Expr,
-    Item,
-    Loop,
     Op,
-    Ref,
     Run,
-    Select,
-    Store,
-    Unary,
     whole,
 )
+from language.parameter import typed
 from language.program import (
     Constant,
     Function,
@@ -47,6 +36,7 @@ from language.program import (
     value_type,
 )
 from language.region import fired_variable, mode_variable
+from language.traversal import block_names, walk
 from language.units import Dimension
 from language.working import in_working_type
 
@@ -210,7 +200,7 @@ def mode_infos(region: Region) -> tuple[ModeInfo, ...]:
 def finished(program: Program, entries: tuple[str, ...], keep: tuple[str, ...] = ()) -> Program:
     """Return the program with only what its entries use, and the variables to keep anyway."""
     blocks = _reached(program.blocks, entries)
-    used = {name for block in blocks.values() for name in _names(block)}
+    used = {name for block in blocks.values() for name in block_names(block)}
     used |= {*keep, *(wire.source for wire in program.outputs)}
     constants = [c for c in program.constants if c.name in used]
     while True:
@@ -234,28 +224,13 @@ def finished(program: Program, entries: tuple[str, ...], keep: tuple[str, ...] =
     )
 
 
-def walk(block: Block) -> Iterator[Op]:
-    """Yield every operation of a block, those inside others too."""
-    for op in block:
-        yield op
-        match op:
-            case Branch(_, then, other):
-                yield from walk(then)
-                yield from walk(other)
-            case Choose(_, cases):
-                for _, case_block in cases:
-                    yield from walk(case_block)
-            case Loop(_, _, body):
-                yield from walk(body)
-
-
 def _without_idle_before(
     program: Program, variables: list[Variable], blocks: dict[str, Block]
 ) -> list[Variable]:
     """Leave out the memory of inputs that nobody reads."""
     if "remember" not in blocks:
         return variables
-    reading = {n for name, b in blocks.items() if name != "remember" for n in _names(b)}
+    reading = {n for name, b in blocks.items() if name != "remember" for n in block_names(b)}
     kept = tuple(op for op in blocks["remember"] if isinstance(op, Assign) and op.target in reading)
     blocks["remember"] = kept
     targets = {op.target for op in kept}
@@ -281,56 +256,5 @@ def _functions(used: set[str], number: NumberType) -> tuple[Function, ...]:
         name = stack.pop()
         if name in known and name not in found:
             found.add(name)
-            stack += [called.removeprefix("call ") for called in _names(known[name].body)]
+            stack += [called.removeprefix("call ") for called in block_names(known[name].body)]
     return tuple(function for name, function in known.items() if name in found)
-
-
-def _names(block: Block) -> Iterator[str]:
-    """Yield the variables and constants that a block reads or writes, and `call <function>`."""
-    for op in walk(block):
-        match op:
-            case Assign(target, value, _):
-                yield target
-                yield from expr_names(value)
-            case Store(array, index, value):
-                yield array
-                yield from expr_names(index)
-                yield from expr_names(value)
-            case Branch(condition, _, _):
-                yield from expr_names(condition)
-            case Choose(selector, _):
-                yield selector
-            case Loop(_, index, _):
-                yield index
-            case Count(timer, condition, _, _):
-                yield timer
-                yield from expr_names(condition)
-            case _:
-                yield "memory.faults"
-
-
-def expr_names(expr: Expr) -> Iterator[str]:
-    """Yield the variables and constants that an expression reads, and `call <function>`."""
-    match expr:
-        case Ref(name):
-            yield name
-        case Item(name, index):
-            yield name
-            yield from expr_names(index)
-        case Unary(_, operand):
-            yield from expr_names(operand)
-        case Binary(_, left, right) | Compare(_, left, right):
-            yield from expr_names(left)
-            yield from expr_names(right)
-        case Select(condition, then, other):
-            for part in (condition, then, other):
-                yield from expr_names(part)
-        case Call(function, arguments):
-            yield f"call {function}"
-            for argument in arguments:
-                yield from expr_names(argument)
-
-
-def reads(blocks: Iterable[Block]) -> set[str]:
-    """Return every name that some blocks read or write."""
-    return {name for block in blocks for name in _names(block)}

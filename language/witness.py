@@ -15,13 +15,14 @@ from language.action import place_of
 from language.constants import parameter_constants, values_of
 from language.declaration import Range
 from language.evaluate import Scalar, evaluate
-from language.lower import constant_names, equations, expression, variable_names
+from language.lower import equations, expression, variable_names
 from language.model import Automaton, Mode, Transition
 from language.operation import Assign, Expr
+from language.parameter import constant_names
 from language.problem import Problems
 from language.region import one_configuration
 from language.syntax import Name, Relation, Tree, names, walk
-from language.wiring import expr_names
+from language.traversal import expr_names
 
 SAMPLES = 64
 """Points of the search; a guard of one or two linear relations is met within a few."""

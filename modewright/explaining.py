@@ -10,9 +10,9 @@ from typing import Any, Literal
 from language.calibration import read_calibration
 from language.document import Document
 from language.load import automaton_of, command_line_value, program_of
-from language.lower import parameter_kinds
 from language.model_text import model_text
 from language.numbers_text import numbers_text
+from language.parameter import parameter_kinds
 from language.printing import program_text
 from language.problem import Problems, SpecError
 from language.project import Project, expanded, read_document, with_calibrations

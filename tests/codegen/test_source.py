@@ -11,13 +11,15 @@ from pathlib import Path
 import pytest
 
 import modewright as mw
+from codegen.mathematics import math_files
 from codegen.names import CNames
-from codegen.source import c_files, math_files, version
+from codegen.rendering import version
+from codegen.source import c_files
 from language.load import program_of
 from language.operation import Assign
 from language.printing import digest
 from language.program import Program
-from language.wiring import walk
+from language.traversal import walk
 from modewright.api import load, program
 
 GOLDEN = Path(__file__).parent / "golden"

@@ -11,7 +11,7 @@ from language.affine import jacobian
 from language.constants import parameter_constants, values_of
 from language.continuous import continuous_program
 from language.field import Field, field_blocks
-from language.lower import constant_names, expression
+from language.lower import expression
 from language.matrix import Matrix
 from language.model import Automaton
 from language.operation import (
@@ -22,6 +22,7 @@ from language.operation import (
     Select,
     Value,
 )
+from language.parameter import constant_names
 from language.problem import Problems
 from tests.language.making import automaton, shipped, tree
 

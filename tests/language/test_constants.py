@@ -11,10 +11,10 @@ from hypothesis import given, strategies as st
 from engine.interpreter import Interpreter
 from language.constants import constant_value, exact_value, parameter_constants, values_of
 from language.declaration import Formula
-from language.lower import parameter_kinds, parameter_order
 from language.model import Automaton
 from language.number import rounded
 from language.operation import Assign
+from language.parameter import parameter_kinds, parameter_order
 from language.problem import Problems
 from language.program import Program, TransitionInfo
 from language.transition import MAX_TICKS

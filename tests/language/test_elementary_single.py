@@ -14,7 +14,7 @@ from language.evaluate import apply
 from language.functions import FUNCTIONS, FUNCTIONS_OF
 from language.number import single
 from language.operation import Assign, Value
-from language.wiring import walk
+from language.traversal import walk
 
 POINTS = 3000
 SINGLES = FUNCTIONS_OF["float32"]

@@ -27,7 +27,8 @@ from language.operation import (
     real,
 )
 from language.program import Program
-from language.wiring import expr_names, finished, reads, walk
+from language.traversal import expr_names, reads, walk
+from language.wiring import finished
 from tests.language.making import program, shipped, stepper
 
 TEXT = """language: 1

@@ -12,7 +12,7 @@ from language.number import NUMBERS
 from language.operation import Assign, Expr, Op
 from language.printing import expr_text
 from language.program import Program
-from language.wiring import reads, walk
+from language.traversal import reads, walk
 from lockstep.compare import compare
 from tests.lockstep.programs import Tick, programs, taped, ticks
 

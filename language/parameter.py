@@ -1,0 +1,118 @@
+"""Parameter: what a Program reads of parameters - groups, kinds, order, tunables, units."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from language.declaration import Formula
+from language.graph import post_order
+from language.kind import Type
+from language.lower import WHOLE_TYPES, reads_of
+from language.model import Automaton
+from language.number import rounded
+from language.operation import (
+    Expr,
+    Ref,
+    Value,
+)
+from language.program import Constant, value_type
+from language.units import Unit
+
+
+def constant_names(automaton: Automaton) -> dict[str, Expr]:
+    """Return the parameters, and the names of enumerations, as what a Program reads."""
+    groups = {"fixed": "constant", "tunable": "calibration", "derived": "derived"}
+    found: dict[str, Expr] = {name: Value(n) for name, n in automaton.literals.items()}
+    for name, kind in parameter_kinds(automaton).items():
+        is_whole = automaton.parameters[name].type in WHOLE_TYPES
+        found[name] = Ref(f"{groups[kind]}.{name}", is_whole)
+    for name, parameter in automaton.parameters.items():
+        for k, axis in enumerate(parameter.table.axes if parameter.table else (), start=1):
+            found[f"{name} axis {k}"] = Ref(f"axis.{name}_{k}")
+            found[f"{name} size {k}"] = Value(len(axis.points))
+    return found
+
+
+def parameter_kinds(automaton: Automaton) -> dict[str, str]:
+    """Return each parameter's kind: what is derived from fixed values alone is fixed."""
+    kinds: dict[str, str] = {}
+    for name in parameter_order(automaton):
+        parameter = automaton.parameters[name]
+        kinds[name] = parameter.kind
+        if parameter.derived:
+            reads = {kinds.get(read, "derived") for read in parameter.derived.reads}
+            kinds[name] = "fixed" if reads <= {"fixed"} else "derived"
+    return {name: kinds[name] for name in automaton.parameters}
+
+
+def parameter_order(automaton: Automaton) -> list[str]:
+    """Return the parameters so that each comes after those that it is derived from."""
+    parameters = automaton.parameters.items()
+    return post_order({name: p.derived.reads if p.derived else () for name, p in parameters})
+
+
+def tunables_of(automaton: Automaton, formulas: Iterable[Formula]) -> tuple[str, ...]:
+    """Return the tunable parameters that some formulas read, directly or through derived ones."""
+    found: dict[str, None] = {}
+    stack = reads_of(formula.tree for formula in formulas)
+    seen: set[str] = set()
+    while stack:
+        name = stack.pop()
+        parameter = automaton.parameters.get(name)
+        if parameter is None or name in seen:
+            continue
+        seen.add(name)
+        if parameter.kind == "tunable":
+            found[name] = None
+        if parameter.derived:
+            stack.extend(parameter.derived.reads)
+    return tuple(sorted(found))
+
+
+def constant_of(automaton: Automaton, name: str, kind: str, value: float) -> Constant:
+    """Return the Program's constant for a parameter."""
+    parameter = automaton.parameters[name]
+    groups = {"fixed": "constant", "tunable": "calibration", "derived": "derived"}
+    limits = parameter.range
+    return Constant(
+        name=f"{groups[kind]}.{name}",
+        kind=kind,  # type: ignore[arg-type]
+        value=typed(value, parameter.type),
+        unit=si_text(automaton, name),
+        key=f"{owner(automaton, name)} {parameter.key}",
+        range=(rounded(limits[0]), rounded(limits[1])) if limits else None,
+        type=value_type(parameter.type),
+        values=parameter.values,
+        items=tuple(rounded(item) for item in parameter.table.values) if parameter.table else (),
+        about=parameter.about,
+    )
+
+
+def typed(value: float, kind: Type) -> float | int | bool:
+    """Return a number as a value of a type."""
+    if kind == "real":
+        return value
+    return bool(value) if kind == "bool" else int(value)
+
+
+def owner(automaton: Automaton, name: str) -> str:
+    """Return the automaton that declares a parameter: the model, or this one."""
+    model = automaton.model
+    return model.name if model and name in model.parameters else automaton.name
+
+
+def si_text(automaton: Automaton, name: str) -> str:
+    """Return the SI unit of a name, for comments: the unit as written where it is SI."""
+    unit = _unit_of(automaton, name)
+    if unit and unit.factor == 1 and not unit.offset:
+        return unit.text
+    dimension = unit.dimension if unit else automaton.dimensions.get(name)
+    return str(dimension) if dimension else "1"
+
+
+def _unit_of(automaton: Automaton, name: str) -> Unit | None:
+    if name in automaton.parameters:
+        return automaton.parameters[name].unit
+    if name in automaton.inputs:
+        return automaton.inputs[name].unit
+    return automaton.carried[name].unit if name in automaton.carried else None

@@ -1,0 +1,90 @@
+"""Traversal: every operation of a block, and the names that blocks read and write."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from language.operation import (
+    Assign,
+    Binary,
+    Block,
+    Branch,
+    Call,
+    Choose,
+    Compare,
+    Count,
+    Expr,
+    Item,
+    Loop,
+    Op,
+    Ref,
+    Select,
+    Store,
+    Unary,
+)
+
+
+def walk(block: Block) -> Iterator[Op]:
+    """Yield every operation of a block, those inside others too."""
+    for op in block:
+        yield op
+        match op:
+            case Branch(_, then, other):
+                yield from walk(then)
+                yield from walk(other)
+            case Choose(_, cases):
+                for _, case_block in cases:
+                    yield from walk(case_block)
+            case Loop(_, _, body):
+                yield from walk(body)
+
+
+def block_names(block: Block) -> Iterator[str]:
+    """Yield the variables and constants that a block reads or writes, and `call <function>`."""
+    for op in walk(block):
+        match op:
+            case Assign(target, value, _):
+                yield target
+                yield from expr_names(value)
+            case Store(array, index, value):
+                yield array
+                yield from expr_names(index)
+                yield from expr_names(value)
+            case Branch(condition, _, _):
+                yield from expr_names(condition)
+            case Choose(selector, _):
+                yield selector
+            case Loop(_, index, _):
+                yield index
+            case Count(timer, condition, _, _):
+                yield timer
+                yield from expr_names(condition)
+            case _:
+                yield "memory.faults"
+
+
+def expr_names(expr: Expr) -> Iterator[str]:
+    """Yield the variables and constants that an expression reads, and `call <function>`."""
+    match expr:
+        case Ref(name):
+            yield name
+        case Item(name, index):
+            yield name
+            yield from expr_names(index)
+        case Unary(_, operand):
+            yield from expr_names(operand)
+        case Binary(_, left, right) | Compare(_, left, right):
+            yield from expr_names(left)
+            yield from expr_names(right)
+        case Select(condition, then, other):
+            for part in (condition, then, other):
+                yield from expr_names(part)
+        case Call(function, arguments):
+            yield f"call {function}"
+            for argument in arguments:
+                yield from expr_names(argument)
+
+
+def reads(blocks: Iterable[Block]) -> set[str]:
+    """Return every name that some blocks read or write."""
+    return {name for block in blocks for name in block_names(block)}
