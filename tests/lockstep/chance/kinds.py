@@ -1,9 +1,10 @@
-"""Kinds: which random specs there are - sampled automata of several flavours."""
+"""Kinds: which random specs there are - sampled automata of several flavours, continuous ones."""
 
 from __future__ import annotations
 
 from random import Random
 
+from tests.lockstep.chance.flowing import flowing
 from tests.lockstep.chance.sampled import sampled
 from tests.lockstep.chance.spec import Spec
 
@@ -14,5 +15,5 @@ def chance(number: int) -> Spec:
 
 
 def random_spec(draw: Random, name: str) -> Spec:
-    """Return a random spec."""
-    return sampled(draw, name)
+    """Return a random spec: one of four is continuous."""
+    return flowing(draw, name) if draw.random() < 0.25 else sampled(draw, name)

@@ -1,11 +1,14 @@
-"""Running: a random spec in the interpreter, kept on a tape that C is compared with."""
+"""Running: a random spec in the engine, kept on a tape that C is compared with."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterator
+from functools import partial
 from random import Random
 
+from engine.continuous import ContinuousRun, Stopped
 from engine.interpreter import Interpreter
+from engine.trajectory import Event
 from language.program import Program
 from lockstep.compare import Tape
 from tests.lockstep.chance.spec import Spec
@@ -14,30 +17,66 @@ from tests.lockstep.chance.stimulus import Tick, ticks
 Look = Callable[[Interpreter], None]
 
 
-def taped(spec: Spec, program: Program, count: int, run: Program | None = None) -> Tape:
-    """Return the tape of some ticks; `run` is what the interpreter runs in place of the Program."""
-    return tape_of(program, Interpreter(run or program), inputs_of(spec, count))
+def nothing(seen: object) -> None:
+    """Look at nothing."""
 
 
-def inputs_of(spec: Spec, count: int) -> Iterable[Tick]:
-    """Return the inputs of a spec, the same each time."""
-    return ticks(Random(f"inputs of {spec.name}"), spec, count)
-
-
-def tape_of(
-    program: Program, stepper: Interpreter, inputs: Iterable[Tick], look: Look | None = None
+def taped(
+    spec: Spec,
+    program: Program,
+    count: int,
+    run: Program | None = None,
+    look: Look = nothing,
+    log: Callable[[Event], None] = nothing,
 ) -> Tape:
-    """Return the tape of a stepper; `look` sees it after each tick."""
-    tape = Tape(program, program.name)
+    """Return the tape of some ticks or major steps, fewer if the run is stopped.
+
+    `run` is what the interpreter runs in place of the Program; `look` sees it after each tick,
+    `log` each event of a continuous automaton.
+    """
+    stepper, tape = Interpreter(run or program), Tape(program, program.name)
+    inputs = inputs_of(spec, program, stepper, count)
+    if program.period is None:
+        flow = ContinuousRun(program.name, program, stepper, log)
+        _flow(flow, inputs, count, partial(_seen, tape, stepper, look))
+        return tape
+    for _ in inputs:
+        stepper.run("step")
+        _seen(tape, stepper, look)
+    return tape
+
+
+def inputs_of(spec: Spec, program: Program, stepper: Interpreter, count: int) -> Iterator[Tick]:
+    """Set the inputs of each tick, the same each time."""
     flags = [v.name for v in program.variables if v.name.startswith("is_new.")]
-    for tick in inputs:
+    draw, is_sampled = Random(f"inputs of {spec.name}"), program.period is not None
+    for tick in ticks(draw, spec, count, special=is_sampled):
         for name, value in tick.items():
             if stepper.has(name):
                 stepper.set(name, value)
         for name in flags:
             stepper.set(name, bool(tick["input.go"]))
-        stepper.run("step")
-        tape.record(stepper)
-        if look:
-            look(stepper)
-    return tape
+        yield tick
+
+
+def _seen(tape: Tape, stepper: Interpreter, look: Look) -> None:
+    tape.record(stepper)
+    look(stepper)
+
+
+def _flow(
+    run: ContinuousRun, inputs: Iterator[Tick], count: int, stepped: Callable[[], None]
+) -> None:
+    """As engine/simulate.py does: flow to the end of a step, new inputs, jumps."""
+    run.stepped = stepped
+    try:
+        for number in range(count):
+            if number:
+                run.flow_to(number * run.program.major_step)
+            next(inputs)
+            if not number:
+                run.start()
+            run.settle()
+            run.end_step()
+    except Stopped:
+        return

@@ -204,7 +204,7 @@ class _Sampled:
         found = ["    transitions:"]
         priorities = draw.sample(range(9), len(own))
         for k, (target, priority) in enumerate(zip(own, priorities, strict=True)):
-            wait, when = self._when(f"{region or 'modes'}.{mode}.{target}", guard if k == 0 else "")
+            wait, when = self._when(f"{region or 'modes'}.{mode}.{target}", guard if k else "", k)
             names = draw.choice(((), ("x",), ("x", "z"), ("x", "z", "k")))
             reset = ", ".join(f"{n}: {v}" for n, v in self._reset(names, region).items())
             found.append(
@@ -213,7 +213,7 @@ class _Sampled:
             )
         return found
 
-    def _when(self, key: str, guard: str) -> tuple[str, str]:
+    def _when(self, key: str, guard: str, place: int) -> tuple[str, str]:
         """Return a wait and a guard: a condition by name where it waits, else any."""
         draw = self.draw
         if guard:
@@ -225,6 +225,8 @@ class _Sampled:
             self.guards[key] = condition
             return f", wait: {wait} ms", condition
         relation = draw.choice(self.conditions)
+        if place == 0:  # a way out that inputs can take
+            return "", relation
         forms = [relation, relation, f"({relation}) and k < 9", f"rising({relation})"]
         forms += [f"falling({relation})", "after(40 ms)", f"({relation}) or after(200 ms)", "b"]
         forms += ["key == hot", "m > 3 and not go", f"rising(go) and {truth(draw, self.scope)}"]
