@@ -9,26 +9,22 @@ from tempfile import TemporaryDirectory
 from hypothesis import HealthCheck, given, note, settings, strategies as st
 
 from language.number import NUMBERS, NumberType
-from lockstep.compare import compare, judged
-from tests.lockstep.chance.batch import FLAGS, Batch
-from tests.lockstep.chance.kinds import chance, random_spec
+from lockstep.compare import compare
+from tests.lockstep.chance.batch import FLAGS
+from tests.lockstep.chance.healthy import Healthy
+from tests.lockstep.chance.kinds import random_spec
 from tests.lockstep.chance.running import taped
 from tests.lockstep.chance.spec import program
+from tests.lockstep.conftest import TICKS
 
-COUNT = 14
-TICKS = 200
 SHARE = 25
 """An example costs two compilations."""
 
 
-def test_a_batch_of_random_specs_is_in_lockstep(tmp_path: Path) -> None:
-    pairs = [(s, program(s, n, tmp_path)) for s in map(chance, range(COUNT)) for n in NUMBERS]
-    batch = Batch([made for _, made in pairs], tmp_path / "batch")
-    for spec, made in pairs:
-        tape = taped(spec, made, TICKS)
-        verdict = judged(tape, batch.run(made, b"".join(tape.inputs)))
-        assert verdict.is_equal, f"{verdict.first}\n{spec.text}"
-        assert verdict.ticks == TICKS
+def test_random_specs_are_in_lockstep(random_specs: list[Healthy]) -> None:
+    for one in random_specs:
+        assert one.verdict.is_equal, f"{one.verdict.first}\n{one.spec.text}"
+        assert one.verdict.ticks == TICKS
 
 
 @settings(

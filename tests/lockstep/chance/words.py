@@ -76,6 +76,7 @@ _FORMS: tuple[Callable[[Part], str], ...] = (
     *(lambda p: f"({p()}) + ({p()}) * ({p()})", lambda p: f"-({p()})"),
     *(lambda p: f"(if ? then {p()} else {p()})",) * 2,
     *(lambda p: f"min({p()}, {p()})", lambda p: f"max({p()}, {p()})"),
+    *(lambda p: f"min({p()}, 0)", lambda p: f"max(0, {p()})", lambda p: f"min(0, {p()})"),
     *(lambda p: f"clip({p()}, -2, {p()})", lambda p: f"clip({p()}, 0, 1.5)"),
     *(lambda p: f"sign({p()})", lambda p: f"floor({p()})", lambda p: f"abs({p()})"),
     *(lambda p: f"sqrt(abs({p()}))", lambda p: f"sqrt(max({p()}, 0))"),

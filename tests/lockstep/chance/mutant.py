@@ -1,0 +1,87 @@
+"""Mutant: a small mistake in one of the two back ends, or in what one of them is given."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import pytest
+
+from language.operation import Block, Branch, Choose, Loop, Op
+from language.program import Program
+
+Patch = Callable[[pytest.MonkeyPatch], None]
+Change = Callable[[Op], Block]
+
+
+def unpatched(patch: pytest.MonkeyPatch) -> None:
+    """Change nothing."""
+
+
+def same(program: Program) -> Program:
+    """Return the Program as it is."""
+    return program
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """`patch` while one side works; `rewrite` of the Program that this side is given."""
+
+    name: str
+    side: Literal["interpreter", "generator"]
+    patch: Patch = unpatched
+    rewrite: Callable[[Program], Program] = same
+
+
+def item(name: str, key: str, value: Any) -> Patch:
+    """Return a patch of an entry of a mapping, given as `module.NAME`."""
+
+    def apply(patch: pytest.MonkeyPatch) -> None:
+        module, _, attribute = name.rpartition(".")
+        holder = __import__(module, fromlist=[attribute])
+        patch.setitem(getattr(holder, attribute), key, value)
+
+    return apply
+
+
+def attribute(name: str, value: Any) -> Patch:
+    """Return a patch of an attribute, given as `module.name`."""
+    return lambda patch: patch.setattr(name, value)
+
+
+def changed(change: Change) -> Callable[[Program], Program]:
+    """Return what replaces each operation of a Program by some."""
+
+    def rewrite(program: Program) -> Program:
+        blocks = {name: rewritten(block, change) for name, block in program.blocks.items()}
+        return dataclasses.replace(program, blocks=blocks)
+
+    return rewrite
+
+
+def rewritten(block: Block, change: Change) -> Block:
+    """Return a block with each operation replaced, the inner ones first."""
+    return tuple(op for old in block for op in change(_inside(old, change)))
+
+
+def _inside(op: Op, change: Change) -> Op:
+    match op:
+        case Branch(condition, then, other):
+            return Branch(condition, rewritten(then, change), rewritten(other, change))
+        case Choose(selector, cases):
+            return Choose(selector, tuple((n, rewritten(b, change)) for n, b in cases))
+        case Loop(count, index, body):
+            return Loop(count, index, rewritten(body, change))
+        case _:
+            return op
+
+
+def lines_without(text: str) -> Callable[[Callable[..., Iterator[str]]], Callable[..., Any]]:
+    """Return what makes of a generator of lines one that leaves some out."""
+
+    def outer(made: Callable[..., Iterator[str]]) -> Callable[..., Any]:
+        return lambda *words: [line for line in made(*words) if line.strip() != text]
+
+    return outer

@@ -1,0 +1,284 @@
+"""Mutants: mistakes that lock-step on random specs must see; one list per side."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from codegen import expression as printed
+from codegen.statement import Writer
+from engine.arithmetic import ARITHMETIC
+from language.number import NUMBERS, NumberType
+from language.operation import Assign, Binary, Block, Branch, Compare, Expr, Op, Ref, Run, Value
+from language.program import Program, Variable
+from tests.lockstep.chance.mutant import Mutant, Patch, attribute, changed, item, lines_without
+
+CLOSURES = "engine.closures"
+
+
+def _elementary(name: str, function: Callable[..., Any]) -> Patch:
+    """An elementary operation that is wrong, in both number types."""
+
+    def apply(patch: pytest.MonkeyPatch) -> None:
+        for number in NUMBERS:
+            arithmetic = ARITHMETIC[number]
+
+            def wrong(*values: Any, real: Any = arithmetic.real) -> Any:
+                return real(function(*values))
+
+            patch.setitem(arithmetic.elementary, name, wrong)
+
+    return apply
+
+
+def _count(late: int, is_kept: bool) -> Callable[..., Any]:
+    def count(slot: int, condition: Any, limit: int) -> Any:
+        def act(v: list[Any]) -> None:
+            if condition(v):
+                v[slot] = min(v[slot] + 1, limit - late)
+            elif not is_kept:
+                v[slot] = 0
+
+        return act
+
+    return count
+
+
+def _overwritten(slot: int, bit: int, signal: str, left: dict[str, None]) -> Any:
+    def act(v: list[Any]) -> None:
+        v[slot] = bit
+
+    return act
+
+
+def _short_loop(count: int, slot: int, body: list[Any]) -> Any:
+    def act(v: list[Any]) -> None:
+        for index in range(count - 1):
+            v[slot] = index
+            for action in body:
+                action(v)
+
+    return act
+
+
+def _at_once(verb: str) -> Callable[[Op], Block]:
+    """What a stage computes is committed before the next of its lines reads."""
+
+    def change(op: Op) -> Block:
+        if isinstance(op, Assign) and op.target.startswith((f"work.{verb}_x", f"work.{verb}_z")):
+            state = op.target.replace(f"work.{verb}_", "state.")
+            return (op, Assign(state, Ref(op.target)))
+        return (op,)
+
+    return change
+
+
+def _stale(op: Op) -> Block:
+    """Equations after a jump are left out."""
+    is_fired = isinstance(op, Branch) and "memory.fired" in repr(op.condition)
+    return () if is_fired and "equations_" in repr(op) and "commit" not in repr(op) else (op,)
+
+
+def _no_clearing(op: Op) -> Block:
+    """Counters of a mode that is left are not cleared."""
+    if not isinstance(op, Assign) or not op.target.startswith("timer."):
+        return (op,)
+    is_whole = isinstance(op.value, Value) and type(op.value.value) is int
+    return () if is_whole else (op,)
+
+
+def _late(program: Program) -> Program:
+    """`previous` is one tick later than it should be."""
+    more: dict[str, Variable] = {}
+
+    def change(op: Op) -> Block:
+        if not isinstance(op, Assign) or not op.target.startswith("memory.delay_"):
+            return (op,)
+        kind = next(v for v in program.variables if v.name == op.target).type
+        late = f"work.late_{op.target.rpartition('_')[2]}"
+        more[late] = Variable(late, kind)
+        return (Assign(op.target, Ref(late)), Assign(late, op.value))
+
+    made = changed(change)(program)
+    return dataclasses.replace(made, variables=(*made.variables, *more.values()))
+
+
+def _early(program: Program) -> Program:
+    """`previous` is the value of now: kept before the equations are evaluated."""
+    step = program.blocks["step"]
+    keep = tuple(op for op in step if op == Run("keep"))
+    place = next((k for k, op in enumerate(step) if "equations_" in repr(op)), 0)
+    rest = (*step[:place], *keep, *(op for op in step[place:] if op != Run("keep")))
+    return dataclasses.replace(program, blocks={**program.blocks, "step": rest})
+
+
+def _any_priority(program: Program) -> Program:
+    """The chain of guards of a jump is turned round: the largest priority wins."""
+
+    def turned(block: Block) -> Block:
+        last = block[-1] if block else None
+        if not isinstance(last, Branch):
+            return block
+        links: list[Branch] = []
+        link: Op | None = last
+        while isinstance(link, Branch):
+            links.append(link)
+            link = link.other[0] if len(link.other) == 1 else None
+        chain: Block = ()
+        for old in links:
+            chain = (Branch(old.condition, old.then, chain),)
+        return (*block[:-1], *chain)
+
+    blocks = {n: turned(b) if n.startswith("jump_") else b for n, b in program.blocks.items()}
+    return dataclasses.replace(program, blocks=blocks)
+
+
+INTERPRETER = (
+    Mutant(
+        "the relation > holds on equality too",
+        "interpreter",
+        item(f"{CLOSURES}._BINARY", ">", lambda a, b: lambda v: a(v) >= b(v)),
+    ),
+    Mutant(
+        "the relation <= fails on equality",
+        "interpreter",
+        item(f"{CLOSURES}._BINARY", "<=", lambda a, b: lambda v: a(v) < b(v)),
+    ),
+    Mutant(
+        "a counter stops one short",
+        "interpreter",
+        attribute(f"{CLOSURES}._count", _count(1, False)),
+    ),
+    Mutant(
+        "a counter is not cleared", "interpreter", attribute(f"{CLOSURES}._count", _count(0, True))
+    ),
+    Mutant(
+        "a fault bit wipes out the others",
+        "interpreter",
+        attribute(f"{CLOSURES}._fault", _overwritten),
+    ),
+    Mutant(
+        "a fault bit that is not latched stays",
+        "interpreter",
+        attribute(f"{CLOSURES}._clear", lambda slot, bit: lambda v: None),
+    ),
+    Mutant("a loop ends one short", "interpreter", attribute(f"{CLOSURES}._loop", _short_loop)),
+    Mutant(
+        "min takes the second of equals",
+        "interpreter",
+        _elementary("min", lambda a, b: b if b <= a else a),
+    ),
+    Mutant(
+        "max takes the second of equals",
+        "interpreter",
+        _elementary("max", lambda a, b: b if b >= a else a),
+    ),
+    Mutant(
+        "clip makes the upper bound of NaN",
+        "interpreter",
+        _elementary("clip", lambda x, low, high: (x if x > low else low) if x < high else high),
+    ),
+    Mutant("sign of 0 is 1", "interpreter", _elementary("sign", lambda x: math.copysign(1.0, x))),
+    Mutant(
+        "floor rounds towards 0",
+        "interpreter",
+        _elementary("floor", lambda x: float(math.trunc(float(x))) if math.isfinite(x) else x),
+    ),
+    Mutant("a reset is sequential", "interpreter", rewrite=changed(_at_once("reset"))),
+    Mutant("an update is sequential", "interpreter", rewrite=changed(_at_once("next"))),
+    Mutant("equations are stale after a jump", "interpreter", rewrite=changed(_stale)),
+    Mutant("counters outlive their mode", "interpreter", rewrite=changed(_no_clearing)),
+    Mutant("previous is one tick late", "interpreter", rewrite=_late),
+    Mutant("previous is the value of now", "interpreter", rewrite=_early),
+    Mutant("the largest priority wins", "interpreter", rewrite=_any_priority),
+)
+
+
+def _reciprocal(whole: Binary, operator: str, left: Expr, right: Expr, place: Any) -> str:
+    if operator != "/":
+        return _BINARY(whole, operator, left, right, place)
+    one = printed.literal(1.0, place.number)
+    return (
+        f"({printed.c_expression(left, place)}) * ({one} / ({printed.c_expression(right, place)}))"
+    )
+
+
+def _rough(digits: int) -> Callable[[float, NumberType], str]:
+    """A literal of some digits; of float32 as many fewer than it needs."""
+
+    def decimal(value: float, number: NumberType) -> str:
+        if not math.isfinite(value):
+            return repr(value)
+        rough = float(f"{value:.{digits if number == 'float64' else digits - 8}g}")
+        return repr(rough if math.isfinite(rough) else value)
+
+    return decimal
+
+
+def _bare(expr: Expr, place: Any) -> str:
+    is_sum = isinstance(expr, Binary) and expr.operator in ("+", "-", "*", "/")
+    return printed.c_expression(expr, place) if is_sum else _OPERAND(expr, place)
+
+
+def _double(value: float | int | bool, number: NumberType) -> str:
+    return _LITERAL(value, "float64" if isinstance(value, float) else number)
+
+
+def _strict(expr: Expr, place: Any) -> str:
+    if isinstance(expr, Compare) and expr.operator == ">=":
+        expr = Compare(">", expr.left, expr.right)
+    return _EXPRESSION(expr, place)
+
+
+def _everywhere(name: str, value: Any) -> Patch:
+    def apply(patch: pytest.MonkeyPatch) -> None:
+        for module in ("expression", "statement"):
+            patch.setattr(f"codegen.{module}.{name}", value)
+
+    return apply
+
+
+def _short(writer: Writer, timer: str, condition: object, limit: int, key: str) -> Any:
+    return _COUNT(writer, timer, condition, limit - 1, key)
+
+
+_COUNT = Writer._count
+_BINARY, _OPERAND, _LITERAL = printed._binary, printed._operand, printed.literal
+_EXPRESSION = printed.c_expression
+
+GENERATOR = (
+    Mutant(
+        "a division is a product", "generator", attribute("codegen.expression._binary", _reciprocal)
+    ),
+    Mutant(
+        "literals have 15 digits", "generator", attribute("codegen.expression.decimal", _rough(15))
+    ),
+    Mutant(
+        "literals have 16 digits", "generator", attribute("codegen.expression.decimal", _rough(16))
+    ),
+    Mutant("parentheses are missing", "generator", attribute("codegen.expression._operand", _bare)),
+    Mutant(
+        "float32 is computed in double",
+        "generator",
+        attribute("codegen.expression.literal", _double),
+    ),
+    Mutant(
+        "the relation >= fails on equality",
+        "generator",
+        _everywhere("c_expression", _strict),
+    ),
+    Mutant(
+        "a case falls through",
+        "generator",
+        attribute("codegen.statement.Writer._choose", lines_without("break;")(Writer._choose)),
+    ),
+    Mutant(
+        "a counter stops one short in C",
+        "generator",
+        attribute("codegen.statement.Writer._count", _short),
+    ),
+)

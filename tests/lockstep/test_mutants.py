@@ -1,0 +1,34 @@
+"""Mistakes that are made on purpose on one side: lock-step on random specs sees each of them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.lockstep.chance.healthy import Healthy, killed_by
+from tests.lockstep.chance.mutant import Mutant
+from tests.lockstep.chance.mutants import GENERATOR, INTERPRETER
+from tests.lockstep.conftest import TICKS
+
+MUTANTS = (*INTERPRETER, *GENERATOR)
+
+
+@pytest.mark.parametrize("mutant", MUTANTS, ids=[mutant.name for mutant in MUTANTS])
+def test_a_mutant_is_killed(
+    mutant: Mutant, random_specs: list[Healthy], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    assert killed_by(mutant, random_specs, TICKS, monkeypatch, tmp_path)
+
+
+def test_no_mutant_is_alive_twice() -> None:
+    assert len({mutant.name for mutant in MUTANTS}) == len(MUTANTS)
+
+
+@pytest.mark.parametrize("side", ["interpreter", "generator"])
+def test_what_is_no_mutant_lives(
+    side: str, random_specs: list[Healthy], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """The comparison that kills mutants finds nothing where nothing is wrong."""
+    none = Mutant("none", "interpreter" if side == "interpreter" else "generator")
+    assert not killed_by(none, random_specs[:4], TICKS, monkeypatch, tmp_path)
