@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from language.balance import coefficient_of
 from language.interval import ANYTHING, Interval, Ranging
 from language.memory import formulas
 from language.model import Automaton, Mode
+from language.order import equation_order
+from language.parameter import parameter_order
 from language.problem import Problems, SpecError
 from language.region import sources
 from language.syntax import Tree
@@ -18,23 +22,31 @@ HELP = {
 
 def check_domains(automaton: Automaton, problems: Problems) -> None:
     """Report divisors and roots whose declared ranges go beyond their domain."""
+    fixed: dict[str, Interval] = {}
     for mode in automaton.all_modes:
-        _ModeDomains(automaton, mode, problems).check()
+        domains = _ModeDomains(automaton, mode, problems, fixed)
+        if not fixed:
+            fixed.update({name: domains.look(name) for name in parameter_order(automaton)})
+        domains.check()
 
 
 class _ModeDomains:
     """The intervals of the names of one mode, each equation's found once."""
 
-    def __init__(self, automaton: Automaton, mode: Mode, problems: Problems) -> None:
+    def __init__(
+        self, automaton: Automaton, mode: Mode, problems: Problems, fixed: Mapping[str, Interval]
+    ) -> None:
         self.automaton = automaton
         self.mode = mode
         self.problems = problems
         self.formulas = sources(mode)
-        self.found: dict[str, Interval] = {}
-        self.quiet = Ranging(self._look, self._table, lambda what, tree, interval: None)
+        self.found: dict[str, Interval] = dict(fixed)
+        self.quiet = Ranging(self.look, self._table, lambda what, tree, interval: None)
 
     def check(self) -> None:
-        ranging = Ranging(self._look, self._table, self._report)
+        ranging = Ranging(self.look, self._table, self._report)
+        for name in equation_order(self.mode):
+            self.look(name)
         for formula in formulas(self.mode):
             ranging.of(formula.tree)
         for balance in self.mode.flow.values():
@@ -45,7 +57,8 @@ class _ModeDomains:
                 if interval.meets_zero:
                     self._report("divisor", factor, interval)
 
-    def _look(self, name: str) -> Interval:
+    def look(self, name: str) -> Interval:
+        """Return the interval of a name; called in order, so that a long chain needs no stack."""
         if name not in self.found:
             self.found[name] = ANYTHING
             self.found[name] = self._interval(name)

@@ -13,10 +13,12 @@ from language.lower import expression
 from language.model import Automaton, Mode
 from language.order import equation_order
 from language.parameter import constant_names
-from language.problem import SpecError
+from language.problem import Problems, SpecError
 from language.simplify import is_zero, minus, negative, number, over, plus, replaced, times
-from language.syntax import Application, Arithmetic, Name, Negative, Power, Tree, names
+from language.syntax import Application, Arithmetic, Name, Negative, Power, Tree, names, walk
 
+MOST_PARTS = 20_000
+"""Names, numbers and operations of an equation with all others put in; those shipped have 100."""
 Rows = dict[str, dict[str, Tree]]
 """A matrix by the names of its rows and columns, zeros left out."""
 
@@ -49,12 +51,35 @@ class Point:
 
 
 def inlined(mode: Mode, given: Mapping[str, Tree]) -> dict[str, Tree]:
-    """Return the equations of a mode in states, inputs and parameters; some names are given."""
+    """Return the equations of a mode in states, inputs and parameters; some names are given.
+
+    Raises SpecError where they would be too large: each read of an equation copies it.
+    """
+    if is_too_large(mode):
+        problems = Problems()
+        label = f"the equations of mode `{mode.name}` are too large to be put into each other"
+        hint = f"they would have more than {MOST_PARTS} parts; write the matrices, or fewer steps"
+        problems.error("expression", mode.span, label, hint)
+        raise SpecError(problems.found)
     known = dict(given)
     own = [name for name in equation_order(mode) if name in mode.equations]
     for name in own:  # those of a region beside are not known: its mode chooses them
         known[name] = replaced(mode.equations[name].tree, known)
     return known
+
+
+def is_too_large(mode: Mode) -> bool:
+    """Tell whether the equations of a mode, put into each other, have more parts than are handled.
+
+    An equation that is read twice by the next, and so on 50 times, would have 2^50 parts.
+    """
+    sizes: dict[str, int] = {}
+    for name in equation_order(mode):
+        if name in mode.equations:
+            formula = mode.equations[name]
+            read = sum(sizes.get(path, 0) for path in formula.reads)
+            sizes[name] = len(walk(formula.tree)) + read
+    return max(sizes.values(), default=0) > MOST_PARTS
 
 
 def rates(mode: Mode, known: Mapping[str, Tree]) -> dict[str, Tree]:

@@ -7,7 +7,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 from language.derivative import derivative
-from language.linear import Point, inlined
+from language.linear import Point, inlined, is_too_large
 from language.model import Automaton, Mode
 from language.problem import SpecError
 from language.simplify import replaced
@@ -70,6 +70,8 @@ def strongest(mode: Mode, row: str, column: str, point: Point) -> Term | None:
     """Return the term of a state's rate that changes most with another state."""
     best: Term | None = None
     largest = 0.0
+    if is_too_large(mode):
+        return None
     for term in terms_of(mode, row) if row in mode.flow else ():
         with suppress(SpecError):
             size = abs(float(point.value(derivative(term.full, column, point.value))))
