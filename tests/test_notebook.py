@@ -27,7 +27,7 @@ def test_the_notebook_runs_and_every_picture_is_shown(tmp_path: Path) -> None:
     assert shown == ["image/svg+xml", "image/png", "image/png"]
     printed = "".join(output.get("text", "") for cell in cells for output in cell.outputs)
     assert "0.506013945 s: drive_contact -> no_contact" in printed
-    assert printed.count("values, 0 differ") == 2
+    assert printed.count("values, 0 differ") == 3
     assert (tmp_path / "run.csv").exists()
 
 

@@ -57,5 +57,5 @@ def test_a_run_of_a_model_with_effects_is_the_same_in_c(tmp_path: Path) -> None:
     trajectory, verdicts = mw.lockstep("rig", "run", root=tmp_path)
     assert trajectory.stopped is None
     assert len(trajectory.events_of("plant")) >= 2  # the gap is crossed, so the run jumps too
-    (verdict,) = verdicts
-    assert verdict.ticks == 401 and verdict.differing == 0 and verdict.is_equal
+    assert all(verdict.is_equal and verdict.ticks > 1 for verdict in verdicts), verdicts
+    assert verdicts[0].ticks == 401
