@@ -10,9 +10,7 @@ import argparse
 import csv
 import gzip
 import os
-import subprocess
 import sys
-import time
 from collections.abc import Callable
 from fractions import Fraction
 from functools import partial
@@ -43,9 +41,7 @@ def figures(recordings: Path | None) -> dict[str, Callable[[], Figure]]:
     found: dict[str, Callable[[], Figure]] = {"tip_out": tip_out, "lockstep": lockstep}
     for suffix in ("", "_noisy"):
         found[f"replay_1kHz{suffix}"] = partial(reference_replay, suffix)
-    found["table_1"] = table_1
     found["refused"] = refused
-    found["check_cold"] = check_cold
     if recordings:
         for drive in DRIVES:
             for estimator in ("estimator", "estimator_simple"):
@@ -72,17 +68,6 @@ def tip_out() -> Figure:
     late = float(np.abs(times - expected).max())
     met = len(times) == 10 and late <= 1e-6 and max(relative.values()) <= 1e-6
     return {"met": met, "events": len(times), "largest_event_error_s": late, "signals": relative}
-
-
-def check_cold() -> Figure:
-    """`modewright check` of every shipped spec, each in a process of its own."""
-    seconds = {}
-    for path in sorted((ROOT / "spec").rglob("*.yaml")):
-        start = time.monotonic()
-        command = [sys.executable, "-m", "modewright", "check", str(path)]
-        subprocess.run(command, cwd=ROOT, check=True, capture_output=True)
-        seconds[str(path.relative_to(ROOT))] = round(time.monotonic() - start, 2)
-    return {"met": max(seconds.values()) < 2.0, "seconds": seconds}
 
 
 def lockstep() -> Figure:
@@ -120,16 +105,6 @@ def reference_replay(suffix: str) -> Figure:
         "mode_changes_s": events[0].time,
         "differing_bits": found.verdict.differing,
     }
-
-
-def table_1() -> Figure:
-    """Delays until the loss of contact is seen, Table 1: 14, 2 and 0.8 ms."""
-    run = mw.simulate("table_1", "nominal", root=ROOT / "tests" / "data" / "specs" / "table_1")
-    lost = run.events_of("plant")[0].time
-    published = {"at_100Hz": 14e-3, "at_1kHz": 2e-3, "at_10kHz": 0.8e-3}
-    delays = {rate: run.events_of(rate)[0].time - lost for rate in published}
-    met = all(abs(delays[rate] - published[rate]) <= 1e-4 for rate in published)
-    return {"met": met, "delays_s": delays, "published_s": published}
 
 
 def leaf(estimator: str, path: Path) -> Figure:
