@@ -6,6 +6,7 @@ import argparse
 import csv
 import hashlib
 import os
+import resource
 import subprocess
 import sys
 import tempfile
@@ -23,6 +24,7 @@ from tests.verify.store import ROOT, Figure, measured
 
 CORES = ("Haswell", "SandyBridge", "Prescott")
 """Kernels of OpenBLAS that give three patterns of bits."""
+CHECK_SECONDS = 2.0
 SUITES = {
     "matrices": "tests/language/test_kalman.py",
     "drivelines": "tests/engine/test_drivelines.py",
@@ -87,14 +89,22 @@ def table_1() -> Figure:
 
 
 def check_cold() -> Figure:
-    """`modewright check` of every shipped spec, each in a process of its own."""
-    seconds = {}
+    """`modewright check` of every shipped spec, each in a process of its own.
+
+    The bar is on processor time: a busy machine changes little.
+    """
+    seconds, longest = {}, 0.0
     for path in sorted((ROOT / "spec").rglob("*.yaml")):
-        start = time.monotonic()
+        start, before = time.monotonic(), resource.getrusage(resource.RUSAGE_CHILDREN)
         command = [sys.executable, "-m", "modewright", "check", str(path)]
         subprocess.run(command, cwd=ROOT, check=True, capture_output=True)
-        seconds[str(path.relative_to(ROOT))] = round(time.monotonic() - start, 2)
-    return {"met": max(seconds.values()) < 2.0, "seconds": seconds}
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        used = after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
+        seconds[str(path.relative_to(ROOT))] = round(used, 2)
+        longest = max(longest, time.monotonic() - start)
+    largest = max(seconds.values())
+    met = largest < CHECK_SECONDS
+    return {"met": met, "specs": len(seconds), "largest_s": largest, "longest_wall_s": longest}
 
 
 def generate_anywhere() -> Figure:
