@@ -6,14 +6,15 @@ transition the stages are the exit of the source, the reset, the entry of the ta
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 from language.declaration import Formula
 from language.limit import stored
 from language.lower import WHOLE_TYPES, Names, assigned, equations, reads_of
-from language.model import Automaton, Mode
-from language.operation import Assign, Block, Op, Ref
+from language.model import Automaton, Mode, Transition
+from language.operation import Assign, Block, Choose, Op, Ref
 from language.program import Variable, value_type
+from language.region import sources
 from language.wiring import watched_range
 
 
@@ -50,14 +51,46 @@ def committing(automaton: Automaton, written: Iterable[str], verb: str = "reset"
     return found
 
 
-def entry(automaton: Automaton, target: Mode, known: Names) -> Block:
-    """Return the entry of a mode: it reads its mode's equations as they are after the reset."""
-    if not target.entry:
+def stage_of_regions(
+    automaton: Automaton,
+    taken: Callable[[str], str],
+    number: Callable[[Transition], int],
+    written: Callable[[Transition], Mapping[str, Formula]],
+    known: Names,
+) -> Block:
+    """Return one stage of the transitions that all regions take: all read, then all commit.
+
+    `taken` is the variable of a region that holds the number of its transition, 0 for none.
+    """
+    reads: list[Op] = []
+    commits: list[Op] = []
+    for region in automaton.all_regions:
+        ways = [way for mode in region.modes.values() for way in mode.transitions if written(way)]
+        numbers = [number(way) for way in ways]
+        read = [tuple(reading(automaton, written(way), known)) for way in ways]
+        commit = [tuple(committing(automaton, written(way))) for way in ways]
+        if ways:
+            reads.append(Choose(taken(region.name), tuple(zip(numbers, read, strict=True))))
+            commits.append(Choose(taken(region.name), tuple(zip(numbers, commit, strict=True))))
+    return (*reads, *commits)
+
+
+def entry(
+    automaton: Automaton, target: Mode, written: Mapping[str, Formula], known: Names
+) -> Block:
+    """Return the entry of modes: it reads the equations of a mode of the chart after the reset."""
+    if not written:
         return ()
-    inside = {name: place for name, place in known.items() if name not in target.equations}
-    wanted = reads_of(formula.tree for formula in target.entry.values())
+    inside = {name: place for name, place in known.items() if name not in sources(target)}
+    wanted = reads_of(formula.tree for formula in written.values())
     ops = equations(target, inside, "equation.", f"{automaton.name} ", wanted)
-    return (*ops, *stage(automaton, target.entry, inside))
+    return (*ops, *stage(automaton, written, inside))
+
+
+def first_entry(automaton: Automaton) -> dict[str, Formula]:
+    """Return what the entry of the initial modes of all regions writes."""
+    initial = [region.modes[region.initial] for region in automaton.all_regions]
+    return {name: formula for mode in initial for name, formula in mode.entry.items()}
 
 
 def action_variables(automaton: Automaton) -> list[Variable]:

@@ -246,7 +246,8 @@ class _Check:
         )
         check = DimensionCheck(scope, self.problems)
         self._balances(mode, check)
-        self._assignments(mode.update, check)
+        for assignments in (mode.update, mode.entry, mode.exit):
+            self._assignments(assignments, check)
         self._transitions(mode, check)
         self._writers(mode)
 

@@ -20,11 +20,6 @@ def check_regions(automaton: Automaton, problems: Problems) -> None:
     for region in automaton.regions:
         for mode in region.modes.values():
             _check_mode(region, mode, problems)
-    for mode in automaton.all_modes if automaton.regions else ():
-        for what, formulas in (("entry", mode.entry), ("exit", mode.exit)):
-            if formulas:
-                label = f"`{what}` stands in an automaton without `regions` only"
-                problems.error("form", mode.span, label, "write a `reset` of the transitions")
     _check_writers(automaton, problems)
 
 
@@ -46,16 +41,16 @@ def _check_mode(region: Region, mode: Mode, problems: Problems) -> None:
 
 
 def _check_writers(automaton: Automaton, problems: Problems) -> None:
-    """One region defines, balances, resets or updates a name."""
-    for what in ("equation", "balance", "reset or update"):
+    """One region defines, balances or assigns to a name, whatever the stage."""
+    for what in ("equation", "balance", "assignment"):
         writers: dict[str, str] = {}
         for region in automaton.all_regions:
             for name, span in _written(region, what):
                 first = writers.setdefault(name, region.name)
                 if first != region.name:
-                    label = (
-                        f"`{name}` has a {what} in region `{first}` and in region `{region.name}`"
-                    )
+                    a = "a" if what == "balance" else "an"
+                    here = f"in region `{first}` and in region `{region.name}`"
+                    label = f"`{name}` has {a} {what} {here}"
                     hint = "parallel regions write disjoint variables"
                     problems.error("writer", span, label, hint)
 
@@ -67,7 +62,6 @@ def _written(region: Region, what: str) -> Iterator[tuple[str, Span]]:
         elif what == "balance":
             yield from ((name, balance.left.span) for name, balance in mode.flow.items())
         else:
-            for name, formula in mode.update.items():
-                yield name, formula.span
-            for transition in mode.transitions:
-                yield from ((name, formula.span) for name, formula in transition.reset.items())
+            resets = [transition.reset for transition in mode.transitions]
+            for formulas in (mode.entry, mode.exit, mode.update, *resets):
+                yield from ((name, formula.span) for name, formula in formulas.items())

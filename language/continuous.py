@@ -16,7 +16,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Collection
 
-from language.action import discrete_variables
+from language.action import discrete_variables, first_entry
 from language.constants import derive_block, parameter_constants, values_of
 from language.field import (
     Field,
@@ -268,7 +268,7 @@ def _entries(
             *((Assign(AGE.name, real(0.0)),) if histories else ()),
             Assign("memory.time", real(0.0)),
             Assign("memory.started", Value(True)),
-            *entered(field, automaton.modes[automaton.initial]),
+            *entered(field, automaton.modes[automaton.initial], first_entry(automaton)),
             *fill,
         ),
         "equations": evaluate,

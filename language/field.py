@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from language.action import action_variables, committing, place_of, reading, stage
+from language.declaration import Formula
 from language.lower import Names, choice, equation_names, equations, expression, rate, reads_of
 from language.model import Automaton, Balance, Mode, Transition
 from language.operation import (
@@ -170,7 +171,7 @@ def reset_at_once(field: Field, transition: Transition) -> list[Op]:
         ops = stage(field.automaton, source.exit, all_known_at(field))
         ops += [op for op in at_state(field) if transition.reset]
         ops += stage(field.automaton, transition.reset, all_known_at(field))
-        return [*ops, *entered(field, target)]
+        return [*ops, *entered(field, target, target.entry)]
     first, second = resets(field, transition)
     if len(first) == 1:
         (name,) = transition.reset
@@ -180,14 +181,14 @@ def reset_at_once(field: Field, transition: Transition) -> list[Op]:
     return first + second
 
 
-def entered(field: Field, target: Mode) -> list[Op]:
-    """Return the entry of a mode: it reads its mode's equations at the point after the reset."""
-    if not target.entry:
+def entered(field: Field, target: Mode, written: Mapping[str, Formula]) -> list[Op]:
+    """Return the entry of modes: it reads the equations of a mode of the chart after the reset."""
+    if not written:
         return []
     known = known_at(field)
-    wanted = reads_of(formula.tree for formula in target.entry.values())
+    wanted = reads_of(formula.tree for formula in written.values())
     ops = equations(target, known, "work.at_", field.prefix, wanted)
-    return [*at_state(field), *ops, *stage(field.automaton, target.entry, known)]
+    return [*at_state(field), *ops, *stage(field.automaton, written, known)]
 
 
 def enter(field: Field, transition: Transition) -> Assign:
@@ -220,7 +221,8 @@ def _guards(field: Field, mode: Mode) -> Block:
     """The guards of a mode of the chart, then those of the modes beside it, on its equations."""
     known = known_at(field)
     trees = [transition.when.tree for transition in transitions(mode)]
-    trees += [formula.tree for formula in mode.exit.values()]
+    for active in (mode, *(m for region in mode.beside for m in region.modes.values())):
+        trees += [formula.tree for formula in active.exit.values()]
     for transition in transitions(mode):
         trees += [formula.tree for formula in transition.reset.values()]
     ops = equations(mode, known, "work.at_", field.prefix, reads_of(trees))

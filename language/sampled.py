@@ -11,7 +11,14 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 
-from language.action import action_variables, committing, discrete_variables, entry, reading
+from language.action import (
+    action_variables,
+    committing,
+    discrete_variables,
+    entry,
+    first_entry,
+    reading,
+)
 from language.constants import derive_block, parameter_constants, values_of
 from language.covariance import COVARIANCE_RANGE, covariance_variables
 from language.evaluate import Scalar
@@ -135,9 +142,9 @@ class _Sampled:
             blocks.update(self._advance(mode))
         for mode in automaton.all_modes:
             blocks.update(self._phases(mode))
-        for region in automaton.all_regions if automaton.regions else ():
-            commit = sampled_commit(automaton, region, self.transitions)
-            blocks[f"commit_{region.name}"] = (commit,)
+        if automaton.regions:
+            again = self._each("equations")
+            blocks["commit"] = sampled_commit(automaton, self.transitions, self.now, again)
         blocks.update(self._entries())
         blocks.update(invariant_block(automaton, self.now))
         self.problems.stop_if_any()
@@ -266,7 +273,7 @@ class _Sampled:
             ops += start_regions(self.automaton.model)
         ops.append(Assign("memory.started", Value(True)))
         ops += enter_run(self.automaton, initial)
-        ops += entry(self.automaton, initial, self.now)
+        ops += entry(self.automaton, initial, first_entry(self.automaton), self.now)
         starts = [o.start for name, o in self.observers.items() if name == initial.name and o.start]
         starts += [observer.start for observer in self.observers.values() if observer.start]
         ops += starts[0] if starts else ()
@@ -323,9 +330,8 @@ class _Sampled:
         if self.automaton.fault_mode:
             ops += [Assign(HAPPENED, Ref(PENDING)), Assign(PENDING, Value(False))]
         ops += [self._in(region, "jump") for region in regions]
-        if self.automaton.regions:
-            ops += [Run(f"commit_{region.name}") for region in regions]
-        ops.append(Branch(self._fired(), (self._each("equations"),)))
+        commit = (Run("commit"),) if self.automaton.regions else ()
+        ops.append(Branch(self._fired(), (*commit, self._each("equations"))))
         if keep_block(self.automaton, self.delays, self.all):
             ops.append(Run("keep"))
         updated = [r for r in regions if any(mode.update for mode in r.modes.values())]

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from fractions import Fraction
 
-from language.action import committing, entry, reading, stage
+from language.action import entry, stage, stage_of_regions
 from language.constants import exact_value
-from language.lower import equation_names, expression
+from language.declaration import Formula
+from language.lower import equation_names, expression, reads_of
 from language.memory import guard_names, leave, watch_edges
-from language.model import Automaton, Mode, Region, Transition
+from language.model import Automaton, Mode, Transition
 from language.operation import (
     Assign,
     Block,
@@ -79,7 +80,7 @@ def sampled_jump(
     """Return the jump of a tick: wait counters, then one transition (rules 3 and 4).
 
     The guard's first true tick counts 1 here, so a wait of N ticks is over above N. Where regions
-    run in parallel, what commits is left to `sampled_commit`: all read one snapshot (rule 14).
+    run in parallel, it only chooses: what that does is left to `sampled_commit` (rule 14).
     """
     known = {**now, **equation_names(automaton.all_modes, "equation.")}
     edges = watch_edges(automaton, mode, known)
@@ -94,30 +95,52 @@ def sampled_jump(
             key = f"{automaton.name} {transition.when.key}"
             counters.insert(0, Count(info.timer, enabled, info.ticks + 1, key))
             enabled = Compare(">", Ref(info.timer), whole(info.ticks))
-        if automaton.regions:
-            fire = reading(automaton, transition.reset, known)
-        else:
-            fire = _at_once(automaton, mode, transition, known)
-            fire += _taken(automaton, transition, infos)
-        fire.append(Assign(fired_variable(mode.region), whole(info.number), info.key))
+        fire: list[Op] = [Assign(fired_variable(mode.region), whole(info.number), info.key)]
         if not automaton.regions:
             target = automaton.target(transition)
-            fire += [*enter_run(automaton, target), *entry(automaton, target, now)]
+            before = _at_once(automaton, mode, transition, known)
+            fire = [*before, *_taken(automaton, transition, infos), *fire]
+            fire += enter_run(automaton, target)
+            fire += entry(automaton, target, target.entry, now)
         chain = (Branch(enabled, tuple(fire), chain),)
     return (*edges, *counters, *chain)
 
 
-def sampled_commit(automaton: Automaton, region: Region, infos: tuple[TransitionInfo, ...]) -> Op:
-    """Return what makes the transition of a region true once all regions have chosen."""
-    cases = []
-    for mode in region.modes.values():
-        own = infos_of(mode, infos)
-        for transition, info in zip(mode.transitions, own, strict=True):
-            ops = committing(automaton, transition.reset)
-            ops += _taken(automaton, transition, infos)
-            ops += enter_run(automaton, automaton.target(transition))
-            cases.append((info.number, tuple(ops)))
-    return Choose(fired_variable(region.name), tuple(cases))
+def sampled_commit(
+    automaton: Automaton, infos: tuple[TransitionInfo, ...], now: Mapping[str, Expr], again: Op
+) -> Block:
+    """Return what the transitions do that the regions have chosen, stage by stage (rule 6).
+
+    Each stage of all regions reads one snapshot; `again` evaluates the equations of the new modes.
+    """
+    numbers = {info.key: info.number for info in infos}
+
+    def number(way: Transition) -> int:
+        return numbers[f"{automaton.name} {way.key}"]
+
+    def stage_of(written: Callable[[Transition], Mapping[str, Formula]]) -> Block:
+        return stage_of_regions(automaton, fired_variable, number, written, known)
+
+    known = {**now, **equation_names(automaton.all_modes, "equation.")}
+    before = stage_of(lambda way: automaton.source(way).exit)
+    before = (*before, *stage_of(lambda way: way.reset))
+    moved = []
+    for region in automaton.all_regions:
+        ways = [way for mode in region.modes.values() for way in mode.transitions]
+        cases = tuple((number(way), _moved(automaton, way, infos)) for way in ways)
+        moved.append(Choose(fired_variable(region.name), cases))
+    after = stage_of(lambda way: automaton.target(way).entry)
+    return (*before, *moved, *((again,) if _entry_reads_equations(automaton) else ()), *after)
+
+
+def _moved(automaton: Automaton, way: Transition, infos: tuple[TransitionInfo, ...]) -> Block:
+    return (*_taken(automaton, way, infos), *enter_run(automaton, automaton.target(way)))
+
+
+def _entry_reads_equations(automaton: Automaton) -> bool:
+    named = equation_names(automaton.all_modes, "equation.")
+    entries = [formula for mode in automaton.all_modes for formula in mode.entry.values()]
+    return any(name in named for name in reads_of(formula.tree for formula in entries))
 
 
 def enter_run(automaton: Automaton, target: Mode) -> list[Op]:
