@@ -28,7 +28,6 @@ from language.kalman import Kalman, kalman, observer_variables
 from language.limit import (
     HAPPENED,
     MAX_FAULTS,
-    PENDING,
     fault_of,
     first_latched,
     latch,
@@ -37,13 +36,11 @@ from language.limit import (
 )
 from language.lower import equation_names, equations, variable_names
 from language.memory import delays_of, keep_block, memory_variables, with_delays
-from language.model import CHART, Automaton, Mode, Region
+from language.model import CHART, Automaton, Mode
 from language.operation import (
     Assign,
-    Binary,
     Block,
     Branch,
-    Choose,
     Compare,
     Expr,
     FaultBit,
@@ -51,7 +48,6 @@ from language.operation import (
     Ref,
     Run,
     Value,
-    real,
     whole,
 )
 from language.parameter import constant_names
@@ -64,8 +60,9 @@ from language.program import (
     Variable,
 )
 from language.recursive import recursive
-from language.region import fired_variable, in_modes, mode_variable
+from language.region import in_modes
 from language.run import EVENT_LIMIT, run_block, run_motion, start_regions
+from language.tick import by_mode, tick_block
 from language.transition import enter_run, sampled_commit, sampled_jump, transition_infos
 from language.traversal import walk
 from language.wiring import (
@@ -75,7 +72,6 @@ from language.wiring import (
     initial_ops,
     input_variables,
     mode_and_fired,
-    none_fired,
     state_variables,
 )
 
@@ -143,7 +139,7 @@ class _Sampled:
         for mode in automaton.all_modes:
             blocks.update(self._phases(mode))
         if automaton.regions:
-            again = self._each("equations")
+            again = by_mode(automaton.chart, "equations")
             blocks["commit"] = sampled_commit(automaton, self.transitions, self.now, again)
         blocks.update(self._entries())
         blocks.update(invariant_block(automaton, self.now))
@@ -313,54 +309,12 @@ class _Sampled:
         return tuple(ops)
 
     def _step(self) -> Block:
-        modes = list(self.automaton.modes.values())
-        advance = [(mode.number, self._carried(mode)) for mode in modes]
-        cases = tuple((number, block) for number, block in advance if block)
-        ops: list[Op] = none_fired(self.automaton)
-        unlatched = [name for name, latched in self.automaton.faults.items() if not latched]
-        ops += [FaultBit(name, value=False) for name in unlatched]
-        if latch(self.automaton):
-            ops.append(Run("latch"))
-        measured = {name: None for o in self.observers.values() for name in o.info.measures}
-        ops += [Assign(f"innovation.{name}", real(0.0)) for name in measured]
-        then: Block = (Choose("memory.mode", cases),) if cases else ()
-        ops.append(Branch(Ref("memory.started"), then, (Run("start"),)))
-        ops.append(self._each("equations"))
-        regions = self.automaton.all_regions
-        if self.automaton.fault_mode:
-            ops += [Assign(HAPPENED, Ref(PENDING)), Assign(PENDING, Value(False))]
-        ops += [self._in(region, "jump") for region in regions]
-        commit = (Run("commit"),) if self.automaton.regions else ()
-        ops.append(Branch(self._fired(), (*commit, self._each("equations"))))
-        if keep_block(self.automaton, self.delays, self.all):
-            ops.append(Run("keep"))
-        updated = [r for r in regions if any(mode.update for mode in r.modes.values())]
-        ops += [self._in(region, "update") for region in updated]
-        if self.automaton.regions:
-            ops += [self._in(region, "store") for region in updated]
-        ops.append(Run("remember"))
-        return tuple(ops)
-
-    def _fired(self) -> Expr:
-        """Whether a transition fired in any region."""
-        found: Expr | None = None
-        for region in self.automaton.all_regions:
-            here = Compare("!=", Ref(fired_variable(region.name)), whole(0))
-            found = here if found is None else Binary("or", found, here)
-        assert found is not None
-        return found
+        carried = {mode.name: self._carried(mode) for mode in self.automaton.modes.values()}
+        found = (name for o in self.observers.values() for name in o.info.measures)
+        keeps = bool(keep_block(self.automaton, self.delays, self.all))
+        return tick_block(self.automaton, carried, dict.fromkeys(found), keeps)
 
     def _carried(self, mode: Mode) -> Block:
         if mode.name in self.observers:
             return (Run(f"predict_{mode.name}"), Run(f"correct_{mode.name}"))
         return (Run(f"run_{mode.name}"),) if mode.run else ()
-
-    def _each(self, verb: str) -> Choose:
-        return self._in(self.automaton.chart, verb)
-
-    def _in(self, region: Region, verb: str) -> Choose:
-        """Return the choice of a block by the mode of a region."""
-        modes = region.modes.values()
-        wanted = [mode for mode in modes if verb not in ("update", "store") or mode.update]
-        cases = tuple((mode.number, (Run(f"{verb}_{mode.label}"),)) for mode in wanted)
-        return Choose(mode_variable("memory.mode", region.name), cases)

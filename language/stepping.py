@@ -38,11 +38,9 @@ from language.operation import (
     multiply,
     real,
     subtract,
-    whole,
 )
 from language.program import Alarm, TransitionInfo, Variable
-from language.region import fired_variable
-from language.wiring import none_fired
+from language.wiring import any_fired, none_fired
 
 EVENTS_PER_STEP = 100
 """More located events than this within one major step are Zeno behaviour (rule 12)."""
@@ -199,11 +197,7 @@ def _settle(field: Field) -> Block:
     regions = field.automaton.all_regions
     bound = sum(len(region.modes) for region in regions)
     going = Ref("work.is_settling")
-    fired: Expr | None = None
-    for region in regions:
-        here = Compare("!=", Ref(fired_variable(region.name)), whole(0))
-        fired = here if fired is None else Binary("or", fired, here)
-    assert fired is not None
+    fired = any_fired(field.automaton)
     micro_step: Block = (Branch(going, (Run("jump"), Assign(going.name, fired))),)
     return (
         Assign(going.name, Value(True)),

@@ -16,9 +16,12 @@ from language.model import CHART, Automaton, Region
 from language.number import NumberType, rounded
 from language.operation import (
     Assign,
+    Binary,
     Block,
+    Compare,
     Expr,
     Op,
+    Ref,
     Run,
     whole,
 )
@@ -135,6 +138,16 @@ def mode_and_fired(automaton: Automaton, instant: str) -> list[Variable]:
 def none_fired(automaton: Automaton) -> list[Op]:
     """Return what forgets the transitions of before."""
     return [Assign(fired_variable(region.name), whole(0)) for region in automaton.all_regions]
+
+
+def any_fired(automaton: Automaton) -> Expr:
+    """Return whether a transition has fired in any region."""
+    found: Expr | None = None
+    for region in automaton.all_regions:
+        here = Compare("!=", Ref(fired_variable(region.name)), whole(0))
+        found = here if found is None else Binary("or", found, here)
+    assert found is not None
+    return found
 
 
 def enter_initial(automaton: Automaton, base: str) -> list[Assign]:

@@ -1,0 +1,66 @@
+"""Tick: what a sampled automaton does at once - latch, advance, jump, update (rule 2)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from language.limit import HAPPENED, PENDING, latch
+from language.model import Automaton, Region
+from language.operation import Assign, Block, Branch, Choose, FaultBit, Op, Ref, Run, Value, real
+from language.region import mode_variable
+from language.wiring import any_fired, none_fired
+
+
+def tick_block(
+    automaton: Automaton, carried: Mapping[str, Block], measured: Iterable[str], keeps: bool
+) -> Block:
+    """Return `step`: `carried` is the advance of each mode of the chart, `keeps` whether delays do.
+
+    The innovations of the inputs `measured` are 0 unless this tick corrects with them.
+    """
+    ops: list[Op] = none_fired(automaton)
+    ops += [
+        FaultBit(name, value=False) for name, latched in automaton.faults.items() if not latched
+    ]
+    if latch(automaton):
+        ops.append(Run("latch"))
+    ops += [Assign(f"innovation.{name}", real(0.0)) for name in measured]
+    ops.append(Branch(Ref("memory.started"), _advance(automaton, carried), (Run("start"),)))
+    ops += _jump(automaton)
+    if keeps:
+        ops.append(Run("keep"))
+    return (*ops, *_update(automaton), Run("remember"))
+
+
+def by_mode(region: Region, verb: str) -> Choose:
+    """Return the choice of a block by the mode of a region."""
+    modes = region.modes.values()
+    wanted = [mode for mode in modes if verb not in ("update", "store") or mode.update]
+    cases = tuple((mode.number, (Run(f"{verb}_{mode.label}"),)) for mode in wanted)
+    return Choose(mode_variable("memory.mode", region.name), cases)
+
+
+def _advance(automaton: Automaton, carried: Mapping[str, Block]) -> Block:
+    modes = automaton.modes.values()
+    cases = tuple((mode.number, carried[mode.name]) for mode in modes if carried[mode.name])
+    return (Choose("memory.mode", cases),) if cases else ()
+
+
+def _jump(automaton: Automaton) -> Block:
+    """Guards read the equations after the advance; a transition makes them anew."""
+    equations = by_mode(automaton.chart, "equations")
+    ops: list[Op] = [equations]
+    if automaton.fault_mode:
+        ops += [Assign(HAPPENED, Ref(PENDING)), Assign(PENDING, Value(False))]
+    ops += [by_mode(region, "jump") for region in automaton.all_regions]
+    commit: Block = (Run("commit"),) if automaton.regions else ()
+    return (*ops, Branch(any_fired(automaton), (*commit, equations)))
+
+
+def _update(automaton: Automaton) -> Block:
+    regions = automaton.all_regions
+    updated = [r for r in regions if any(mode.update for mode in r.modes.values())]
+    ops: list[Op] = [by_mode(region, "update") for region in updated]
+    if automaton.regions:
+        ops += [by_mode(region, "store") for region in updated]
+    return tuple(ops)
