@@ -54,12 +54,14 @@ verify: setup ## measure every acceptance figure; with recordings: ARGS="--recor
 	$(BIN)/python tests/verify/first_drive.py $(ARGS)
 	$(BIN)/python tests/verify/complete.py
 	$(BIN)/python tests/verify/lockstep_bits.py
+	$(BIN)/python tests/verify/random_specs.py
 	$(BIN)/python tests/verify/command_line.py
 
 verify-part: setup ## measure a fixed part of the figures, as CI does
 	$(BIN)/python tests/verify/first_drive.py
 	$(BIN)/python tests/verify/complete.py --part
 	$(BIN)/python tests/verify/lockstep_bits.py --ticks 50000
+	$(BIN)/python tests/verify/random_specs.py --specs 20
 	$(BIN)/python tests/verify/command_line.py
 
 check: check-lock check-format check-lint check-types ## run all checks

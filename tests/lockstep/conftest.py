@@ -6,7 +6,7 @@ import pytest
 
 from tests.lockstep.chance.healthy import Healthy, healthy
 
-COUNT = 14
+COUNT = 12
 TICKS = 200
 
 

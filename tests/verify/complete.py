@@ -30,6 +30,7 @@ SUITES = {
     "drivelines": "tests/engine/test_drivelines.py",
     "rules_in_lockstep": "tests/rules",
     "flags_and_compilers": "tests/lockstep/test_flags.py",
+    "mutants": "tests/lockstep/test_mutants.py",
     "book_of_problems": "tests/refused",
     "hostile_texts": "tests/modewright/test_printers.py",
     "wheel": "tests/test_wheel.py",

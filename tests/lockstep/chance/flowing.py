@@ -13,7 +13,7 @@ from tests.lockstep.chance.words import Scope, real, truth
 
 STEP_MS = 10
 WAITS_MS = (3, 10, 12.5, 20, 37)
-METHODS = ("euler", "midpoint", "rk4", "rk4", "exact", "exponential")
+METHODS = ("euler", "midpoint", "rk4", "midpoint", "exact", "exponential")
 STATES = ("x", "z", "s")
 
 

@@ -11,7 +11,7 @@ from tests.lockstep.chance.spec import Spec
 
 def chance(number: int) -> Spec:
     """Return the random spec of a number: always the same."""
-    return random_spec(Random(f"chance {number}"), f"chance_{number}")
+    return random_spec(Random(f"luck {number}"), f"chance_{number}")
 
 
 def random_spec(draw: Random, name: str) -> Spec:

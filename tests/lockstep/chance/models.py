@@ -47,7 +47,7 @@ modes:
     transitions: {left: {when: ang < 0.1 rad and rate < 0 rad/s}}
 outputs: [ang, rate, mode]
 """
-METHODS = ("euler", "midpoint", "rk4", "exact", "exponential")
+METHODS = ("euler", "midpoint", "midpoint", "rk4", "exact", "exponential")
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 from random import Random
 
@@ -37,6 +38,7 @@ class _Sampled:
     aims: list[Aim] = field(default_factory=list)
     waits: list[int] = field(default_factory=list)
     guards: dict[str, str] = field(default_factory=dict)
+    waiting: set[tuple[str, str]] = field(default_factory=set)
 
     def __post_init__(self) -> None:
         draw = self.draw
@@ -82,7 +84,13 @@ class _Sampled:
             found += self._mode(mode)
         if self.flavour == "regions":
             found += self._regions()
-        return [*found, f"outputs: [{', '.join(self._outputs())}]"]
+        found.append(f"outputs: [{', '.join(self._outputs())}]")
+        return [re.sub(r"<(\w*)\.(\w+)>", self._memory, line) for line in found]
+
+    def _memory(self, wish: re.Match[str]) -> str:
+        """Wait counters are kept where the target has some."""
+        has_some = (wish[1], wish[2]) in self.waiting
+        return ", memory: continue" if has_some else ""
 
     def _outputs(self) -> list[str]:
         names = ["x", "z", "e_1", "e_2", "s", "k", "flag", "gear", "mode", "faults"]
@@ -205,6 +213,9 @@ class _Sampled:
         priorities = draw.sample(range(9), len(own))
         for k, (target, priority) in enumerate(zip(own, priorities, strict=True)):
             wait, when = self._when(f"{region or 'modes'}.{mode}.{target}", guard if k else "", k)
+            if wait and "wait: 0 ms" not in wait:
+                self.waiting.add((region, mode))
+            wait += f"<{region}.{target}>" if draw.random() < 0.2 else ""
             names = draw.choice(((), ("x",), ("x", "z"), ("x", "z", "k")))
             reset = ", ".join(f"{n}: {v}" for n, v in self._reset(names, region).items())
             found.append(
@@ -228,7 +239,8 @@ class _Sampled:
         if place == 0:  # a way out that inputs can take
             return "", relation
         forms = [relation, relation, f"({relation}) and k < 9", f"rising({relation})"]
-        forms += [f"falling({relation})", "after(40 ms)", f"({relation}) or after(200 ms)", "b"]
+        forms += [f"rising({relation})", f"falling({relation})", f"falling({relation})"]
+        forms += ["after(40 ms)", f"({relation}) or after(200 ms)", "b"]
         forms += ["key == hot", "m > 3 and not go", f"rising(go) and {truth(draw, self.scope)}"]
         if self.flavour == "regions":
             forms += ["in(side.left)", f"in(side.right) and ({relation})"] * 2

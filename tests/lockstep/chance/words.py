@@ -92,7 +92,8 @@ def whole(draw: Random, scope: Scope) -> str:
     """Return a whole-number expression that fits 32 bits."""
     a, b = draw.choice(scope.wholes), draw.choice(scope.wholes)
     forms = (a, f"{a} + {b}", f"{a} - {b}", f"{a} * {b}", f"3 - 2 * {a}", f"-{a}")
-    return draw.choice((*forms, f"floor({draw.choice(scope.reals)})", f"{a} + 1", f"{a} + 1"))
+    floors = [f"floor({draw.choice(scope.reals)})" for _ in range(3)]
+    return draw.choice((*forms, *floors, f"{a} + 1", f"{a} + 1"))
 
 
 def truth(draw: Random, scope: Scope, depth: int = 1) -> str:
