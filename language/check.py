@@ -5,25 +5,32 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Mapping
 
-from language.balance import coefficient_of
+from language.check_balance import check_balances, check_flow
 from language.check_domain import check_domains
 from language.check_element import check_laid_on
 from language.check_memory import check_memory
 from language.check_observer import check_observer
 from language.check_region import check_regions
+from language.check_writer import (
+    check_continued,
+    check_outputs,
+    check_scaled,
+    check_writers,
+    equations_of,
+)
 from language.declaration import Formula, Input, LookupTable, Parameter, State
+from language.declared import declared_kind
 from language.dimension import DimensionCheck, Scope
-from language.experiment import SystemInput
 from language.guards import report_overlaps
 from language.kind import Enumeration, Kind, Whole
-from language.model import Automaton, Mode, Region, Transition
+from language.model import Automaton, Mode, Region
 from language.names import report_case_twins
 from language.order import equation_order, report_circle, unreached
 from language.parameter import parameter_kinds
-from language.problem import Problems, Span, SpecError, nearest
+from language.problem import Problems, Span, nearest
 from language.region import sources, with_regions
-from language.syntax import KEPT, MEMORY, Broken, Tree, names, whole_literal
-from language.units import SECOND, Dimension, Unit, common, fits, product
+from language.syntax import KEPT, MEMORY, Tree, names, whole_literal
+from language.units import SECOND, Dimension, Unit, common, fits
 from language.witness import report_refiring
 
 RESERVED_OUTPUTS = ("mode", "faults")
@@ -84,9 +91,9 @@ class _Check:
             for mode in region.modes.values():
                 with self.problems.collecting():
                     self._beside(mode)
-        self._outputs()
+        check_outputs(automaton, self.problems)
         check_laid_on(automaton, self.names, self.problems)
-        self._sampled_ranges()
+        check_scaled(automaton, self.problems)
         known = {name: kind for name, kind in self.names.items() if isinstance(kind, Dimension)}
         regions = tuple(
             dataclasses.replace(region, modes=self._all_with_wholes(region.modes))
@@ -121,7 +128,7 @@ class _Check:
             for thing in group.values():
                 if thing.values:
                     self._literals(thing)
-        for name in _equation_names(automaton.all_modes):
+        for name in equations_of(automaton.all_modes):
             for mode in automaton.all_modes:
                 if name in mode.equations:
                     self._clash(name, mode.equations[name].span)
@@ -223,14 +230,14 @@ class _Check:
                 kind = check.kind(formula.tree)
                 agreed = self._agreed(name, kind, formula)
                 known[name] = kind if isinstance(kind, Whole) else agreed
-        self._flow(mode, check)
+        check_flow(automaton, mode, check)
         for assignments in (mode.update, mode.entry, mode.exit):
             self._assignments(assignments, check)
         self._transitions(mode, check)
         if mode.observer:
             plain = DimensionCheck(dataclasses.replace(scope, memory=frozenset()), self.problems)
             check_observer(automaton, mode.observer, self.names, plain)
-        self._writers(mode)
+        check_writers(automaton, mode, self.problems)
 
     def _beside(self, mode: Mode) -> None:
         """A mode of another region reads what every mode of the chart has."""
@@ -245,11 +252,11 @@ class _Check:
             known, _mode_paths(automaton), place, self._angles(), self._kept(), self._tables()
         )
         check = DimensionCheck(scope, self.problems)
-        self._balances(mode, check)
+        check_balances(automaton, mode, check)
         for assignments in (mode.update, mode.entry, mode.exit):
             self._assignments(assignments, check)
         self._transitions(mode, check)
-        self._writers(mode)
+        check_writers(automaton, mode, self.problems)
 
     def _agreed(self, name: str, kind: Kind | None, formula: Formula) -> Kind | None:
         """Return what a name is, and report where two modes disagree on it."""
@@ -279,43 +286,6 @@ class _Check:
         label = f"`{name}` is in `{kind}` here and in `{before}` in another mode"
         self.problems.error("dimension", formula.span, label)
         return before
-
-    def _flow(self, mode: Mode, check: DimensionCheck) -> None:
-        automaton = self.automaton
-        if automaton.is_sampled:
-            return
-        beside = {
-            balance.state
-            for region in mode.beside
-            for m in region.modes.values()
-            for balance in m.flow.values()
-        }
-        for name, state in automaton.states.items():
-            if name not in mode.flow and name not in beside:
-                label = f"state `{name}` has no balance in mode `{mode.name}`"
-                self.problems.error("missing", state.span, label, f"`der({name}) = 0` keeps it")
-        self._balances(mode, check)
-
-    def _balances(self, mode: Mode, check: DimensionCheck) -> None:
-        automaton = self.automaton
-        for name, balance in mode.flow.items():
-            if name not in automaton.states:
-                hint = nearest(name, automaton.states)
-                self.problems.error("name", balance.left.span, f"`{name}` is not a state", hint)
-                continue
-            with self.problems.collecting():
-                if isinstance(balance.left, Broken):
-                    continue
-                factor = coefficient_of(balance.left, name)
-                if isinstance(factor, SpecError):
-                    raise factor
-                rate = product(automaton.states[name].unit.dimension, SECOND, -1)
-                rate = Dimension(rate.powers, automaton.states[name].unit.dimension.angle)
-                kind: Kind | None = rate if factor is None else check.kind(factor)
-                if factor is not None and isinstance(kind, Dimension):
-                    kind = product(kind, rate)
-                if isinstance(kind, Dimension):
-                    check.quantity(balance.right, kind, f"the left side for {name}")
 
     def _assignments(self, formulas: Mapping[str, Formula], check: DimensionCheck) -> None:
         for name, formula in formulas.items():
@@ -347,23 +317,9 @@ class _Check:
                 self._fixed_wait(transition.wait)
             self._assignments(transition.reset, check)
             if transition.memory == "continue":
-                self._continued(transition)
+                check_continued(automaton, transition, self.problems)
         for invariant in mode.invariants.values():
             check.truth(invariant.that.tree, "that")
-
-    def _continued(self, transition: Transition) -> None:
-        """`memory: continue` keeps the wait counters of the target: there have to be some."""
-        modes = self.automaton.region(transition.region).modes
-        target = modes.get(transition.target)
-        if not self.automaton.is_sampled:
-            label = (
-                "`memory: continue` belongs to a sampled automaton: a continuous wait is an event"
-            )
-            self.problems.error("form", transition.span, label)
-        elif target and not any(other.wait for other in target.transitions):
-            label = f"`memory: continue` keeps wait counters: `{target.name}` has none"
-            hint = "states belong to the automaton and keep their values anyway"
-            self.problems.error("form", transition.span, label, hint)
 
     def _fixed_wait(self, wait: Formula) -> None:
         for read in names(wait.tree):
@@ -371,82 +327,6 @@ class _Check:
             if parameter and parameter_kinds(self.automaton)[read.path] != "fixed":
                 label = f"`{read.path}` is {parameter.kind}: a wait is made of fixed values"
                 self.problems.error("wait", read.span, label)
-
-    def _writers(self, mode: Mode) -> None:
-        automaton = self.automaton
-        if mode.observer and mode.run and not mode.observer.runs:
-            label = f"mode `{mode.name}` has both `observer` and `runs`: one carries the states"
-            help = "or the run predicts for the observer: `predict: runs`"
-            self.problems.error("writer", mode.span, label, help)
-        if mode.observer and mode.observer.runs and not mode.run:
-            label = "`predict: runs` needs `runs:` in this mode"
-            self.problems.error("observer", mode.observer.span, label)
-        wrong = ("flow",) if automaton.is_sampled else ("update", "observer", "run")
-        for what in wrong:
-            if getattr(mode, what):
-                other = "continuous" if automaton.is_sampled else "sampled"
-                label = f"`{'runs' if what == 'run' else what}` belongs to a {other} automaton"
-                self.problems.error("form", mode.span, label)
-        writers: dict[str, str] = {}
-        groups = (
-            ("observer", mode.observer.states if mode.observer and not mode.run else ()),
-            ("runs", tuple(automaton.model.states) if mode.run and automaton.model else ()),
-            ("update", tuple(mode.update)),
-        )
-        for what, written in groups:
-            for name in written:
-                if name not in automaton.states and what == "runs":
-                    label = f"the run needs a state `{name}` here, as its model has"
-                    assert mode.run
-                    self.problems.error("run", mode.run.span, label)
-                elif name in writers:
-                    label = f"`{name}` is written by `{writers[name]}` and by `{what}`"
-                    self.problems.error("writer", mode.span, label)
-                writers[name] = what
-
-    def _outputs(self) -> None:
-        automaton = self.automaton
-        equations = _equation_names(automaton.all_modes)
-        for output, span in automaton.outputs.items():
-            name = automaton.source_of(output)
-            if name == "mode" or name in automaton.carried:
-                continue
-            if name == "faults" and automaton.is_sampled:
-                continue
-            if name not in equations:
-                hint = nearest(name, [*equations, *automaton.carried, "mode"])
-                label = f"output `{name}` is not a state, an equation or `mode`"
-                self.problems.error("name", span, label, hint)
-                continue
-            for mode in automaton.modes.values():
-                if name not in sources(mode):
-                    label = f"output `{name}` has no value in mode `{mode.name}`"
-                    self.problems.error("missing", span, label)
-
-    def _sampled_ranges(self) -> None:
-        automaton = self.automaton
-        used = {m.run.method for m in automaton.modes.values() if m.run}
-        used |= set() if automaton.is_sampled else {automaton.method}
-        scaling = next((name for name in ("exponential", "exact") if name in used), None)
-        models = automaton.model.states if automaton.model else {}
-        for state in (*automaton.states.values(), *models.values()):
-            if scaling and state.range is None:
-                label = f"state `{state.name}` needs a `range`: method `{scaling}` scales with it"
-                self.problems.error("missing", state.span, label)
-
-
-def declared_kind(thing: Parameter | Input | State | SystemInput) -> Kind:
-    """Return the kind that a declaration says; a whole number lies in its range."""
-    if thing.type == "bool":
-        return "truth"
-    if thing.type == "enum":
-        return Enumeration(thing.values)
-    if thing.type == "int":
-        if isinstance(thing, Parameter) and thing.kind == "fixed" and thing.value is not None:
-            return Whole(int(thing.value), int(thing.value))
-        limits = getattr(thing, "range", None)
-        return Whole(int(limits[0]), int(limits[1])) if limits else Whole()
-    return thing.unit.dimension
 
 
 def _never_entered(automaton: Automaton, region: Region) -> list[str]:
@@ -467,7 +347,3 @@ def _mode_paths(automaton: Automaton) -> frozenset[str]:
     if not automaton.regions:
         return frozenset()
     return frozenset(f"{m.region}.{m.name}" for m in automaton.all_modes)
-
-
-def _equation_names(modes: Iterable[Mode]) -> list[str]:
-    return list(dict.fromkeys(name for mode in modes for name in mode.equations))

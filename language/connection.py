@@ -6,8 +6,8 @@ import dataclasses
 from collections.abc import Mapping
 from fractions import Fraction
 
-from language.check import declared_kind
 from language.declaration import Formula
+from language.declared import declared_kind
 from language.dimension import DimensionCheck, Scope
 from language.document import Entry, Node, Scalar, Table
 from language.experiment import Connection, Instance, SystemInput
