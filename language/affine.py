@@ -19,6 +19,7 @@ from language.operation import (
     Unary,
     Value,
 )
+from language.traversal import expr_names
 
 
 @dataclass(frozen=True)
@@ -95,7 +96,8 @@ def _affine(expr: Expr, known: Mapping[str, Affine]) -> Affine:
 
 def _constant(expr: Expr, known: Mapping[str, Affine]) -> Affine:
     values: dict[str, Scalar] = {}
-    for name, part in known.items():
+    for name in expr_names(expr):
+        part = known.get(name, OTHER)
         if part.is_constant and part.constant is not None:
             values[name] = part.constant
     try:

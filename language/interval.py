@@ -73,7 +73,10 @@ class Ranging:
         found = self._of(tree, limits)
         if isinstance(tree, Relation | Logic | Not):
             return found
-        return found.within(limits[form(tree)]) if limits and form(tree) in limits else found
+        if type(tree).__name__ not in {key[0] for key in limits if isinstance(key, tuple)}:
+            return found  # the form of a large tree takes time
+        written = form(tree)
+        return found.within(limits[written]) if written in limits else found
 
     def _of(self, tree: Tree, limits: Limits) -> Interval:
         match tree:
