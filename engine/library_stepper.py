@@ -73,10 +73,13 @@ class LibraryStepper:
         timed = ("work.rise_", "memory.age")
         self._is_timed = any(v.name.startswith(timed) for v in program.variables)
         self._guards = {}
+        levels = [v.name for v in program.variables if v.name.startswith("memory.level_")]
         for mode in program.modes:
             slots = watched(program, mode)
-            now = self._inner.reader(tuple(f"work.guard_{slot}" for slot in slots))
-            armed = self._inner.reader(tuple(f"memory.armed_{slot}" for slot in slots))
+            guards = (f"work.guard_{slot}" for slot in slots)
+            before = (f"memory.armed_{slot}" for slot in slots)
+            now = self._inner.reader((*guards, *(f"work.{short(name)}" for name in levels)))
+            armed = self._inner.reader((*before, *levels))
             self._guards[mode.name] = (now, armed)
 
     def get(self, name: str) -> Any:

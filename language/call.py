@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 WHERE = {
     "previous": "it is for equations, updates, resets and guards of a sampled automaton",
     "delay": "it is for equations, balances, updates, resets and guards",
-    **dict.fromkeys(("rising", "falling"), "it is for guards (`when`) of a sampled automaton"),
+    **dict.fromkeys(("rising", "falling"), "it is for guards: `when`"),
     "after": "it is for guards: `when`",
 }
 """What functions with memory are for."""

@@ -42,7 +42,7 @@ from language.history import (
 from language.integration import method_of
 from language.invariant import INVARIANTS, invariant_block, invariant_variables
 from language.linear import Point
-from language.lower import equation_names, equations, variable_names
+from language.lower import Names, equation_names, equations, variable_names
 from language.model import Automaton, Mode, Transition
 from language.motion import FLOW_HALVINGS, motion_blocks, motion_variables
 from language.operation import (
@@ -78,6 +78,7 @@ from language.stepping import (
     waits_of,
 )
 from language.transition import infos_of, transition_infos
+from language.turning import edge_names, forgotten, level_variables, settled
 from language.wiring import (
     assembled,
     enter_initial,
@@ -132,7 +133,7 @@ def continuous_program(
         "memory.mode",
         f"{automaton.name} ",
         bool(varying or histories),
-        alarm_names(automaton),
+        _remembered(automaton),
     )
     flows = field_blocks(field)
     point = Point(automaton, values_of(parameters), {})
@@ -193,6 +194,7 @@ def _variables(automaton: Automaton, field: Field) -> list[Variable]:
         *discrete_variables(automaton),
         *invariant_variables(automaton),
         *field_variables(field),
+        *level_variables(automaton),
         Variable("work.merge", "real", "s", about="what crosses within it is one instant"),
     ]
 
@@ -214,6 +216,7 @@ def _selection(automaton: Automaton, infos: tuple[TransitionInfo, ...], waits: W
         enabled=enabled,
         moved=lambda t: (
             *ended(waits, automaton.source(t)),
+            *forgotten(automaton, automaton.source(t)),
             *begun(waits, automaton.target(t)),
         ),
     )
@@ -252,7 +255,7 @@ def _entries(
     fill: Block = (Loop(len(histories), "work.round", rounds),) if histories else ()
     keep: Block = (*evaluate, *record_block(histories, whole_known), Assign(AGE.name, real(0.0)))
     record = {"record": keep} if histories else {}
-    watch = tuple((mode.number, _watch(mode)) for mode in automaton.modes.values())
+    watch = tuple((mode.number, _watch(automaton, mode)) for mode in automaton.modes.values())
     return {
         "derive": derive_block(automaton),
         "init": (
@@ -264,6 +267,7 @@ def _entries(
             *initial_ops(automaton, known, field.prefix),
             *enter_initial(automaton, "memory.mode"),
             *(wait.load for wait in waits),
+            *forgotten(automaton),
             *(op for r in automaton.all_regions for op in begun(waits, r.modes[r.initial])),
             *((Assign(AGE.name, real(0.0)),) if histories else ()),
             Assign("memory.time", real(0.0)),
@@ -280,6 +284,12 @@ def _entries(
     }
 
 
-def _watch(mode: Mode) -> Block:
+def _watch(automaton: Automaton, mode: Mode) -> Block:
     armed = [Assign(f"memory.armed_{slot}", Ref(f"work.guard_{slot}")) for slot in slots(mode)]
-    return (Run(f"guards_{mode.name}"), *armed)
+    return (Run(f"guards_{mode.name}"), *armed, *settled(automaton))
+
+
+def _remembered(automaton: Automaton) -> dict[str, Names]:
+    """Return, by the key of a mode, what `after` and edges in its guards are."""
+    alarms, edges = alarm_names(automaton), edge_names(automaton)
+    return {mode.key: {**alarms[mode.key], **edges[mode.key]} for mode in automaton.all_modes}

@@ -36,6 +36,7 @@ from language.region import (
     slots,
     transitions,
 )
+from language.turning import levels, turned
 from language.wiring import equation_variables
 
 
@@ -128,14 +129,16 @@ def by_mode(field: Field, verb: str) -> Choose:
     return Choose(field.mode, tuple((m.number, (Run(f"{verb}_{m.name}"),)) for m in modes))
 
 
-def any_guard(mode: Mode, armed: Mapping[str, str] | None = None) -> Expr:
-    """Return whether a guard of the mode is true (differs from what it was when armed)."""
+def any_guard(field: Field, mode: Mode, armed: Mapping[str, str] | None = None) -> Expr:
+    """Return whether a guard of the mode is true (it or an edge's level is not as when armed)."""
     result: Expr = Value(False)
     for k, watched in enumerate(slots(mode)):
         guard: Expr = Ref(f"work.guard_{watched}")
         if armed is not None:
             guard = Compare("!=", guard, Ref(armed[watched]))
         result = guard if k == 0 else Binary("or", result, guard)
+    for level in turned(field.automaton):
+        result = Binary("or", result, level)
     return result
 
 
@@ -237,7 +240,7 @@ def _guards(field: Field, mode: Mode) -> Block:
 def _own_guards(field: Field, mode: Mode, count: int) -> list[Op]:
     """Return what sets the guards of a mode, and those up to `count` to false."""
     known = {**all_known_at(field), **field.remembered.get(mode.key, {})}
-    ops: list[Op] = []
+    ops = levels(field.automaton, mode, known)
     for k, transition in enumerate(mode.transitions):
         guard = expression(transition.when.tree, known)
         target = f"work.guard_{slot(mode.region, k)}"

@@ -85,7 +85,7 @@ def motion_blocks(
     """
     blocks = {"point": _point(field, method.terms)}
     for mode in field.automaton.modes.values():
-        crossed = any_guard(mode, armed(mode))
+        crossed = any_guard(field, mode, armed(mode))
         blocks[f"locate_{mode.name}"] = _locate(field, mode, crossed, halvings, merge)
         blocks[f"move_{mode.name}"] = _move(field, mode, crossed, merge, is_wait)
     return blocks
