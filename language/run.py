@@ -145,7 +145,7 @@ def _through_events(automaton: Automaton, field: Field, run: ModelRun) -> Block:
 
 def _refuse_actions(automaton: Automaton, model: Automaton, problems: Problems) -> None:
     """A run starts with our states: what its model would do at its own start has no place."""
-    acting = any(mode.entry or mode.exit for mode in model.modes.values())
+    acting = any(mode.entry or mode.exit for mode in model.all_modes)
     if model.discrete or acting:
         what = "discrete variables" if model.discrete else "entry or exit actions"
         label = f"a run inside a tick carries states alone: `{model.name}` has {what}"

@@ -107,3 +107,19 @@ def test_a_run_follows_the_regions_of_its_model(folder: Path) -> None:
     free = signals["plant.gap"] == 0
     assert (signals["est.free"] == free).mean() > 0.999
     assert 0.01 < free.mean() < 0.99
+
+
+def test_a_run_refuses_a_model_whose_regions_act(folder: Path) -> None:
+    spec = folder / "spec"
+    (spec / "follower.yaml").write_text(FOLLOWER)
+    assert not [p for p in mw.check("follower", root=folder) if p.severity == "error"]
+    plant = (spec / "plant.yaml").read_text()
+    acting = plant.replace(
+        "      no_contact:\n", "      no_contact:\n        exit: {theta_b: 0 rad}\n"
+    )
+    assert acting.count("exit:") == 1
+    (spec / "plant.yaml").write_text(acting)
+    errors = [p.label for p in mw.check("follower", root=folder) if p.severity == "error"]
+    assert errors == [
+        "a run inside a tick carries states alone: `driveline_beside` has entry or exit actions"
+    ]
