@@ -22,7 +22,7 @@ def flowing(draw: Random, name: str) -> Spec:
     made = _Flowing(draw, name)
     text = "\n".join(made.lines()) + "\n"
     steps = tuple(-int(-wait // STEP_MS) for wait in made.waits)
-    return Spec(name, {name: text}, tuple(made.aims), steps, {})
+    return Spec(name, {name: text}, tuple(made.aims), steps)
 
 
 @dataclass

@@ -25,7 +25,7 @@ def sampled(draw: Random, name: str) -> Spec:
     text = "\n".join(made.lines()) + "\n"
     texts = {name: text, **({made.model.name: made.model.text} if made.model else {})}
     ticks = tuple(-(-wait // PERIOD_MS) for wait in made.waits)
-    return Spec(name, texts, tuple(made.aims), ticks, made.guards)
+    return Spec(name, texts, tuple(made.aims), ticks)
 
 
 @dataclass
@@ -37,7 +37,6 @@ class _Sampled:
     flavour: str
     aims: list[Aim] = field(default_factory=list)
     waits: list[int] = field(default_factory=list)
-    guards: dict[str, str] = field(default_factory=dict)
     waiting: set[tuple[str, str]] = field(default_factory=set)
 
     def __post_init__(self) -> None:
@@ -212,7 +211,7 @@ class _Sampled:
         found = ["    transitions:"]
         priorities = draw.sample(range(9), len(own))
         for k, (target, priority) in enumerate(zip(own, priorities, strict=True)):
-            wait, when = self._when(f"{region or 'modes'}.{mode}.{target}", guard if k else "", k)
+            wait, when = self._when(guard if k else "", is_first=k == 0)
             if wait and "wait: 0 ms" not in wait:
                 self.waiting.add((region, mode))
             wait += f"<{region}.{target}>" if draw.random() < 0.2 else ""
@@ -224,7 +223,7 @@ class _Sampled:
             )
         return found
 
-    def _when(self, key: str, guard: str, place: int) -> tuple[str, str]:
+    def _when(self, guard: str, is_first: bool) -> tuple[str, str]:
         """Return a wait and a guard: a condition by name where it waits, else any."""
         draw = self.draw
         if guard:
@@ -233,10 +232,9 @@ class _Sampled:
             wait = draw.choice(WAITS_MS)
             self.waits.append(wait)
             condition = f"q_{draw.randrange(len(self.conditions))}"
-            self.guards[key] = condition
             return f", wait: {wait} ms", condition
         relation = draw.choice(self.conditions)
-        if place == 0:  # a way out that inputs can take
+        if is_first:  # a way out that inputs can take
             return "", relation
         forms = [relation, relation, f"({relation}) and k < 9", f"rising({relation})"]
         forms += [f"rising({relation})", f"falling({relation})", f"falling({relation})"]

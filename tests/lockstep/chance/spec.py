@@ -29,16 +29,12 @@ class Aim:
 
 @dataclass(frozen=True)
 class Spec:
-    """The files of a random automaton by name; `waits` are in ticks (or major steps).
-
-    `guards` are the equations that a transition with a wait stands for, by its key path.
-    """
+    """The files of a random automaton by name; `waits` are in ticks (or major steps)."""
 
     name: str
     texts: Mapping[str, str]
     aims: tuple[Aim, ...]
     waits: tuple[int, ...]
-    guards: Mapping[str, str]
 
     @property
     def text(self) -> str:
