@@ -77,6 +77,8 @@ class _Check:
         self.first: dict[str, Span] = {}
         self.bare: dict[str, bool] = {}
         self.literals: dict[str, Kind] = {}
+        modes = reversed(tuple(automaton.modes.values()))
+        self.owners = {name: mode.name for mode in modes for name in sources(mode)}
 
     def run(self) -> Automaton:
         automaton = self.automaton
@@ -223,7 +225,8 @@ class _Check:
             modes |= {f"{automaton.model.name}.{name}" for name in automaton.model.modes}
             modes |= {f"{automaton.model.name}.{path}" for path in _mode_paths(automaton.model)}
         formulas = sources(mode)
-        scope = Scope(known, modes, place, self._angles(), self._kept(), self._tables())
+        kept, owners = self._kept(), self.owners
+        scope = Scope(known, modes, place, self._angles(), kept, self._tables(), mode.name, owners)
         check = DimensionCheck(scope, self.problems)
         for name in equation_order(mode):
             for formula in formulas[name]:

@@ -27,7 +27,17 @@ from language.syntax import (
     Truth,
     whole_literal,
 )
-from language.units import NUMBER, Dimension, Unit, common, fits, power, product, root
+from language.units import (
+    NUMBER,
+    Dimension,
+    Unit,
+    common,
+    fits,
+    power,
+    product,
+    root,
+    units_hint,
+)
 
 ANGLE = Dimension(angle=1)
 SAME = {"abs": 1, "min": 2, "max": 2, "clip": 3}
@@ -43,7 +53,8 @@ class Scope:
     """What names mean at one place: their dimensions, and the modes that `in(...)` may name.
 
     `angles` are the units of the parameters that are declared in a unit of angle, `memory` the
-    functions with memory that may be used, `tables` what `lookup` reads.
+    functions with memory that may be used, `tables` what `lookup` reads,
+    `mode` the mode that reads, `owners` a mode for each equation that any mode has.
     """
 
     names: Mapping[str, Kind | None]
@@ -52,6 +63,8 @@ class Scope:
     angles: Mapping[str, Unit] = field(default_factory=dict)
     memory: frozenset[str] = frozenset()
     tables: Mapping[str, LookupTable] = field(default_factory=dict)
+    mode: str = ""
+    owners: Mapping[str, str] = field(default_factory=dict)
 
 
 class DimensionCheck:
@@ -75,7 +88,10 @@ class DimensionCheck:
             self._report("type", tree.span, label)
         elif isinstance(kind, Dimension) and not _zero(tree) and not fits(kind, want):
             label = f"this is in `{kind}`, `{what}` is in `{want}`"
-            self._report("dimension", tree.span, label, _angle_hint(kind, want))
+            hint = _angle_hint(kind, want)
+            if isinstance(tree, Number | Negative):
+                hint = hint or units_hint(want)
+            self._report("dimension", tree.span, label, hint)
 
     def assigned(self, tree: Tree, want: Kind, what: str) -> None:
         """Check that an expression may be assigned to something of a kind."""
@@ -166,6 +182,9 @@ class DimensionCheck:
         if tree.path in self.scope.names:
             return self.scope.names[tree.path]
         hint = nearest(tree.path, self.scope.names)
+        owner = self.scope.owners.get(tree.path, self.scope.mode)
+        if owner != self.scope.mode:
+            hint = f"mode `{owner}` has an equation of it, mode `{self.scope.mode}` has none"
         self._report("name", tree.span, f"`{tree.path}` is not known {self.scope.place}", hint)
         return None
 
@@ -273,7 +292,9 @@ class DimensionCheck:
         wanted = ARGUMENTS.get(name)
         if wanted is None:
             label = f"`{name}` is not a function that can be used here"
-            self._report("name", tree.span, label, nearest(name, KNOWN))
+            usable = (*ARGUMENTS, *sorted(self.scope.memory), "lookup")
+            hint = nearest(name, KNOWN) or f"there are `{' '.join(usable)}`"
+            self._report("name", tree.span, label, hint)
             return None
         if len(arguments) != wanted:
             label = f"`{name}` takes {wanted} argument(s), not {len(arguments)}"

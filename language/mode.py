@@ -67,7 +67,9 @@ class ModeReader(Reader):
             modes[entry.key] = mode
             if mode.number in numbers:
                 label = f"number {mode.number} is that of mode `{numbers[mode.number]}`"
-                self.problems.error("duplicate", mode.span, label)
+                free = next(n for n in range(len(numbers) + 1) if n not in numbers)
+                hint = f"another `number`, like {free}; without one, modes count from 0"
+                self.problems.error("duplicate", mode.span, label, hint)
             numbers.setdefault(mode.number, mode.name)
         return modes
 

@@ -31,6 +31,10 @@ from language.syntax import (
 )
 from language.units import NO_UNIT, UNIT, Unit, UnitError, parse_unit, unit_hint
 
+FOREIGN = {"&&": "and", "||": "or", "~=": "!=", "**": "^", "!": "not", "~": "not"}
+"""Operators of other languages, and how they are written here."""
+UNIT_HINT = "a unit is written like `W`, `N*m`, `1/s`, a product with `*`: `2 * x`"
+
 DECIMAL = re.compile(r"(0|[1-9]\d*)(\.\d+)?([eE][-+]?\d+)?")
 SIMPLE_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 SIMPLE_QUANTITY = re.compile(rf"{DECIMAL.pattern} {UNIT.pattern}")
@@ -69,13 +73,24 @@ def decimal(text: str, span: Span) -> Fraction:
         hint = f"write `{shorter}`: other YAML tools read `{text}` as octal"
         problems.error("number", span, f"`{text}` starts with a zero", hint)
     elif not DECIMAL.fullmatch(text):
-        problems.error(
-            "number", span, f"`{text}` is not a number", "write it as `1.0e-3` or `12.5`"
-        )
+        hint = _apart(text) or "write it as `1.0e-3` or `12.5`"
+        problems.error("number", span, f"`{text}` is not a number", hint)
     elif abs(_exponent(text)) > MAX_EXPONENT:
         problems.error("number", span, f"`{text}` is out of the range of a double")
     problems.stop_if_any()
     return Fraction(text)
+
+
+def _apart(text: str) -> str:
+    """Return how `100ms` is written, or an empty text where this is no number before a unit."""
+    found = re.fullmatch(r"([0-9.]+?)\.?([A-Za-z].*)", text)
+    if not found or not DECIMAL.fullmatch(found[1]):
+        return ""
+    try:
+        parse_unit(found[2])
+    except UnitError:
+        return ""
+    return f"one blank stands before the unit: `{found[1]} {found[2]}`"
 
 
 def _in_range(value: Fraction, text: str, span: Span) -> Fraction:
@@ -163,6 +178,11 @@ def _explain(
     rest = text[column - 1 :]
     if found in ("<", "<=", ">", ">=", "==", "!="):
         return place, "one relation only", "write `a < b and b < c`"
+    for foreign, ours in FOREIGN.items():
+        at = text.find(foreign, max(column - 2, 0), column - 1 + len(foreign))
+        if at >= 0:
+            label = f"`{foreign}` is not part of an expression"
+            return span.inside(at, len(foreign)), label, f"it is written `{ours}`"
     if rest.startswith("="):
         return place, "`=` is not part of an expression", "equality is written `==`"
     hint = "there is no implied multiplication" if re.match(r"[A-Za-z0-9(]", rest) else ""
@@ -176,7 +196,7 @@ def _unit(text: str, span: Span) -> Unit:
         return parse_unit(text)
     except UnitError as error:
         problems = Problems()
-        hint = unit_hint(text) or "a product is written with `*`: `2 * x`"
+        hint = unit_hint(text) or UNIT_HINT
         problems.error("unit", span, str(error), hint)
         raise SpecError(problems.found) from None
 

@@ -76,5 +76,8 @@ OFTEN_WRITTEN: Mapping[str, str] = {
     **dict.fromkeys(("RPM", "U/min"), "rpm"),
     **dict.fromkeys(("C", "celsius", "Celsius"), "degC"),
     **dict.fromkeys(("Kg", "KG"), "kg"),
+    **dict.fromkeys(("watt", "Watt", "watts", "Watts"), "W"),
+    **dict.fromkeys(("minute", "minutes", "mins"), "min"),
+    **dict.fromkeys(("hour", "hours", "hr"), "h"),
 }
 """Units as people write them, and how they are written here."""

@@ -169,6 +169,16 @@ def unit_hint(text: str) -> str:
         return "a unit is written like `N*m`, `kg*m^2`, `1/s`" if " " in text else ""
 
 
+def units_hint(want: Dimension) -> str:
+    """Return the symbols that fit, like `s`, `ms`, `min`; an empty text where there are none."""
+    fitting = [
+        f"`{name}`"
+        for name, (_, powers, angle) in SYMBOLS.items()
+        if Dimension(powers, angle) == want and not want.is_number
+    ]
+    return f"units that fit: {', '.join(fitting)}" if fitting else ""
+
+
 def _nearest_symbol(symbol: str) -> str:
     if symbol in SYMBOLS:
         return symbol

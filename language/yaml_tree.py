@@ -51,7 +51,9 @@ def _describe(source: Source, error: yaml.YAMLError) -> tuple[Span, str, str]:
     span = Span(source, mark.line + 1, mark.column + 1)
     context = getattr(error, "context", None)
     hint = "a bracket or a quote is not closed, or a key has no `:`"
-    if context and "flow" in context:
+    if context and "tag" in context:
+        hint = "`!` starts a tag in YAML; the contrary of a condition is written `not a`"
+    elif context and "flow" in context:
         hint = "in `{...}` quote an expression that has a comma"
     elif "found character that cannot start any token" in what:
         hint = "YAML is indented with blanks, not with tabs; quote a text that starts with a sign"
@@ -122,7 +124,8 @@ class _Builder:
             self.problems.error("yaml-feature", place, label, "write the value where it is needed")
         if getattr(event, "tag", None) is not None:
             label = "a tag (`!name`) is not part of the language"
-            self.problems.error("yaml-feature", place, label, "leave it out")
+            hint = "leave it out; the contrary of a condition is written `not a`"
+            self.problems.error("yaml-feature", place, label, hint)
 
     def _add(self, node: Node) -> None:
         self.nodes += 1

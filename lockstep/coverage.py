@@ -29,7 +29,8 @@ def noted(
 
 def _reason(program: Program) -> str:
     if "step" not in program.blocks:
-        return "not compared: an input varies inside its major steps, which C cannot be given"
+        reason = "not compared: an input varies inside its major steps, which C cannot be given"
+        return f"{reason}; `steps` and tables with `hold: previous` can be"
     return "not compared: nothing happened to it at its own pace"
 
 

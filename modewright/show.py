@@ -29,15 +29,16 @@ def print_json(value: Mapping[str, Any]) -> None:
 def events_table(events: Sequence[Event]) -> Table:
     """Return a table of transitions."""
     table = Table(
-        escape("time [s]"), "automaton", "from", "to", box=None, pad_edge=False, header_style="bold"
-    )
+        escape("time [s]"), "automaton", "transition", "from", "to",
+        box=None, pad_edge=False, header_style="bold",
+    )  # fmt: skip
     for event in events[:MOST_EVENTS]:
         change = (event.source, event.target)
         if event.kind != "transition":
             change = (event.source, escape(event.message))
         table.add_row(f"{event.time:.9f}", event.instance, event.transition, *change)
     if len(events) > MOST_EVENTS:
-        table.add_row("...", f"{len(events) - MOST_EVENTS} more", "", "")
+        table.add_row("...", f"{len(events) - MOST_EVENTS} more", "", "", "")
     return table
 
 

@@ -49,6 +49,20 @@ def test_the_architecture_page_is_short_enough_to_be_read() -> None:
     assert len((ROOT / "docs" / "ARCHITECTURE.md").read_text().splitlines()) <= 120
 
 
+def test_what_is_shipped_is_replayed_as_the_page_on_recordings_says(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "tests").symlink_to(ROOT / "tests")
+    monkeypatch.chdir(tmp_path)
+    (block,) = re.findall(
+        r"```sh\n(.*?)```", (ROOT / "docs" / "recordings.md").read_text(), re.DOTALL
+    )
+    for line in block.splitlines():
+        command = partial(app, shlex.split(line)[1:], standalone_mode=False)
+        assert exit_code(command) == 0, line
+    assert (tmp_path / "replay.png").exists()
+
+
 def test_the_commands_and_the_python_of_the_guide_work_as_it_says(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

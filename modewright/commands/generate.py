@@ -26,7 +26,7 @@ def generate(
         bool, typer.Option("--check", help="with --all: write nothing, fail where stale")
     ] = False,
 ) -> None:
-    """Print a sampled automaton as C99.
+    """Print an automaton, sampled or continuous, as C99.
 
     \b
     modewright generate estimator --out build

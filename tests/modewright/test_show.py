@@ -1,0 +1,41 @@
+"""Show: what a person reads on the terminal."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from rich.console import Console
+
+from engine.trajectory import Event
+from modewright.show import MOST_EVENTS, events_table
+
+Kind = Literal["transition", "range"]
+HEADS = ["time [s]", "automaton", "transition", "from", "to"]
+
+
+def event(time: float, kind: Kind = "transition") -> Event:
+    return Event(time, 0, "keeper", "trip", "heating", "safe", kind=kind, message="left it")
+
+
+def printed(events: list[Event]) -> list[str]:
+    console = Console(width=120)
+    with console.capture() as capture:
+        console.print(events_table(events))
+    return [line.rstrip() for line in capture.get().splitlines()]
+
+
+def test_every_column_of_the_events_stands_below_its_head() -> None:
+    heads, row = printed([event(0.5)])
+    cells = ["0.500000000", "keeper", "trip", "heating", "safe"]
+    assert [heads.rindex(head) for head in HEADS] == [row.rindex(cell) for cell in cells]
+
+
+def test_what_is_no_transition_is_told_with_its_message() -> None:
+    _, row = printed([event(0.5, "range")])
+    assert row.split()[-3:] == ["heating", "left", "it"]
+
+
+def test_a_long_table_ends_with_the_number_of_events_left_out() -> None:
+    lines = printed([event(float(i)) for i in range(MOST_EVENTS + 2)])
+    assert len(lines) == MOST_EVENTS + 2
+    assert lines[-1].split() == ["...", "2", "more"]
