@@ -65,4 +65,6 @@ def lockstep(
         show.print_json({**show.trajectory_json(trajectory), **found})
     else:
         show.print_verdicts(console(), verdicts)
-    stop_where(trajectory.stopped is not None or not all(v.is_equal for v in verdicts), trajectory)
+    is_compared = any(verdict.ticks for verdict in verdicts)
+    is_equal = is_compared and all(verdict.is_equal for verdict in verdicts)
+    stop_where(trajectory.stopped is not None or not is_equal, trajectory)
