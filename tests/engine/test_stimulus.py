@@ -84,6 +84,7 @@ def test_a_recording_is_found_in_the_folder_of_recordings(
     assert mw.simulate("cart", "run", root=tmp_path).csv() == found.csv()
 
 
+@pytest.mark.recordings
 def test_the_motor_of_a_leaf_follows_its_recorded_wheels(
     recordings: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
