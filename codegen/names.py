@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from language.model import CHART
 from language.number import NumberType
-from language.program import Program, Variable, short
+from language.program import MODE, Program, Variable, mode_variable, short
 
 REAL: Mapping[NumberType, str] = {"float64": "double", "float32": "float"}
 MODES = ("memory.mode", "memory.run_mode")
@@ -59,7 +59,7 @@ class CNames:
         if name == "memory.run_mode":
             return run_mode_constant(self.program, number)
         for region in self.program.regions:
-            if name == region.mode:
+            if name == mode_variable(MODE, region.name):
                 return mode_constant(self.program, number, region.name)
         values = self._values(name)
         if values and 0 <= number < len(values):

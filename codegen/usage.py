@@ -10,14 +10,11 @@ from language.operation import (
     Block,
     Branch,
     Choose,
-    Count,
-    FaultBit,
     Loop,
     Run,
-    Store,
 )
 from language.program import Program
-from language.traversal import expr_names, walk
+from language.traversal import block_reads, block_writes, walk
 
 GROUP_OF = {
     "input": "in",
@@ -88,41 +85,6 @@ def locals_of(program: Program) -> dict[str, frozenset[str]]:
         loops = {op.index for op in walk(block) if isinstance(op, Loop)}
         found[name] = frozenset((once[name] - shared) | loops)
     return found
-
-
-def block_reads(block: Block) -> Iterator[str]:
-    """Yield the variables that a block reads."""
-    for op in walk(block):
-        match op:
-            case Assign(_, value, _):
-                yield from expr_names(value)
-            case Store(_, index, value):
-                yield from expr_names(index)
-                yield from expr_names(value)
-            case Branch(condition, _, _) | Count(_, condition, _, _):
-                yield from expr_names(condition)
-            case Choose(selector, _):
-                yield selector
-            case _:
-                pass
-
-
-def block_writes(block: Block) -> Iterator[str]:
-    """Yield the variables that a block writes."""
-    for op in walk(block):
-        match op:
-            case Assign(target, _, _):
-                yield target
-            case Store(array, _, _):
-                yield array
-            case Count(timer, _, _, _):
-                yield timer
-            case Loop(_, index, _):
-                yield index
-            case FaultBit():
-                yield "memory.faults"
-            case _:
-                pass
 
 
 def _set_once(block: Block) -> set[str]:

@@ -63,8 +63,8 @@ from language.operation import (
 from language.parallel import Selection, parallel_blocks, parallel_step
 from language.parameter import constant_names
 from language.problem import Problems
-from language.program import Program, TransitionInfo, Variable
-from language.region import fired_variable, in_modes, slots
+from language.program import Program, TransitionInfo, Variable, fired_variable
+from language.region import in_modes, slots
 from language.stepping import (
     BETWEEN,
     LIVELOCK,

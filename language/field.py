@@ -24,13 +24,12 @@ from language.operation import (
     Value,
     whole,
 )
-from language.program import Variable
+from language.program import Variable, mode_variable
 from language.region import (
     all_slots,
     balances,
     by_priority,
     in_modes,
-    mode_variable,
     region_of_balance,
     slot,
     slots,

@@ -8,8 +8,7 @@ from __future__ import annotations
 from language.lower import Names, equation_names, expression
 from language.model import Automaton
 from language.operation import Assign, Block, Choose
-from language.program import InvariantInfo, Variable
-from language.region import mode_variable
+from language.program import InvariantInfo, Variable, mode_variable
 
 INVARIANTS = "invariants"
 """The block; generated code has it not."""

@@ -38,8 +38,7 @@ from language.operation import (
     whole,
 )
 from language.problem import Problems
-from language.program import ValueType, Variable
-from language.region import mode_variable
+from language.program import ValueType, Variable, mode_variable
 from language.syntax import (
     EDGES,
     KEPT,

@@ -23,6 +23,8 @@ from language.model import CHART
 from language.number import NumberType
 from language.operation import Block
 
+MODE = "memory.mode"
+"""The variable of the chart's mode; a run keeps its own."""
 ValueType = Literal["real", "truth", "whole"]
 
 
@@ -73,20 +75,10 @@ class ModeInfo:
 
 @dataclass(frozen=True)
 class RegionInfo:
-    """A region beside the chart, its modes, and the variables of its mode and transition."""
+    """A region beside the chart with its modes."""
 
     name: str
     modes: tuple[ModeInfo, ...]
-
-    @property
-    def mode(self) -> str:
-        """The variable that holds the region's mode."""
-        return f"memory.mode_{self.name}"
-
-    @property
-    def fired(self) -> str:
-        """The variable that holds the transition of a micro-step, 0 if none."""
-        return f"memory.fired_{self.name}"
 
 
 @dataclass(frozen=True)
@@ -106,11 +98,6 @@ class TransitionInfo:
     key: str
     region: str = CHART
     slot: str = "0"
-
-    @property
-    def fired(self) -> str:
-        """The variable that holds the number of the region's transition in a micro-step."""
-        return "memory.fired" if self.region == CHART else f"memory.fired_{self.region}"
 
 
 @dataclass(frozen=True)
@@ -242,11 +229,22 @@ class Program:
 
     def mode_variables(self) -> dict[str, str]:
         """Return the variable that holds the mode of each region, the chart first."""
-        return {CHART: "memory.mode", **{region.name: region.mode for region in self.regions}}
+        names = (CHART, *(region.name for region in self.regions))
+        return {name: mode_variable(MODE, name) for name in names}
 
     def fired_variables(self) -> tuple[str, ...]:
         """Return the variables that hold the transition of each region, the chart first."""
-        return ("memory.fired", *(region.fired for region in self.regions))
+        return tuple(fired_variable(region) for region in self.mode_variables())
+
+
+def mode_variable(base: str, region: str) -> str:
+    """Return the variable that holds a region's mode; `base` is that of the chart."""
+    return base if region == CHART else f"{base}_{region}"
+
+
+def fired_variable(region: str) -> str:
+    """Return the variable that holds the transition of a region in a micro-step, 0 for none."""
+    return "memory.fired" if region == CHART else f"memory.fired_{region}"
 
 
 def value_type(kind: str) -> ValueType:

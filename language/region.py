@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping
 from language.declaration import Formula
 from language.model import CHART, Automaton, Balance, Mode, Region, Transition
 from language.operation import Compare, Expr, Ref, whole
+from language.program import mode_variable
 
 
 def equation_names(mode: Mode) -> list[str]:
@@ -86,16 +87,6 @@ def slots(mode: Mode) -> list[str]:
 def all_slots(automaton: Automaton) -> list[str]:
     """Return the endings of the guard variables of an automaton."""
     return [slot(r.name, index) for r in automaton.all_regions for index in range(r.widest)]
-
-
-def mode_variable(base: str, region: str) -> str:
-    """Return the variable that holds a region's mode; `base` is that of the chart."""
-    return base if region == CHART else f"{base}_{region}"
-
-
-def fired_variable(region: str) -> str:
-    """Return the variable that holds the transition of a region in a micro-step, 0 for none."""
-    return "memory.fired" if region == CHART else f"memory.fired_{region}"
 
 
 def in_modes(automaton: Automaton, base: str, prefix: str = "") -> dict[str, Expr]:

@@ -46,8 +46,7 @@ from language.operation import (
 from language.parallel import Selection, parallel_blocks, parallel_step
 from language.parameter import constant_names, typed
 from language.problem import Problems
-from language.program import Constant, MotionInfo, Variable
-from language.region import mode_variable
+from language.program import Constant, MotionInfo, Variable, mode_variable
 from language.syntax import form
 from language.wiring import enter_initial
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from language.limit import HAPPENED, PENDING, latch
 from language.model import Automaton, Region
 from language.operation import Assign, Block, Branch, Choose, FaultBit, Op, Ref, Run, Value, real
-from language.region import mode_variable
+from language.program import mode_variable
 from language.wiring import any_fired, none_fired
 
 

@@ -26,8 +26,8 @@ from language.operation import (
     whole,
 )
 from language.problem import Problems
-from language.program import TransitionInfo
-from language.region import by_priority, fired_variable, mode_variable, slot
+from language.program import TransitionInfo, fired_variable, mode_variable
+from language.region import by_priority, slot
 
 MAX_TICKS = 65534
 """Longest wait: the counters are uint16 and count one further (semantics, rule 4)."""

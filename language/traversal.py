@@ -14,6 +14,7 @@ from language.operation import (
     Compare,
     Count,
     Expr,
+    FaultBit,
     Item,
     Loop,
     Op,
@@ -41,26 +42,43 @@ def walk(block: Block) -> Iterator[Op]:
 
 def block_names(block: Block) -> Iterator[str]:
     """Yield the variables and constants that a block reads or writes, and `call <function>`."""
+    yield from block_reads(block)
+    yield from block_writes(block)
+
+
+def block_reads(block: Block) -> Iterator[str]:
+    """Yield the variables that a block reads."""
     for op in walk(block):
         match op:
-            case Assign(target, value, _):
-                yield target
+            case Assign(_, value, _):
                 yield from expr_names(value)
-            case Store(array, index, value):
-                yield array
+            case Store(_, index, value):
                 yield from expr_names(index)
                 yield from expr_names(value)
-            case Branch(condition, _, _):
+            case Branch(condition, _, _) | Count(_, condition, _, _):
                 yield from expr_names(condition)
             case Choose(selector, _):
                 yield selector
+            case _:
+                pass
+
+
+def block_writes(block: Block) -> Iterator[str]:
+    """Yield the variables that a block writes."""
+    for op in walk(block):
+        match op:
+            case Assign(target, _, _):
+                yield target
+            case Store(array, _, _):
+                yield array
+            case Count(timer, _, _, _):
+                yield timer
             case Loop(_, index, _):
                 yield index
-            case Count(timer, condition, _, _):
-                yield timer
-                yield from expr_names(condition)
-            case _:
+            case FaultBit():
                 yield "memory.faults"
+            case _:
+                pass
 
 
 def expr_names(expr: Expr) -> Iterator[str]:

@@ -36,9 +36,10 @@ from language.program import (
     ValueType,
     Variable,
     Wire,
+    fired_variable,
+    mode_variable,
     value_type,
 )
-from language.region import fired_variable, mode_variable
 from language.traversal import block_names, walk
 from language.units import Dimension
 from language.working import in_working_type
