@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from fractions import Fraction
 from typing import Protocol
 
+from engine.firing import event, fired
 from engine.interpreter import Stepper
 from engine.invariant_watch import InvariantWatch
 from engine.keeping import Records
@@ -129,35 +130,24 @@ class ContinuousRun:
         """Jump before flow: micro-steps until no transition is enabled, then equations."""
         bound = sum(len(self.program.modes_of(region)) for region in self._regions)
         self.stepper.run("latch")
-        fired: list[TransitionInfo] = []
+        done: list[TransitionInfo] = []
         for micro_step in range(bound + 1):
             self.stepper.run("jump")
-            taken = self._taken()
+            taken = fired(self.program, self.stepper)
             if not taken:
                 break
-            fired += taken
+            done += taken
             if micro_step == bound:
-                raise Stopped(f"{self._here()}: {_fired(fired)} fire for ever at one instant")
+                raise Stopped(f"{self._here()}: {_fired(done)} fire for ever at one instant")
             for info in taken:
-                self._log_event(info, micro_step)
-        self._in_step += fired
+                self._log(event(self.name, self.program, info, float(self.time), micro_step))
+        self._in_step += done
         self.stepper.run("watch")
         self.stepper.run("equations")
         self._ranges.look(self.time)
         self._invariants.look(self.time)
         self._around.watch(self.time)
         self.is_settled = True
-
-    def _taken(self) -> list[TransitionInfo]:
-        """Return the transitions of the last micro-step, at most one of each region."""
-        numbers = [self.stepper.get(name) for name in self.program.fired_variables()]
-        return [self.program.transitions[number - 1] for number in numbers if number]
-
-    def _log_event(self, info: TransitionInfo, micro_step: int) -> None:
-        source = self.program.mode_name(info.source, info.region)
-        target = self.program.mode_name(info.target, info.region)
-        place = (self.name, info.name, source, target, info.region)
-        self._log(Event(float(self.time), micro_step, *place))
 
     def _major_step(self, end: Fraction, horizon: Fraction) -> None:
         self._in_step = []

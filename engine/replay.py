@@ -11,12 +11,13 @@ from typing import Any
 
 import numpy as np
 
+from engine.firing import event, fired, mode_names
 from engine.interpreter import Interpreter, Stepper
 from engine.recording import Channel, Recording
 from engine.trajectory import Event, Trajectory, Values, column_array, fault_names
 from language.experiment import Column, RecordingMap
 from language.map import column_dimension
-from language.model import Automaton
+from language.model import CHART, Automaton
 from language.problem import Problems, SpecError, nearest
 from language.program import Program
 from language.units import NUMBER, Dimension, fits
@@ -113,8 +114,27 @@ def replay(
         label = f"the recording spans {count} ticks of {program.period} s; 1 to {MAX_TICKS} is fine"
         problems.error("range", mapping.span, label)
         raise SpecError(problems.found)
-    cursors = [_Cursor(channel, program) for channel in feeds]
     _set_constants(automaton, program, mapping, stepper)
+    keep = _ticked_through(program, stepper, feeds, start, count, ticked)
+    word = stepper.get("memory.faults") if program.faults else 0
+    faults = fault_names(automaton.name, program, word)
+    trajectory = dataclasses.replace(keep.trajectory(automaton.name), faults=faults)
+    compared = [c for c in recording.channels.values() if c.column.compare is not None]
+    found = [_compared(channel, trajectory, start, program) for channel in compared]
+    return Replay(trajectory, keep.innovation_rms(), tuple(one for one in found if one))
+
+
+def _ticked_through(
+    program: Program,
+    stepper: Stepper,
+    feeds: Sequence[Channel],
+    start: Fraction,
+    count: int,
+    ticked: Callable[[Stepper], None] | None,
+) -> _Kept:
+    """Tick `count` times from `start` [s]: channels are latched, then the step runs."""
+    assert program.period is not None
+    cursors = [_Cursor(channel, program) for channel in feeds]
     keep = _Kept(program, [cursor.target for cursor in cursors])
     for tick in range(count):
         time = start + tick * program.period
@@ -124,19 +144,7 @@ def replay(
         keep.row(time, stepper)
         if ticked:
             ticked(stepper)
-    word = stepper.get("memory.faults") if program.faults else 0
-    faults = fault_names(automaton.name, program, word)
-    trajectory = dataclasses.replace(keep.trajectory(automaton.name), faults=faults)
-    compared = [c for c in recording.channels.values() if c.column.compare is not None]
-    return Replay(
-        trajectory,
-        keep.innovation_rms(),
-        tuple(
-            found
-            for channel in compared
-            if (found := _compared(channel, trajectory, start, program))
-        ),
-    )
+    return keep
 
 
 def _check_dimension(column: Column, want: Dimension, what: str, problems: Problems) -> None:
@@ -198,7 +206,8 @@ class _Kept:
         self.program = program
         self.names = {f"in.{name.partition('.')[2]}": name for name in fed}
         self.names.update({wire.name: wire.source for wire in program.outputs})
-        self.names.setdefault("mode", "memory.mode")
+        for region, variable in program.mode_variables().items():
+            self.names.setdefault("mode" if region == CHART else region, variable)
         variables = {variable.name: variable for variable in program.variables}
         self.kinds = {name: variables[source].type for name, source in self.names.items()}
         self.units = {name: variables[source].unit for name, source in self.names.items()}
@@ -215,17 +224,13 @@ class _Kept:
     def row(self, time: Fraction, stepper: Stepper) -> None:
         self.times.append(time)
         self.rows.append(tuple([stepper.get(source) for source in self.names.values()]))
-        fired = stepper.get("memory.fired")
         if self.mode in self.observing:
             for name in self.innovations:
                 if stepper.get(f"is_new.{name.partition('.')[2]}"):
                     self.squares[name] += stepper.get(name) ** 2
                     self.counts[name] += 1
-        if fired:
-            info = self.program.transitions[fired - 1]
-            names = self.program.mode_name
-            modes = names(info.source), names(info.target)
-            self.events.append(Event(float(time), 0, self.program.name, info.name, *modes))
+        taken = fired(self.program, stepper)
+        self.events += [event(self.program.name, self.program, i, float(time)) for i in taken]
         self.mode = stepper.get("memory.mode")
 
     def innovation_rms(self) -> dict[str, float]:
@@ -245,7 +250,7 @@ class _Kept:
             times=np.array([float(time) for time in self.times]),
             signals=signals,
             units=self.units,
-            modes={"mode": {mode.number: mode.name for mode in self.program.modes}},
+            modes=mode_names(self.program),
             events=tuple(self.events),
         )
 

@@ -9,6 +9,7 @@ from functools import partial
 from typing import Any
 
 from engine.continuous import ContinuousRun, Stopped
+from engine.firing import event, fired, mode_names
 from engine.interpreter import Interpreter, Stepper
 from engine.invariant_watch import InvariantWatch
 from engine.page import calibrate
@@ -21,7 +22,6 @@ from engine.stimulus import resolved
 from engine.surroundings import Surroundings
 from engine.trajectory import Event, Trajectory, fault_names
 from language.experiment import Connection, Scenario, System
-from language.model import CHART
 from language.program import Program, short
 
 Build = Callable[[Program], Stepper]
@@ -261,14 +261,8 @@ class _Simulation:
         stepper.run("step")
         self._move_lags(sources, time)
         self._put_into_lines(sources, time)
-        for variable in program.fired_variables():
-            fired = stepper.get(variable)
-            if fired:
-                info = program.transitions[fired - 1]
-                modes = [program.mode_name(n, info.region) for n in (info.source, info.target)]
-                self.events.append(
-                    Event(float(time), 0, name, info.name, modes[0], modes[1], info.region)
-                )
+        taken = fired(program, stepper)
+        self.events += [event(name, program, info, float(time)) for info in taken]
         self._note_ranges(name, time)
         self.invariants[name].look(time)
         if self.ticked:
@@ -309,11 +303,9 @@ class _Simulation:
             signals=self.rows.signals(),
             units=self.rows.units(),
             modes={
-                f"{name}.{'mode' if region == CHART else region}": {
-                    mode.number: mode.name for mode in program.modes_of(region)
-                }
+                signal: names
                 for name, program in self.programs.items()
-                for region in program.mode_variables()
+                for signal, names in mode_names(program, f"{name}.").items()
             },
             events=tuple(self.events),
             stopped=stopped,

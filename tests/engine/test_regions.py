@@ -123,3 +123,39 @@ def test_a_run_refuses_a_model_whose_regions_act(folder: Path) -> None:
     assert errors == [
         "a run inside a tick carries states alone: `driveline_beside` has entry or exit actions"
     ]
+
+
+TWO = """\
+language: 1
+automaton: two
+period: 1 ms
+numbers: float64
+inputs: {u: {unit: "1", range: [-10, 10]}}
+initial: low
+modes: {low: {transitions: {high: {when: u >= 1}}}, high: {}}
+regions:
+  lamp: {initial: dark, modes: {dark: {transitions: {lit: {when: u >= 2}}}, lit: {}}}
+outputs: [mode]
+"""
+MAP = """\
+language: 1
+map: column
+time: {column: t, unit: s}
+columns: {u: {to: u, unit: "1"}}
+"""
+
+
+def test_a_replay_tells_the_transitions_of_all_regions(tmp_path: Path) -> None:
+    spec = tmp_path / "spec"
+    spec.mkdir()
+    (spec / "two.yaml").write_text(TWO)
+    (spec / "column.yaml").write_text(MAP)
+    recording = tmp_path / "u.csv"
+    recording.write_text("t,u\n0,0\n0.001,1\n0.002,2\n0.003,0\n")
+    found = mw.replay("two", recording, "column", root=tmp_path)
+    run = found.result.trajectory
+    moves = [(e.time, e.region, e.source, e.target) for e in run.events]
+    assert moves == [(0.001, "chart", "low", "high"), (0.002, "lamp", "dark", "lit")]
+    assert run.signals["lamp"].tolist() == [0, 0, 1, 1]
+    assert run.modes == {"mode": {0: "low", 1: "high"}, "lamp": {0: "dark", 1: "lit"}}
+    assert found.verdict is not None and found.verdict.is_equal

@@ -1,0 +1,33 @@
+"""Firing: the transitions of a Program as events, and the names of its modes."""
+
+from __future__ import annotations
+
+from engine.interpreter import Stepper
+from engine.trajectory import Event
+from language.model import CHART
+from language.program import Program, TransitionInfo
+
+
+def fired(program: Program, stepper: Stepper) -> list[TransitionInfo]:
+    """Return the transitions of the last micro-step, at most one of each region."""
+    numbers = [stepper.get(name) for name in program.fired_variables()]
+    return [program.transitions[number - 1] for number in numbers if number]
+
+
+def event(
+    name: str, program: Program, info: TransitionInfo, time: float, micro_step: int = 0
+) -> Event:
+    """Return a transition of an instance at a time [s] as an event."""
+    source = program.mode_name(info.source, info.region)
+    target = program.mode_name(info.target, info.region)
+    return Event(time, micro_step, name, info.name, source, target, info.region)
+
+
+def mode_names(program: Program, prefix: str = "") -> dict[str, dict[int, str]]:
+    """Return the names of the modes by signal: `mode` for the chart, else the region."""
+    return {
+        f"{prefix}{'mode' if region == CHART else region}": {
+            mode.number: mode.name for mode in program.modes_of(region)
+        }
+        for region in program.mode_variables()
+    }
