@@ -6,12 +6,20 @@ import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from language.call import WHERE, lookup_kind, memory_kind
 from language.declaration import LookupTable
-from language.kind import LARGEST_WHOLE, Enumeration, Kind, Truthful, Whole, combined
+from language.function import function_kind
+from language.kind import (
+    LARGEST_WHOLE,
+    Enumeration,
+    Kind,
+    Truthful,
+    Whole,
+    as_real,
+    combined,
+    said,
+)
 from language.problem import Problems, Span, nearest
 from language.syntax import (
-    MEMORY,
     Application,
     Arithmetic,
     Broken,
@@ -25,27 +33,19 @@ from language.syntax import (
     Relation,
     Tree,
     Truth,
+    is_zero,
     whole_literal,
 )
 from language.units import (
-    NUMBER,
     Dimension,
     Unit,
+    angle_hint,
     common,
     fits,
     power,
     product,
-    root,
     units_hint,
 )
-
-ANGLE = Dimension(angle=1)
-SAME = {"abs": 1, "min": 2, "max": 2, "clip": 3}
-"""Functions whose arguments and value have one dimension, with their number of arguments."""
-NUMBERS = {"exp": 1, "tanh": 1, "floor": 1, "sign": 1}
-ANGLES = {"sin": 1, "cos": 1, "tan": 1}
-ARGUMENTS = {**SAME, **NUMBERS, **ANGLES, "sqrt": 1, "atan2": 2}
-KNOWN = (*ARGUMENTS, *MEMORY, "lookup", "in", "der")
 
 
 @dataclass(frozen=True)
@@ -82,16 +82,16 @@ class DimensionCheck:
 
     def quantity(self, tree: Tree, want: Dimension, what: str) -> None:
         """Check that an expression is a quantity that fits `want`."""
-        kind = _as_real(self.kind(tree))
+        kind = as_real(self.kind(tree))
         if isinstance(kind, str | Enumeration):
-            label = f"`{what}` is a quantity, this is {_said(kind)}"
-            self._report("type", tree.span, label)
-        elif isinstance(kind, Dimension) and not _zero(tree) and not fits(kind, want):
+            label = f"`{what}` is a quantity, this is {said(kind)}"
+            self.report("type", tree.span, label)
+        elif isinstance(kind, Dimension) and not is_zero(tree) and not fits(kind, want):
             label = f"this is in `{kind}`, `{what}` is in `{want}`"
-            hint = _angle_hint(kind, want)
+            hint = angle_hint(kind, want)
             if isinstance(tree, Number | Negative):
                 hint = hint or units_hint(want)
-            self._report("dimension", tree.span, label, hint)
+            self.report("dimension", tree.span, label, hint)
 
     def assigned(self, tree: Tree, want: Kind, what: str) -> None:
         """Check that an expression may be assigned to something of a kind."""
@@ -106,23 +106,23 @@ class DimensionCheck:
             is_floor = isinstance(tree, Application) and tree.function == "floor"
             if kind is not None and not isinstance(kind, Whole) and not is_floor:
                 hint = "`floor(...)` makes a whole number of a real"
-                label = f"`{what}` is a whole number, this is {_said(kind)}"
-                self._report("type", tree.span, label, hint if isinstance(kind, Dimension) else "")
+                label = f"`{what}` is a whole number, this is {said(kind)}"
+                self.report("type", tree.span, label, hint if isinstance(kind, Dimension) else "")
 
     def _same(self, tree: Tree, want: Kind, what: str) -> None:
         kind = self.kind(tree)
         if kind is not None and kind != want:
-            label = f"`{what}` is {_said(want)}, this is {_said(kind)}"
+            label = f"`{what}` is {said(want)}, this is {said(kind)}"
             hint = "compare it: `x > 0`" if want == "truth" else ""
-            self._report("type", tree.span, label, hint)
+            self.report("type", tree.span, label, hint)
 
     def truth(self, tree: Tree, what: str) -> None:
         """Check that an expression is true or false."""
         kind = self.kind(tree)
         if kind is not None and kind != "truth":
             hint = "compare it: `x > 0`"
-            label = f"`{what}` is a condition, this is {_said(kind)}"
-            self._report("type", tree.span, label, hint)
+            label = f"`{what}` is a condition, this is {said(kind)}"
+            self.report("type", tree.span, label, hint)
 
     def kind(self, tree: Tree) -> Kind | None:
         """Return what the expression is, None where a problem was reported inside it."""
@@ -152,32 +152,34 @@ class DimensionCheck:
             case Relation():
                 return self._relation(tree)
             case Power(base, exponent, _):
-                kind = self._real(base)
+                kind = self.real(base)
                 return None if kind is None else power(kind, exponent)
             case Choice():
                 return self._choice(tree)
             case Application():
-                return self._application(tree)
+                return function_kind(self, tree)
 
-    def _report(self, kind: str, span: Span, label: str, help: str = "") -> None:
+    def report(self, kind: str, span: Span, label: str, help: str = "") -> None:
+        """Report a problem."""
         self.problems.error(kind, span, label, help)
 
-    def _real(self, tree: Tree) -> Dimension | None:
+    def real(self, tree: Tree) -> Dimension | None:
+        """Return the dimension of a quantity; reports what is none."""
         return self._number(self.kind(tree), tree)
 
     def _number(self, kind: Kind | None, tree: Tree) -> Dimension | None:
         """What a whole number is in arithmetic of reals: a number without a unit."""
-        kind = _as_real(kind)
+        kind = as_real(kind)
         if isinstance(kind, Dimension):
             return kind
         if kind is not None:
-            self._report("type", tree.span, f"this is {_said(kind)}, a quantity is needed")
+            self.report("type", tree.span, f"this is {said(kind)}, a quantity is needed")
         return None
 
     def _name(self, tree: Name) -> Kind | None:
         if tree.path in self.scope.tables:
             hint = f"read it with `lookup({tree.path}, ...)`"
-            self._report("table", tree.span, f"`{tree.path}` is a table, not a value", hint)
+            self.report("table", tree.span, f"`{tree.path}` is a table, not a value", hint)
             return None
         if tree.path in self.scope.names:
             return self.scope.names[tree.path]
@@ -185,7 +187,7 @@ class DimensionCheck:
         owner = self.scope.owners.get(tree.path, self.scope.mode)
         if owner != self.scope.mode:
             hint = f"mode `{owner}` has an equation of it, mode `{self.scope.mode}` has none"
-        self._report("name", tree.span, f"`{tree.path}` is not known {self.scope.place}", hint)
+        self.report("name", tree.span, f"`{tree.path}` is not known {self.scope.place}", hint)
         return None
 
     def _arithmetic(self, tree: Arithmetic) -> Dimension | Whole | None:
@@ -201,9 +203,9 @@ class DimensionCheck:
         for part in (tree.left, tree.right):
             if isinstance(part, Number) and part.unit.offset:
                 label = "a temperature in degC is not added or subtracted"
-                self._report("dimension", part.span, label, "write a difference in K")
+                self.report("dimension", part.span, label, "write a difference in K")
         self._one_unit_of_angle(tree)
-        return self._together(tree.left, left, tree.right, right, tree.span, tree.operator)
+        return self.together(tree.left, left, tree.right, right, tree.span, tree.operator)
 
     def _one_unit_of_angle(self, tree: Arithmetic) -> None:
         """Two declared numbers in `deg` and `rad` are not added: rule 20, nothing is converted."""
@@ -214,7 +216,7 @@ class DimensionCheck:
         )
         if first and second and first.factor != second.factor:
             label = f"`{tree.operator}` joins `{first.text}` and `{second.text}`"
-            self._report("dimension", tree.span, label, "declare both in one unit of angle")
+            self.report("dimension", tree.span, label, "declare both in one unit of angle")
 
     def _safe(self, kind: Whole, tree: Arithmetic) -> Whole:
         """Whole numbers are held in 32 bits: what may not fit is a problem."""
@@ -222,20 +224,21 @@ class DimensionCheck:
             return kind
         label = f"this may lie from {kind.low} to {kind.high}: past {LARGEST_WHOLE}"
         hint = "give the whole numbers in it a narrower `range`"
-        self._report("overflow", tree.span, label, hint)
+        self.report("overflow", tree.span, label, hint)
         return Whole()
 
-    def _together(
+    def together(
         self, a: Tree, left: Dimension, b: Tree, right: Dimension, span: Span, operator: str
     ) -> Dimension | None:
-        if _zero(a):
+        """Return the dimension of what joins `a` and `b`; reports where they do not fit."""
+        if is_zero(a):
             return right
-        if _zero(b):
+        if is_zero(b):
             return left
         if fits(left, right):
             return common(left, right)
         label = f"`{operator}` joins `{left}` and `{right}`"
-        self._report("dimension", span, label, _angle_hint(left, right))
+        self.report("dimension", span, label, angle_hint(left, right))
         return None
 
     def _relation(self, tree: Relation) -> Truthful:
@@ -249,17 +252,17 @@ class DimensionCheck:
             return "truth"
         named = [kind for kind in (first, second) if isinstance(kind, str | Enumeration)]
         if equality and len(named) == 2:
-            label = f"`{tree.operator}` compares {_said(named[0])} and {_said(named[1])}"
-            self._report("type", tree.span, label)
+            label = f"`{tree.operator}` compares {said(named[0])} and {said(named[1])}"
+            self.report("type", tree.span, label)
             return "truth"
         left, right = self._number(first, tree.left), self._number(second, tree.right)
         if left is None or right is None:
             return "truth"
         if equality:
             label = f"`{tree.operator}` is not for real numbers"
-            self._report("type", tree.span, label, "use `<=` or `>=`")
+            self.report("type", tree.span, label, "use `<=` or `>=`")
         else:
-            self._together(tree.left, left, tree.right, right, tree.span, tree.operator)
+            self.together(tree.left, left, tree.right, right, tree.span, tree.operator)
         return "truth"
 
     def _choice(self, tree: Choice) -> Kind | None:
@@ -270,82 +273,16 @@ class DimensionCheck:
         wholes = _wholes(tree.then, first, tree.other, second)
         if wholes:
             return wholes[0].joined(wholes[1])
-        left, right = _as_real(first), _as_real(second)
+        left, right = as_real(first), as_real(second)
         if isinstance(left, Dimension) and isinstance(right, Dimension):
-            return self._together(tree.then, left, tree.other, right, tree.span, "if")
+            return self.together(tree.then, left, tree.other, right, tree.span, "if")
         if left != right:
-            label = f"one arm is {_said(first)}, the other {_said(second)}"
+            label = f"one arm is {said(first)}, the other {said(second)}"
             if "truth" in (left, right) and Dimension in (type(left), type(right)):
                 label = "one arm is a condition, the other a quantity"
-            self._report("type", tree.span, label)
+            self.report("type", tree.span, label)
             return None
         return left
-
-    def _application(self, tree: Application) -> Kind | None:
-        name, arguments = tree.function, tree.arguments
-        if name == "in":
-            return self._in(tree)
-        if name in WHERE:
-            return memory_kind(self, tree)
-        if name == "lookup":
-            return lookup_kind(self, tree)
-        wanted = ARGUMENTS.get(name)
-        if wanted is None:
-            label = f"`{name}` is not a function that can be used here"
-            usable = (*ARGUMENTS, *sorted(self.scope.memory), "lookup")
-            hint = nearest(name, KNOWN) or f"there are `{' '.join(usable)}`"
-            self._report("name", tree.span, label, hint)
-            return None
-        if len(arguments) != wanted:
-            label = f"`{name}` takes {wanted} argument(s), not {len(arguments)}"
-            self._report("arguments", tree.span, label)
-            return None
-        kinds = [self._real(argument) for argument in arguments]
-        if any(kind is None for kind in kinds):
-            return None
-        return self._function(tree, [kind for kind in kinds if kind is not None])
-
-    def _function(self, tree: Application, kinds: list[Dimension]) -> Dimension | None:
-        name, first = tree.function, kinds[0]
-        if name in SAME or name == "atan2":
-            base: Tree = tree.arguments[0]
-            sum_so_far: Dimension = first
-            for argument, kind in zip(tree.arguments[1:], kinds[1:], strict=True):
-                joined = self._together(base, sum_so_far, argument, kind, tree.span, name)
-                if joined is None:
-                    return None
-                base, sum_so_far = (argument if _zero(base) else base), joined
-            return ANGLE if name == "atan2" else sum_so_far
-        if name == "sqrt":
-            result = root(first)
-            if result is None:
-                self._report("dimension", tree.span, f"`{first}` has no square root")
-            return result
-        if name == "sign":
-            return NUMBER
-        fine = first.is_bare and (first.angle is None or first.angle == (name in ANGLES))
-        if not fine and not _zero(tree.arguments[0]):
-            want = "an angle" if name in ANGLES else "a number"
-            self._report("dimension", tree.span, f"`{name}` takes {want}, this is in `{first}`")
-        return NUMBER
-
-    def _in(self, tree: Application) -> Truthful:
-        name = tree.arguments[0]
-        if not isinstance(name, Name) or name.path not in self.scope.modes:
-            shown = name.path if isinstance(name, Name) else "..."
-            label = f"`in({shown})` does not name a mode of the run of this mode or of a region"
-            hint = nearest(shown, self.scope.modes)
-            self._report("name", tree.span, label, hint)
-        return "truth"
-
-
-def _zero(tree: Tree) -> bool:
-    """A bare 0 goes with any dimension."""
-    return isinstance(tree, Number) and tree.is_bare_zero
-
-
-def _as_real(kind: Kind | None) -> Kind | None:
-    return NUMBER if isinstance(kind, Whole) else kind
 
 
 def _wholes(
@@ -359,19 +296,3 @@ def _wholes(
     if isinstance(second, Whole) and (value := whole_literal(a)) is not None:
         return Whole(value, value), second
     return None
-
-
-def _said(kind: Kind) -> str:
-    if kind == "truth":
-        return "true or false"
-    if isinstance(kind, Enumeration):
-        return f"one of {', '.join(kind.values)}"
-    return "a whole number" if isinstance(kind, Whole) else "a quantity"
-
-
-def _angle_hint(left: Dimension, right: Dimension) -> str:
-    if left.powers != right.powers:
-        return ""
-    if left.is_bare and 0 in (left.angle, right.angle):
-        return "give the unit of the angle: `0.02 rad`, `3 deg`"
-    return "they differ in the power of the angle (rad)"

@@ -1,13 +1,18 @@
-"""Fault: the transitions into the declared fault mode (rules 13 and 18)."""
+"""Fault: the names of the bits, and the transitions into the fault mode (rules 13 and 18)."""
 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterable, Mapping
 
 from language.declaration import Formula
+from language.limit import MAX_FAULTS, fault_of, limited_things
 from language.model import Automaton, Mode, Transition
+from language.operation import Block, FaultBit
+from language.problem import Problems
 from language.region import with_regions
 from language.syntax import Name
+from language.traversal import walk
 
 FAULT_GUARD = "fault happened"
 """The name under which the guard of these transitions is known; no spec can write it."""
@@ -40,3 +45,19 @@ def _with_way_out(automaton: Automaton, mode: Mode) -> Mode:
         span=mode.span,
     )
     return dataclasses.replace(mode, transitions=(*mode.transitions, way))
+
+
+def fault_names(
+    automaton: Automaton, blocks: Mapping[str, Block], more: Iterable[str], problems: Problems
+) -> tuple[str, ...]:
+    """Return the faults that are declared, then `more`, then all others that something sets."""
+    ops = [op for block in blocks.values() for op in walk(block)]
+    named = {op.fault for op in ops if isinstance(op, FaultBit)}
+    own = [fault for fault in map(fault_of, limited_things(automaton)) if fault in named]
+    found = tuple(dict.fromkeys([*automaton.faults, *more, *own]))
+    if len(found) > MAX_FAULTS:
+        label = f"there are {len(found)} fault bits: {MAX_FAULTS} fit into one word"
+        hint = "give several ranges one bit: `fault: name` beside them"
+        problems.error("faults", automaton.span, label, hint)
+        problems.stop_if_any()
+    return found

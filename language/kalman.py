@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from language.constants import constant_value
 from language.declaration import Formula
 from language.derived import with_model
+from language.entries import number_diagonal, number_matrix, output_matrix
 from language.evaluate import Scalar
 from language.limit import stored
 from language.lower import Names, expression
@@ -274,42 +275,3 @@ def solved_formulas(observer: Observer) -> list[Formula]:
     rows = [*observer.a.values(), *observer.b.values(), *observer.c.values()]
     noise = [observer.process_noise, observer.measurement_noise]
     return [formula for row in [*rows, *noise] for formula in row.values()]
-
-
-def number_matrix(
-    automaton: Automaton,
-    values: Mapping[str, Scalar],
-    entries: Mapping[str, Mapping[str, Formula]],
-    rows: tuple[str, ...],
-    columns: tuple[str, ...],
-    what: str,
-) -> Matrix:
-    """Return a matrix of formulas in numbers, by row and column name."""
-
-    def value(row: str, column: str) -> float:
-        formula = entries.get(row, {}).get(column)
-        return constant_value(formula, automaton, values, what) if formula else 0.0
-
-    return tuple(tuple(value(row, column) for column in columns) for row in rows)
-
-
-def number_diagonal(
-    automaton: Automaton,
-    values: Mapping[str, Scalar],
-    entries: Mapping[str, Formula],
-    names: tuple[str, ...],
-) -> Matrix:
-    """Return a diagonal matrix of formulas in numbers."""
-    rows = {name: {name: formula} for name, formula in entries.items()}
-    return number_matrix(automaton, values, rows, names, names, "noise")
-
-
-def output_matrix(automaton: Automaton, values: Mapping[str, Scalar], observer: Observer) -> Matrix:
-    """Return C (measures, states)."""
-    measures = tuple(observer.measures)
-    if observer.c:
-        return number_matrix(automaton, values, observer.c, measures, observer.states, "C")
-    return tuple(
-        tuple(1.0 if state == observer.measures[name] else 0.0 for state in observer.states)
-        for name in measures
-    )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from language.units import Dimension
+from language.units import NUMBER, Dimension
 
 Type = Literal["real", "int", "bool", "enum"]
 """What a declaration says after `type:`."""
@@ -58,3 +58,17 @@ def combined(operator: str, left: Whole, right: Whole) -> Whole:
         return Whole(left.low - right.high, left.high - right.low)
     corners = [a * b for a in (left.low, left.high) for b in (right.low, right.high)]
     return Whole(min(corners), max(corners))
+
+
+def as_real(kind: Kind | None) -> Kind | None:
+    """Return what a kind is in arithmetic of reals: a whole number is a number without a unit."""
+    return NUMBER if isinstance(kind, Whole) else kind
+
+
+def said(kind: Kind) -> str:
+    """Return a kind in words."""
+    if kind == "truth":
+        return "true or false"
+    if isinstance(kind, Enumeration):
+        return f"one of {', '.join(kind.values)}"
+    return "a whole number" if isinstance(kind, Whole) else "a quantity"

@@ -15,15 +15,13 @@ from language.constants import constant_value
 from language.covariance import Ahead, bounded, corrected, entry, pairs, spread
 from language.declaration import Formula
 from language.derived import with_model
+from language.entries import number_diagonal, number_matrix, output_matrix
 from language.evaluate import Scalar, evaluate
 from language.kalman import (
     Kalman,
     SolvedNames,
     is_fresh,
     mean_ahead,
-    number_diagonal,
-    number_matrix,
-    output_matrix,
     rest_constants,
     solved_formulas,
 )

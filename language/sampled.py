@@ -9,7 +9,6 @@ of its model's field.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
 
 from language.action import (
     action_variables,
@@ -22,17 +21,14 @@ from language.action import (
 from language.constants import derive_block, parameter_constants, values_of
 from language.covariance import COVARIANCE_RANGE, covariance_variables
 from language.evaluate import Scalar
-from language.fault import FAULT_GUARD, with_fault_transitions
+from language.fault import FAULT_GUARD, fault_names, with_fault_transitions
 from language.invariant import INVARIANTS, invariant_block, invariant_variables
 from language.kalman import Kalman, kalman, observer_variables
 from language.limit import (
     HAPPENED,
-    MAX_FAULTS,
-    fault_of,
     first_latched,
     latch,
     limit_variables,
-    limited_things,
 )
 from language.lower import equation_names, equations, variable_names
 from language.memory import delays_of, keep_block, memory_variables, with_delays
@@ -40,10 +36,8 @@ from language.model import CHART, Automaton, Mode
 from language.operation import (
     Assign,
     Block,
-    Branch,
     Compare,
     Expr,
-    FaultBit,
     Op,
     Ref,
     Run,
@@ -62,9 +56,9 @@ from language.program import (
 from language.recursive import recursive
 from language.region import in_modes
 from language.run import EVENT_LIMIT, run_block, run_motion, start_regions
+from language.stamp import STALE_CALIBRATION, STAMPS, stamps_block, stamps_of
 from language.tick import by_mode, tick_block
 from language.transition import enter_run, sampled_commit, sampled_jump, transition_infos
-from language.traversal import walk
 from language.wiring import (
     assembled,
     enter_initial,
@@ -74,10 +68,6 @@ from language.wiring import (
     mode_and_fired,
     state_variables,
 )
-
-STALE_CALIBRATION = "stale_calibration"
-STAMPS = "compare_stamps"
-"""Run before the first tick and after each change of the calibration."""
 
 
 def sampled_program(automaton: Automaton, problems: Problems) -> Program:
@@ -147,26 +137,12 @@ class _Sampled:
         program = assembled(automaton, blocks, self.constants, variables, self.transitions)
         program = dataclasses.replace(
             program,
-            faults=self._fault_names(blocks),
+            faults=fault_names(automaton, blocks, self.faults, self.problems),
             run_modes=self._run_modes() if runs else (),
             observers=tuple(observer.info for observer in self.observers.values()),
             motion=self.motion,
         )
         return finished(program, entries=("init", "derive", STAMPS, "step", INVARIANTS))
-
-    def _fault_names(self, blocks: Mapping[str, Block]) -> tuple[str, ...]:
-        """The faults that are declared, then all others that something sets."""
-        ops = [op for block in blocks.values() for op in walk(block)]
-        named = {op.fault for op in ops if isinstance(op, FaultBit)}
-        automaton = self.automaton
-        own = [f for f in map(fault_of, limited_things(automaton)) if f in named]
-        found = tuple(dict.fromkeys([*automaton.faults, *self.faults, *own]))
-        if len(found) > MAX_FAULTS:
-            label = f"there are {len(found)} fault bits: {MAX_FAULTS} fit into one word"
-            hint = "give several ranges one bit: `fault: name` beside them"
-            self.problems.error("faults", self.automaton.span, label, hint)
-            self.problems.stop_if_any()
-        return found
 
     def _phases(self, mode: Mode) -> dict[str, Block]:
         """Equations, jump and update of one mode."""
@@ -183,8 +159,12 @@ class _Sampled:
 
     def _entries(self) -> dict[str, Block]:
         """What is run from outside, and what these run whatever the mode."""
-        inputs, stamps = self.automaton.inputs, self._stamps()
-        found: dict[str, Block] = {STAMPS: stamps} if stamps else {}
+        inputs = self.automaton.inputs
+        stamps = stamps_of(self.automaton, self.constants, self.parameters, self.problems)
+        self.constants += stamps
+        if stamps and STALE_CALIBRATION not in self.faults:
+            self.faults.append(STALE_CALIBRATION)
+        found: dict[str, Block] = {STAMPS: stamps_block(stamps)} if stamps else {}
         return found | {
             "latch": latch(self.automaton),
             "remember": tuple(
@@ -195,7 +175,7 @@ class _Sampled:
             "keep": keep_block(self.automaton, self.delays, self.all),
             "start": self._start(),
             "derive": derive_block(self.automaton),
-            "init": self._init(stamps),
+            "init": self._init(bool(stamps)),
             "step": self._step(),
         }
 
@@ -277,7 +257,7 @@ class _Sampled:
             ops.append(Run(f"correct_{initial.name}"))
         return tuple(ops)
 
-    def _init(self, stamps: Block) -> Block:
+    def _init(self, stamps: bool) -> Block:
         """Before the first tick: nothing has started."""
         ops: list[Op] = [
             Assign("memory.started", Value(False)),
@@ -286,27 +266,6 @@ class _Sampled:
             *first_latched(self.automaton),
         ]
         return (*ops, Run(STAMPS)) if stamps else tuple(ops)
-
-    def _stamps(self) -> Block:
-        """Solved numbers must fit the calibration: before the first tick, and after a change."""
-        ops: list[Op] = []
-        stamped = {name for constant in self.constants for name in constant.depends_on}
-        for name in sorted(stamped):
-            if STALE_CALIBRATION not in self.faults:
-                self.faults.append(STALE_CALIBRATION)
-            if self.parameters[name].items:
-                label = (
-                    f"`{name}` enters what is solved when the spec is checked: it is not tunable"
-                )
-                self.problems.error("table", self.automaton.parameters[name].span, label)
-                continue
-            stamp = f"solved.stamp_{name}"
-            value = self.parameters[name].value
-            unit = self.parameters[name].unit
-            self.constants.append(Constant(stamp, "solved", value, unit, depends_on=(name,)))
-            changed = Compare("!=", Ref(f"calibration.{name}"), Ref(stamp))
-            ops.append(Branch(changed, (FaultBit(STALE_CALIBRATION),)))
-        return tuple(ops)
 
     def _step(self) -> Block:
         carried = {mode.name: self._carried(mode) for mode in self.automaton.modes.values()}

@@ -210,3 +210,8 @@ def depth(tree: Tree) -> int:
         deepest += 1
         level = [child for part in level for child in children(part)]
     return deepest
+
+
+def is_zero(tree: Tree) -> bool:
+    """Tell whether an expression is a bare 0: it goes with any dimension."""
+    return isinstance(tree, Number) and tree.is_bare_zero

@@ -184,3 +184,12 @@ def _nearest_symbol(symbol: str) -> str:
         return symbol
     found = difflib.get_close_matches(symbol, SYMBOLS, n=1)
     return OFTEN_WRITTEN.get(symbol, found[0] if found else symbol)
+
+
+def angle_hint(left: Dimension, right: Dimension) -> str:
+    """Return what to do where two dimensions differ in the angle only; else nothing."""
+    if left.powers != right.powers:
+        return ""
+    if left.is_bare and 0 in (left.angle, right.angle):
+        return "give the unit of the angle: `0.02 rad`, `3 deg`"
+    return "they differ in the power of the angle (rad)"

@@ -1,0 +1,50 @@
+"""Entries: the matrices of an observer in numbers, from the formulas of their entries."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from language.constants import constant_value
+from language.declaration import Formula
+from language.evaluate import Scalar
+from language.matrix import Matrix
+from language.model import Automaton, Observer
+
+
+def number_matrix(
+    automaton: Automaton,
+    values: Mapping[str, Scalar],
+    entries: Mapping[str, Mapping[str, Formula]],
+    rows: tuple[str, ...],
+    columns: tuple[str, ...],
+    what: str,
+) -> Matrix:
+    """Return a matrix of formulas in numbers, by row and column name."""
+
+    def value(row: str, column: str) -> float:
+        formula = entries.get(row, {}).get(column)
+        return constant_value(formula, automaton, values, what) if formula else 0.0
+
+    return tuple(tuple(value(row, column) for column in columns) for row in rows)
+
+
+def number_diagonal(
+    automaton: Automaton,
+    values: Mapping[str, Scalar],
+    entries: Mapping[str, Formula],
+    names: tuple[str, ...],
+) -> Matrix:
+    """Return a diagonal matrix of formulas in numbers."""
+    rows = {name: {name: formula} for name, formula in entries.items()}
+    return number_matrix(automaton, values, rows, names, names, "noise")
+
+
+def output_matrix(automaton: Automaton, values: Mapping[str, Scalar], observer: Observer) -> Matrix:
+    """Return C (measures, states)."""
+    measures = tuple(observer.measures)
+    if observer.c:
+        return number_matrix(automaton, values, observer.c, measures, observer.states, "C")
+    return tuple(
+        tuple(1.0 if state == observer.measures[name] else 0.0 for state in observer.states)
+        for name in measures
+    )

@@ -1,0 +1,85 @@
+"""Function: what the elementary functions and `in` take, and what they return (rule 20)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from language.call import WHERE, lookup_kind, memory_kind
+from language.problem import nearest
+from language.syntax import MEMORY, Application, Name, Tree, is_zero
+from language.units import NUMBER, Dimension, root
+
+if TYPE_CHECKING:
+    from language.dimension import DimensionCheck
+    from language.kind import Kind
+
+ANGLE = Dimension(angle=1)
+SAME = {"abs": 1, "min": 2, "max": 2, "clip": 3}
+"""Functions whose arguments and value have one dimension, with their number of arguments."""
+NUMBERS = {"exp": 1, "tanh": 1, "floor": 1, "sign": 1}
+ANGLES = {"sin": 1, "cos": 1, "tan": 1}
+ARGUMENTS = {**SAME, **NUMBERS, **ANGLES, "sqrt": 1, "atan2": 2}
+KNOWN = (*ARGUMENTS, *MEMORY, "lookup", "in", "der")
+
+
+def function_kind(check: DimensionCheck, tree: Application) -> Kind | None:
+    """Return what a function returns; None where a problem was reported."""
+    name, arguments = tree.function, tree.arguments
+    if name == "in":
+        return _in(check, tree)
+    if name in WHERE:
+        return memory_kind(check, tree)
+    if name == "lookup":
+        return lookup_kind(check, tree)
+    wanted = ARGUMENTS.get(name)
+    if wanted is None:
+        label = f"`{name}` is not a function that can be used here"
+        usable = (*ARGUMENTS, *sorted(check.scope.memory), "lookup")
+        hint = nearest(name, KNOWN) or f"there are `{' '.join(usable)}`"
+        check.report("name", tree.span, label, hint)
+        return None
+    if len(arguments) != wanted:
+        label = f"`{name}` takes {wanted} argument(s), not {len(arguments)}"
+        check.report("arguments", tree.span, label)
+        return None
+    kinds = [check.real(argument) for argument in arguments]
+    if any(kind is None for kind in kinds):
+        return None
+    return _elementary(check, tree, [kind for kind in kinds if kind is not None])
+
+
+def _elementary(
+    check: DimensionCheck, tree: Application, kinds: list[Dimension]
+) -> Dimension | None:
+    name, first = tree.function, kinds[0]
+    if name in SAME or name == "atan2":
+        base: Tree = tree.arguments[0]
+        sum_so_far: Dimension = first
+        for argument, kind in zip(tree.arguments[1:], kinds[1:], strict=True):
+            joined = check.together(base, sum_so_far, argument, kind, tree.span, name)
+            if joined is None:
+                return None
+            base, sum_so_far = (argument if is_zero(base) else base), joined
+        return ANGLE if name == "atan2" else sum_so_far
+    if name == "sqrt":
+        result = root(first)
+        if result is None:
+            check.report("dimension", tree.span, f"`{first}` has no square root")
+        return result
+    if name == "sign":
+        return NUMBER
+    fine = first.is_bare and (first.angle is None or first.angle == (name in ANGLES))
+    if not fine and not is_zero(tree.arguments[0]):
+        want = "an angle" if name in ANGLES else "a number"
+        check.report("dimension", tree.span, f"`{name}` takes {want}, this is in `{first}`")
+    return NUMBER
+
+
+def _in(check: DimensionCheck, tree: Application) -> Kind:
+    name = tree.arguments[0]
+    if not isinstance(name, Name) or name.path not in check.scope.modes:
+        shown = name.path if isinstance(name, Name) else "..."
+        label = f"`in({shown})` does not name a mode of the run of this mode or of a region"
+        hint = nearest(shown, check.scope.modes)
+        check.report("name", tree.span, label, hint)
+    return "truth"
