@@ -31,28 +31,37 @@ CONVERT: Mapping[str, Callable[[Any], Any]] = {"real": float, "truth": bool, "wh
 
 
 def simulate(
-    system: System, scenario: Scenario, build: Build = Interpreter, ticked: Ticked | None = None
+    system: System,
+    scenario: Scenario,
+    build: Build = Interpreter,
+    ticked: Ticked | None = None,
+    programs: Mapping[str, Program] | None = None,
 ) -> Trajectory:
     """Return the trajectory of a system through a scenario.
 
     `build` makes the steppers (the interpreter, or a compiled one with the same protocol);
     `ticked` is called after each tick of a sampled instance, and after each major step of a
-    continuous one until something outside happens between two of them. Raises SpecError for what
-    is wrong with a recording.
+    continuous one until something outside happens between two of them; `programs` are those of the
+    instances where they are made already. Raises SpecError for what is wrong with a recording.
     """
-    return _Simulation(system, resolved(system, scenario), build, ticked).run()
+    return _Simulation(system, resolved(system, scenario), build, ticked, programs).run()
 
 
 class _Simulation:
     """The instances of a system and the instants at which something happens."""
 
     def __init__(
-        self, system: System, scenario: Scenario, build: Build, ticked: Ticked | None
+        self,
+        system: System,
+        scenario: Scenario,
+        build: Build,
+        ticked: Ticked | None,
+        programs: Mapping[str, Program] | None,
     ) -> None:
         self.system = system
         self.scenario = scenario
         self.ticked = ticked
-        self.programs = programs_of(system, scenario)
+        self.programs = dict(programs or programs_of(system, scenario))
         self.schedule = Schedule(system, scenario, self.programs)
         self.steppers = {name: build(program) for name, program in self.programs.items()}
         self.signals = Signals(system, scenario, self.programs, self.steppers)

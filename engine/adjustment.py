@@ -1,0 +1,208 @@
+"""Adjustment: which values of a batch one Program takes, and which need a Program per value.
+
+A swept parameter is made tunable in the Programs of the batch, a swept initial value becomes a
+tunable parameter of its own: so all variants share their Programs, and differ in calibrations.
+Numbers that are solved at check time (gains, matrix exponentials) and times of waits cannot follow
+a tunable: what they depend on is set before the Program is made, once for each value.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.batch import Batch
+from engine.starting import programs_of
+from engine.stimulus import resolved
+from language.declaration import Formula, Parameter
+from language.experiment import Scenario, System
+from language.model import Automaton
+from language.printing import digest
+from language.problem import SpecError
+from language.program import Program
+from language.syntax import Name
+
+START = "start_of_{}"
+"""The name of the parameter that a swept initial value becomes."""
+
+
+@dataclass(frozen=True)
+class Adjustment:
+    """How a batch is carried out: `system` and `scenario` in which swept values are tunable.
+
+    `tuned` gives for each swept name its instance and tunable parameter; `rebuilt` says why a name
+    needs a Program per value. `programs` are those of the batch's own values of what is rebuilt.
+    """
+
+    system: System
+    scenario: Scenario
+    programs: Mapping[str, Program]
+    tuned: Mapping[str, tuple[str, str]]
+    rebuilt: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class Group:
+    """Variants (places in the batch) that share their Programs."""
+
+    variants: NDArray[np.int64]
+    adjustment: Adjustment
+
+
+def adjusted(batch: Batch) -> Adjustment:
+    """Return how the names of a batch are swept.
+
+    Raises ValueError for a name that is not there, SpecError for a value that no Program takes.
+    """
+    require_known(batch)
+    scenario = _without_initial(resolved(batch.system, batch.scenario), batch)
+    rebuilt: dict[str, str] = {}
+    system, tuned = batch.system, {}
+    for name in dict.fromkeys([*batch.parameters, *batch.initial]):
+        reason = None if name in batch.initial else _why_rebuilt(batch, scenario, name)
+        if reason:
+            rebuilt[name] = reason
+        else:
+            tuned[name] = _tunable_of(name, batch)
+            system = _tuned(system, name, batch)
+    return Adjustment(system, scenario, programs_of(system, scenario), tuned, rebuilt)
+
+
+def groups(batch: Batch) -> list[Group]:
+    """Return the variants of a batch by the values that need a Program of their own."""
+    adjustment = adjusted(batch)
+    if not adjustment.rebuilt:
+        return [Group(np.arange(batch.count), adjustment)]
+    names = list(adjustment.rebuilt)
+    table = np.stack([batch.parameters[name] for name in names], axis=1)
+    rows, of = np.unique(table, axis=0, return_inverse=True)
+    found = []
+    for number, row in enumerate(rows):
+        system = adjustment.system
+        for name, value in zip(names, row.tolist(), strict=True):
+            system = _valued(system, name, value)
+        programs = programs_of(system, adjustment.scenario)
+        own = dataclasses.replace(adjustment, system=system, programs=programs)
+        found.append(Group(np.flatnonzero(of.reshape(-1) == number), own))
+    return found
+
+
+def require_known(batch: Batch) -> None:
+    """Raise ValueError for a name that is not there, or for arrays of another length."""
+    for name in batch.parameters:
+        owner, _, short = name.partition(".")
+        instance = batch.system.instances.get(owner)
+        if instance is None or short not in instance.automaton.parameters:
+            raise ValueError(f"`{name}` is no parameter of {batch.system.name}")
+    for name in batch.initial:
+        owner, _, short = name.partition(".")
+        instance = batch.system.instances.get(owner)
+        if instance is None or short not in instance.automaton.states:
+            raise ValueError(f"`{name}` is no state of {batch.system.name}")
+    arrays = {**batch.parameters, **batch.initial}
+    arrays |= {name: table.values for name, table in batch.inputs.items()}
+    for name, values in arrays.items():
+        if len(values) != batch.count or not np.all(np.isfinite(values)):
+            raise ValueError(f"`{name}` needs {batch.count} finite values")
+    for name, table in batch.inputs.items():
+        if name not in batch.system.inputs:
+            raise ValueError(f"`{name}` is no input of {batch.system.name}")
+        if (
+            not table.starts
+            or table.starts[0] != 0
+            or table.values.shape[1:] != (len(table.starts),)
+        ):
+            raise ValueError(f"`{name}` needs a value for each start, the first at 0 s")
+    known = (*batch.system.signals, *batch.system.inputs)
+    for name in (*batch.outputs, *(measure.signal for measure in batch.measures)):
+        if name not in known:
+            raise ValueError(f"`{name}` is no signal of {batch.system.name}")
+
+
+def _without_initial(scenario: Scenario, batch: Batch) -> Scenario:
+    kept = {name: value for name, value in scenario.initial.items() if name not in batch.initial}
+    signals = tuple(dict.fromkeys([*batch.outputs, *(m.signal for m in batch.measures)]))
+    return dataclasses.replace(scenario, initial=kept, signals=signals or scenario.signals[:1])
+
+
+def _tunable_of(name: str, batch: Batch) -> tuple[str, str]:
+    owner, _, short = name.partition(".")
+    return owner, START.format(short) if name in batch.initial else short
+
+
+def _tuned(system: System, name: str, batch: Batch) -> System:
+    owner, _, short = name.partition(".")
+    automaton = system.instances[owner].automaton
+    parameters, states = dict(automaton.parameters), dict(automaton.states)
+    if name not in batch.initial:
+        first = float(batch.parameters[name][0])
+        return _as_tunable(_valued(system, name, first), owner, short)
+    state, fresh = states[short], START.format(short)
+    key, span = f"parameters.{fresh}", state.span
+    parameters[fresh] = Parameter(fresh, "tunable", state.unit, Fraction(0), None, None, key, span)
+    formula = Formula(Name(fresh, span), state.initial.key)
+    states[short] = dataclasses.replace(state, initial=formula)
+    changed = dataclasses.replace(automaton, parameters=parameters, states=states)
+    return _with_automaton(system, owner, changed)
+
+
+def _valued(system: System, name: str, value: float) -> System:
+    """Return the system with a parameter set, in an automaton and in the model that it knows."""
+    owner, _, short = name.partition(".")
+    exact = Fraction(repr(float(value)))  # the decimal that was meant: a wait of 2 ms is two ticks
+
+    def with_value(automaton: Automaton) -> Automaton:
+        old = automaton.parameters.get(short)
+        if old is None:
+            return automaton
+        kind = "fixed" if old.kind == "derived" else old.kind
+        new = dataclasses.replace(old, value=exact, derived=None, kind=kind)
+        model = automaton.model and with_value(automaton.model)
+        parameters = {**automaton.parameters, short: new}
+        return dataclasses.replace(automaton, parameters=parameters, model=model)
+
+    return _with_automaton(system, owner, with_value(system.instances[owner].automaton))
+
+
+def _with_automaton(system: System, owner: str, automaton: Automaton) -> System:
+    instance = dataclasses.replace(system.instances[owner], automaton=automaton)
+    return dataclasses.replace(system, instances={**system.instances, owner: instance})
+
+
+def _why_rebuilt(batch: Batch, scenario: Scenario, name: str) -> str | None:
+    """Return why a parameter needs a Program per value: more than a calibration follows from it."""
+    owner, _, short = name.partition(".")
+    values = batch.parameters[name]
+    ends = [_valued(batch.system, name, float(end)) for end in (np.min(values), np.max(values))]
+    for system in ends:
+        programs_of(system, scenario)
+    try:
+        low, high = (
+            programs_of(_as_tunable(system, owner, short), scenario)[owner] for system in ends
+        )
+    except SpecError as error:
+        return f"{error.problems[0].label}: a Program for each value"
+    if digest(_without_values(low)) == digest(_without_values(high)):
+        return None
+    return f"`{owner}` has numbers or times that are solved from it: a Program for each value"
+
+
+def _without_values(program: Program) -> Program:
+    """Return a Program in which tunables, and what follows from them, have no value."""
+    constants = tuple(
+        dataclasses.replace(c, value=0.0) if c.kind in ("tunable", "derived") else c
+        for c in program.constants
+    )
+    return dataclasses.replace(program, constants=constants)
+
+
+def _as_tunable(system: System, owner: str, short: str) -> System:
+    automaton = system.instances[owner].automaton
+    parameter = dataclasses.replace(automaton.parameters[short], kind="tunable")
+    parameters = {**automaton.parameters, short: parameter}
+    return _with_automaton(system, owner, dataclasses.replace(automaton, parameters=parameters))
