@@ -1,11 +1,15 @@
-"""Closures: each operation of a Program as a Python function over one frame of values."""
+"""Closures: the blocks of a Program as Python functions over one frame of values."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from engine import actions, shapes
+from engine.actions import Action
 from engine.arithmetic import ARITHMETIC
+from engine.frame import LEFT_RANGE, Scope, scope_of
+from engine.shapes import Frame, Read
 from language.evaluate import OPERATIONS
 from language.operation import (
     Assign,
@@ -29,98 +33,176 @@ from language.operation import (
     Value,
 )
 from language.program import Function, Program
+from language.traversal import with_value
 
-Frame = list[Any]
-Read = Callable[[Frame], Any]
-Action = Callable[[Frame], None]
+AT_ONCE = 4
+"""Most assignments in one function (engine/actions.py)."""
+UNROLLED = 8
+"""Loops of at most so many turns have a copy of their body for each: indices become constants."""
 
 
 class Compiler:
     """From operations to closures; constant parts are evaluated once, with the same operations."""
 
-    def __init__(self, program: Program, slots: Mapping[str, int]) -> None:
-        self.slots = slots
+    def __init__(self, program: Program) -> None:
+        self.program = program
         self.faults = {name: 1 << bit for bit, name in enumerate(program.faults)}
-        self.left: dict[str, None] = {}
-        fixed = ("constant.", "solved.")
         self.arithmetic = ARITHMETIC[program.number]
         value = self.arithmetic.value
+        self.scope = scope_of(program)
+        fixed = ("constant.", "solved.")
         scalars = [c for c in program.constants if c.name.startswith(fixed) and not c.items]
         self.fixed = {c.name: value(c.value) for c in scalars}
         self.functions: dict[str, Callable[..., Any]] = {}
         for function in sorted(program.functions, key=lambda f: _depth(f, program.functions)):
             self.functions[function.name] = self._function(function)
-        self.blocks: dict[str, list[Action]] = {name: [] for name in program.blocks}
-        for name, block in program.blocks.items():
-            self.blocks[name].extend(self._action(op) for op in block)
+        reals = [v.name for v in program.variables if v.type == "real"]
+        reals += [c.name for c in program.constants if c.type == "real"]
+        self.reals = frozenset(reals)
+        self._done: dict[str, Action] = {}
+        self.blocks = {name: self._named(name) for name in program.blocks}
 
     def _function(self, function: Function) -> Callable[..., Any]:
-        slots = {name: slot for slot, name in enumerate(_locals(function))}
-        outer, self.slots = self.slots, slots
-        actions = [self._action(op) for op in function.body]
-        self.slots = outer
-        y, count = slots["work.y"], len(function.parameters)
-        rest: Frame = [None] * (len(slots) - count)
+        """Return a function of Python: its frame is its arguments, then its own variables."""
+        names = _locals(function)
+        outer = self.scope
+        self.scope = Scope({name: slot for slot, name in enumerate(names)}, [None] * len(names))
+        act = self._block(function.body)
+        y, count = self.scope.slots["work.y"], len(function.parameters)
+        rest = self.scope.values[count:]
+        self.scope = outer
 
         def call(*values: Any) -> Any:
             frame: Frame = [*values, *rest]
-            for action in actions:
-                action(frame)
+            act(frame)
             return frame[y]
 
         return call
 
-    def _block(self, block: Block) -> list[Action]:
-        return [self._action(op) for op in block]
+    def _named(self, name: str) -> Action:
+        if name not in self._done:
+            self._done[name] = self._block(self.program.blocks[name])
+        return self._done[name]
+
+    def _block(self, block: Block) -> Action:
+        found: list[Action] = []
+        row: list[Assign] = []
+        for op in block:
+            if row and not (isinstance(op, Assign) and self._go_on(row, op)):
+                found.append(self._row(row))
+                row = []
+            if isinstance(op, Assign):
+                row.append(op)
+            else:
+                found.append(self._action(op))
+        return actions.in_turn([*found, *([self._row(row)] if row else [])])
+
+    def _go_on(self, row: Sequence[Assign], op: Assign) -> bool:
+        """Tell whether an assignment is done in one function with those before it."""
+        alike = (self._slot(row[-1].value) is None) == (self._slot(op.value) is None)
+        return alike and len(row) < AT_ONCE
+
+    def _row(self, row: Sequence[Assign]) -> Action:
+        targets = [self.scope.slots[op.target] for op in row]
+        sources = [self._slot(op.value) for op in row]
+        if None not in sources:
+            return actions.copy(targets, [slot for slot in sources if slot is not None])
+        return actions.assign(targets, [self._read(op.value) for op in row])
 
     def _action(self, op: Op) -> Action:
+        slots = self.scope.slots
         match op:
-            case Assign(target, value, _):
-                return _assign(self.slots[target], self._read(value))
+            case Assign():
+                return self._row([op])
             case Store(array, index, value):
-                return _store(self.slots[array], self._read(index), self._read(value))
+                return actions.store(slots[array], self._read(index), self._read(value))
             case Branch(condition, then, other):
-                return _branch(self._read(condition), self._block(then), self._block(other))
+                two = self._block(then), self._block(other)
+                return actions.branch(self._read(condition), *two)
             case Choose(selector, cases):
                 table = {number: self._block(block) for number, block in cases}
-                return _choose(self.slots[selector], table)
+                return actions.choose(slots[selector], table)
+            case Loop(count, index, body) if count <= UNROLLED and _is_indexed(body):
+                turns = [with_value(body, index, k) for k in range(count)]
+                last = Assign(index, Value(count - 1))
+                return self._block((*(op for turn in turns for op in turn), last))
             case Loop(count, index, body):
-                return _loop(count, self.slots[index], self._block(body))
+                return actions.loop(count, slots[index], self._block(body))
             case Count(timer, condition, limit, _):
-                return _count(self.slots[timer], self._read(condition), limit)
-            case FaultBit(fault, signal, True):
-                slot, bit = self.slots["memory.faults"], self.faults[fault]
-                return _fault(slot, bit, signal, self.left)
-            case FaultBit(fault, _, _):
-                return _clear(self.slots["memory.faults"], self.faults[fault])
+                return actions.count(slots[timer], self._read(condition), limit)
+            case FaultBit(fault, signal, is_set):
+                slot, bit = slots["memory.faults"], self.faults[fault]
+                left = slots[LEFT_RANGE]
+                return (
+                    actions.fault(slot, bit, signal, left) if is_set else actions.clear(slot, bit)
+                )
             case Run(name):
-                return _run(self.blocks[name])
+                return self._named(name)
+
+    def _slot(self, expr: Expr) -> int | None:
+        """Return the slot of an operand that is read without a function of its own."""
+        return self._place(expr)
+
+    def _place(self, expr: Expr) -> int | None:
+        """Return where a value stands that needs no operation."""
+        if isinstance(expr, Ref) and expr.name in self.scope.slots:
+            return self.scope.slots[expr.name]
+        if _is_fixed(expr, self.fixed):
+            return self.scope.literal(self._fold(expr))
+        return None
 
     def _read(self, expr: Expr) -> Read:
-        if _is_fixed(expr, self.fixed):
-            return _constant(self._fold(expr))
+        place = self._place(expr)
+        if place is not None:
+            return shapes.of_slot(place)
         match expr:
-            case Ref(name):
-                return _slot(self.slots[name])
+            case Item(name, index) if _is_fixed(index, {}):
+                return shapes.of_element(self.scope.slots[name], self._fold(index))
             case Item(name, index):
-                return _item(self.slots[name], self._read(index))
+                return shapes.of_item(self.scope.slots[name], self._read(index))
             case Unary("-", operand):
-                return _negative(self._read(operand))
+                return shapes.negative(self._read(operand))
             case Unary(_, operand):
-                return _not(self._read(operand))
-            case Binary("/", left, right):
-                return _quotient(self.arithmetic.divide, self._read(left), self._read(right))
-            case Binary(operator, left, right):
-                return _BINARY[operator](self._read(left), self._read(right))
-            case Compare(operator, left, right):
-                return _BINARY[operator](self._read(left), self._read(right))
+                return shapes.opposite(self._read(operand))
+            case Binary(operator, left, right) | Compare(operator, left, right):
+                return self._pair(operator, left, right)
             case Select(condition, then, other):
-                return _select(self._read(condition), self._read(then), self._read(other))
+                parts = [self._read(part) for part in (condition, then, other)]
+                return shapes.selected(*parts)
             case Call(function, arguments):
                 known = self.functions.get(function) or self.arithmetic.elementary[function]
-                return _call(known, [self._read(argument) for argument in arguments])
+                return shapes.called(known, [self._read(argument) for argument in arguments])
             case _:
                 raise TypeError(f"not an expression: {expr!r}")
+
+    def _pair(self, operator: str, left: Expr, right: Expr) -> Read:
+        a, b = self._slot(left), self._slot(right)
+        if a is not None and b is not None:
+            return shapes.SLOTS[operator](a, b)
+        if a is not None:
+            three = self._inner(shapes.RIGHT, operator, right)
+            return (
+                three[0](a, *three[1])
+                if three
+                else shapes.SLOT_READ[operator](a, self._read(right))
+            )
+        if b is not None:
+            three = self._inner(shapes.LEFT, operator, left)
+            return (
+                three[0](*three[1], b) if three else shapes.READ_SLOT[operator](self._read(left), b)
+            )
+        return shapes.READS[operator](self._read(left), self._read(right))
+
+    def _inner(
+        self, table: Mapping[tuple[str, str], shapes.Triple], outer: str, inner: Expr
+    ) -> tuple[shapes.Triple, tuple[int, int]] | None:
+        """Return the shape of two operations on three slots, and two of them, if it is that."""
+        if not isinstance(inner, Binary) or (outer, inner.operator) not in table:
+            return None
+        a, b = self._slot(inner.left), self._slot(inner.right)
+        if a is None or b is None:
+            return None
+        return table[outer, inner.operator], (a, b)
 
     def _fold(self, expr: Expr) -> Any:
         match expr:
@@ -152,6 +234,11 @@ def _is_fixed(expr: Expr, fixed: Mapping[str, float]) -> bool:
             return False
 
 
+def _is_indexed(body: Block) -> bool:
+    """Tell whether a loop reads or sets elements, and nothing in it has a body of its own."""
+    return all(isinstance(op, Assign | Store) for op in body) and "Item(" in repr(body)
+
+
 def _locals(function: Function) -> list[str]:
     targets = [op.target for op in function.body if isinstance(op, Assign)]
     parameters = [f"work.{name}" for name in function.parameters]
@@ -163,132 +250,3 @@ def _depth(function: Function, functions: tuple[Function, ...]) -> int:
     text = repr(function.body)
     called = [f for f in functions if f is not function and f"function='{f.name}'" in text]
     return sum(1 + _depth(f, functions) for f in called)
-
-
-def _constant(value: Any) -> Read:
-    return lambda v: value
-
-
-def _slot(slot: int) -> Read:
-    return lambda v: v[slot]
-
-
-def _item(slot: int, index: Read) -> Read:
-    return lambda v: v[slot][index(v)]
-
-
-def _negative(a: Read) -> Read:
-    return lambda v: -a(v)
-
-
-def _not(a: Read) -> Read:
-    return lambda v: not a(v)
-
-
-def _select(condition: Read, then: Read, other: Read) -> Read:
-    return lambda v: then(v) if condition(v) else other(v)
-
-
-def _call(function: Callable[..., Any], arguments: list[Read]) -> Read:
-    if len(arguments) == 1:
-        only = arguments[0]
-        return lambda v: function(only(v))
-    return lambda v: function(*[argument(v) for argument in arguments])
-
-
-def _quotient(divide: Callable[[Any, Any], Any], a: Read, b: Read) -> Read:
-    return lambda v: divide(a(v), b(v))
-
-
-def _and(a: Read, b: Read) -> Read:
-    return lambda v: a(v) & b(v)
-
-
-def _or(a: Read, b: Read) -> Read:
-    return lambda v: a(v) | b(v)
-
-
-_BINARY: Mapping[str, Callable[[Read, Read], Read]] = {
-    "+": lambda a, b: lambda v: a(v) + b(v),
-    "-": lambda a, b: lambda v: a(v) - b(v),
-    "*": lambda a, b: lambda v: a(v) * b(v),
-    "and": _and,
-    "or": _or,
-    "<": lambda a, b: lambda v: a(v) < b(v),
-    "<=": lambda a, b: lambda v: a(v) <= b(v),
-    ">": lambda a, b: lambda v: a(v) > b(v),
-    ">=": lambda a, b: lambda v: a(v) >= b(v),
-    "==": lambda a, b: lambda v: a(v) == b(v),
-    "!=": lambda a, b: lambda v: a(v) != b(v),
-}
-
-
-def _assign(slot: int, value: Read) -> Action:
-    def act(v: Frame) -> None:
-        v[slot] = value(v)
-
-    return act
-
-
-def _store(slot: int, index: Read, value: Read) -> Action:
-    def act(v: Frame) -> None:
-        v[slot][index(v)] = value(v)
-
-    return act
-
-
-def _branch(condition: Read, then: list[Action], other: list[Action]) -> Action:
-    def act(v: Frame) -> None:
-        for action in then if condition(v) else other:
-            action(v)
-
-    return act
-
-
-def _choose(slot: int, table: Mapping[int, list[Action]]) -> Action:
-    def act(v: Frame) -> None:
-        for action in table.get(v[slot], ()):
-            action(v)
-
-    return act
-
-
-def _loop(count: int, slot: int, body: list[Action]) -> Action:
-    def act(v: Frame) -> None:
-        for index in range(count):
-            v[slot] = index
-            for action in body:
-                action(v)
-
-    return act
-
-
-def _count(slot: int, condition: Read, limit: int) -> Action:
-    def act(v: Frame) -> None:
-        v[slot] = min(v[slot] + 1, limit) if condition(v) else 0
-
-    return act
-
-
-def _fault(slot: int, bit: int, signal: str, left: dict[str, None]) -> Action:
-    def act(v: Frame) -> None:
-        v[slot] |= bit
-        if signal:
-            left[signal] = None
-
-    return act
-
-
-def _clear(slot: int, bit: int) -> Action:
-    def act(v: Frame) -> None:
-        v[slot] &= ~bit
-
-    return act
-
-
-def _run(block: list[Action]) -> Action:
-    def act(v: Frame) -> None:
-        for action in block:
-            action(v)
-
-    return act

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
+from operator import itemgetter
 from typing import Any, Protocol
 
 from engine.arithmetic import ARITHMETIC
-from engine.closures import Compiler, Frame
-from language.program import Constant, Program
-
-INITIAL = {"real": 0.0, "truth": False, "whole": 0}
+from engine.closures import Compiler
+from engine.frame import LEFT_RANGE
+from engine.shapes import Frame
+from language.program import Program
 
 
 class Stepper(Protocol):
@@ -35,47 +37,36 @@ class Interpreter:
     """A Program with its frame of values. Variables start at 0 or false, `init` has run."""
 
     def __init__(self, program: Program) -> None:
-        """Build the closures. `X_Derive` and `X_Init` of the C code are run here too."""
+        """Take the closures. `X_Derive` and `X_Init` of the C code are run here too."""
         self.program = program
-        names = [v.name for v in program.variables] + [c.name for c in program.constants]
-        self._slots = {name: slot for slot, name in enumerate(names)}
-        self._arithmetic = ARITHMETIC[program.number]
-        initial = {kind: self._arithmetic.value(value) for kind, value in INITIAL.items()}
-        self._frame: Frame = [
-            [initial[v.type]] * v.size if v.size else initial[v.type] for v in program.variables
-        ]
-        self._frame += [self._constant(constant) for constant in program.constants]
-        self._real = [v.type == "real" for v in program.variables]
-        self._real += [constant.type == "real" for constant in program.constants]
-        with self._arithmetic.quiet():
-            compiler = Compiler(program, self._slots)
+        compiler = _closures_of(_Same(program))
+        self._slots = compiler.scope.slots
         self._blocks = compiler.blocks
-        self._left = compiler.left
+        self._real = compiler.reals
+        self._arithmetic = ARITHMETIC[program.number]
+        self._is_plain = program.number == "float64"
+        self._frame: Frame = compiler.scope.frame()
         for entry in ("derive", "init"):
             if entry in self._blocks:
                 self.run(entry)
 
-    def _constant(self, constant: Constant) -> Any:
-        if constant.items:
-            return tuple(self._arithmetic.value(item) for item in constant.items)
-        return self._arithmetic.value(constant.value)
-
     def get(self, name: str) -> Any:
         """Return the value of a variable or constant, `group.name`."""
-        return self._arithmetic.plain(self._frame[self._slots[name]])
+        value = self._frame[self._slots[name]]
+        return value if self._is_plain else self._arithmetic.plain(value)
 
     def set(self, name: str, value: float | int | bool) -> None:
         """Set a variable; a real is rounded to the number type, once."""
-        slot = self._slots[name]
-        if self._real[slot]:
+        if name in self._real:
             with self._arithmetic.quiet():
                 value = self._arithmetic.real(value)
-        self._frame[slot] = value
+        self._frame[self._slots[name]] = value
 
     def left(self) -> tuple[str, ...]:
         """Return the signals that left their range since this was asked last."""
-        found = tuple(self._left)
-        self._left.clear()
+        noted = self._frame[self._slots[LEFT_RANGE]]
+        found = tuple(noted)
+        noted.clear()
         return found
 
     def has(self, name: str) -> bool:
@@ -84,13 +75,37 @@ class Interpreter:
 
     def run(self, block: str) -> None:
         """Run a block."""
-        frame = self._frame
-        with self._arithmetic.quiet():
-            for action in self._blocks[block]:
-                action(frame)
+        if self._is_plain:
+            self._blocks[block](self._frame)
+        else:
+            with self._arithmetic.quiet():
+                self._blocks[block](self._frame)
 
     def reader(self, names: tuple[str, ...]) -> Callable[[], tuple[Any, ...]]:
         """Return a function that returns the values of some variables."""
         slots = [self._slots[name] for name in names]
         frame, plain = self._frame, self._arithmetic.plain
+        if self._is_plain and len(slots) > 1:
+            together = itemgetter(*slots)
+            return lambda: together(frame)
         return lambda: tuple([plain(frame[slot]) for slot in slots])
+
+
+class _Same:
+    """A Program that equals itself alone: to tell whether two are equal takes longer than a run."""
+
+    def __init__(self, program: Program) -> None:
+        self.program = program
+
+    def __hash__(self) -> int:
+        return id(self.program)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Same) and other.program is self.program
+
+
+@lru_cache(maxsize=64)
+def _closures_of(same: _Same) -> Compiler:
+    """Return the closures of a Program: all interpreters of one Program share them."""
+    with ARITHMETIC[same.program.number].quiet():
+        return Compiler(same.program)

@@ -22,6 +22,7 @@ from language.operation import (
     Select,
     Store,
     Unary,
+    Value,
 )
 
 
@@ -106,3 +107,41 @@ def expr_names(expr: Expr) -> Iterator[str]:
 def reads(blocks: Iterable[Block]) -> set[str]:
     """Return every name that some blocks read or write."""
     return {name for block in blocks for name in block_names(block)}
+
+
+def with_value(block: Block, name: str, number: int) -> Block:
+    """Return assignments and stores in which a whole-number variable has a value."""
+    found: list[Op] = []
+    for op in block:
+        match op:
+            case Assign(target, value, key):
+                found.append(Assign(target, _with_value(value, name, number), key))
+            case Store(array, index, value):
+                parts = (_with_value(part, name, number) for part in (index, value))
+                found.append(Store(array, *parts))
+            case _:
+                raise TypeError(f"neither an assignment nor a store: {op!r}")
+    return tuple(found)
+
+
+def _with_value(expr: Expr, name: str, number: int) -> Expr:
+    def part(inner: Expr) -> Expr:
+        return _with_value(inner, name, number)
+
+    match expr:
+        case Ref(variable):
+            return Value(number) if variable == name else expr
+        case Item(array, index, is_whole):
+            return Item(array, part(index), is_whole)
+        case Unary(operator, operand):
+            return Unary(operator, part(operand))
+        case Binary(operator, left, right):
+            return Binary(operator, part(left), part(right))
+        case Compare(operator, left, right):
+            return Compare(operator, part(left), part(right))
+        case Select(condition, then, other):
+            return Select(part(condition), part(then), part(other))
+        case Call(function, arguments):
+            return Call(function, tuple(part(argument) for argument in arguments))
+        case Value():
+            return expr

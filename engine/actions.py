@@ -1,0 +1,193 @@
+"""Actions: what operations do, as Python functions over one frame; several in a row as one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+from engine.shapes import Frame, Read
+
+Action = Callable[[Frame], None]
+
+
+def nothing(v: Frame) -> None:
+    """Do nothing."""
+
+
+def in_turn(actions: Sequence[Action]) -> Action:
+    """Return what does some actions one after the other."""
+    match actions:
+        case []:
+            return nothing
+        case [only]:
+            return only
+        case [first, second]:
+
+            def two(v: Frame) -> None:
+                first(v)
+                second(v)
+
+            return two
+        case [first, second, third]:
+
+            def three(v: Frame) -> None:
+                first(v)
+                second(v)
+                third(v)
+
+            return three
+    every = tuple(actions)
+
+    def act(v: Frame) -> None:
+        for action in every:
+            action(v)
+
+    return act
+
+
+def assign(targets: Sequence[int], values: Sequence[Read]) -> Action:
+    """Return what sets one to four variables, one after the other."""
+    match targets, values:
+        case [s], [a]:
+
+            def one(v: Frame) -> None:
+                v[s] = a(v)
+
+            return one
+        case [s, t], [a, b]:
+
+            def two(v: Frame) -> None:
+                v[s] = a(v)
+                v[t] = b(v)
+
+            return two
+        case [s, t, u], [a, b, c]:
+
+            def three(v: Frame) -> None:
+                v[s] = a(v)
+                v[t] = b(v)
+                v[u] = c(v)
+
+            return three
+        case [s, t, u, w], [a, b, c, d]:
+
+            def four(v: Frame) -> None:
+                v[s] = a(v)
+                v[t] = b(v)
+                v[u] = c(v)
+                v[w] = d(v)
+
+            return four
+    raise ValueError(f"{len(targets)} variables")
+
+
+def copy(targets: Sequence[int], sources: Sequence[int]) -> Action:
+    """Return what copies one to four variables, one after the other."""
+    match targets, sources:
+        case [s], [a]:
+
+            def one(v: Frame) -> None:
+                v[s] = v[a]
+
+            return one
+        case [s, t], [a, b]:
+
+            def two(v: Frame) -> None:
+                v[s] = v[a]
+                v[t] = v[b]
+
+            return two
+        case [s, t, u], [a, b, c]:
+
+            def three(v: Frame) -> None:
+                v[s] = v[a]
+                v[t] = v[b]
+                v[u] = v[c]
+
+            return three
+        case [s, t, u, w], [a, b, c, d]:
+
+            def four(v: Frame) -> None:
+                v[s] = v[a]
+                v[t] = v[b]
+                v[u] = v[c]
+                v[w] = v[d]
+
+            return four
+    raise ValueError(f"{len(targets)} variables")
+
+
+def store(slot: int, index: Read, value: Read) -> Action:
+    """Return what sets one element of an array."""
+
+    def act(v: Frame) -> None:
+        v[slot][index(v)] = value(v)
+
+    return act
+
+
+def branch(condition: Read, then: Action, other: Action) -> Action:
+    """Return what does one of two actions."""
+    if other is nothing:
+
+        def act_or_not(v: Frame) -> None:
+            if condition(v):
+                then(v)
+
+        return act_or_not
+
+    def act(v: Frame) -> None:
+        if condition(v):
+            then(v)
+        else:
+            other(v)
+
+    return act
+
+
+def choose(slot: int, table: Mapping[int, Action]) -> Action:
+    """Return what does the action of the number that a variable has."""
+
+    def act(v: Frame) -> None:
+        table.get(v[slot], nothing)(v)
+
+    return act
+
+
+def loop(count: int, slot: int, body: Action) -> Action:
+    """Return what does an action a number of times."""
+
+    def act(v: Frame) -> None:
+        for index in range(count):
+            v[slot] = index
+            body(v)
+
+    return act
+
+
+def count(slot: int, condition: Read, limit: int) -> Action:
+    """Return what counts up to a limit while a condition holds, else back to 0."""
+
+    def act(v: Frame) -> None:
+        v[slot] = min(v[slot] + 1, limit) if condition(v) else 0
+
+    return act
+
+
+def fault(slot: int, bit: int, signal: str, left: int) -> Action:
+    """Return what sets a fault bit, and notes the signal that left its range."""
+
+    def act(v: Frame) -> None:
+        v[slot] |= bit
+        if signal:
+            v[left][signal] = None
+
+    return act
+
+
+def clear(slot: int, bit: int) -> Action:
+    """Return what clears a fault bit."""
+
+    def act(v: Frame) -> None:
+        v[slot] &= ~bit
+
+    return act

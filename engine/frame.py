@@ -1,0 +1,54 @@
+"""Frame: the values of a Program in one list, and where each of them stands in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from engine.arithmetic import ARITHMETIC
+from engine.shapes import Frame
+from language.program import Constant, Program
+
+INITIAL = {"real": 0.0, "truth": False, "whole": 0}
+LEFT_RANGE = "left range"
+"""Place of the signals that left their range, as keys of a dict."""
+
+
+@dataclass
+class Scope:
+    """Where names stand in a frame, and the values that stand there from the start."""
+
+    slots: dict[str, int]
+    values: Frame
+    literals: dict[str, int] = field(default_factory=dict)
+
+    def literal(self, value: Any) -> int:
+        """Return the slot of a value that never changes."""
+        key = f"{type(value).__name__} {value!r}"  # 0, 0.0, -0.0 and False are four values
+        if key not in self.literals:
+            self.literals[key] = len(self.values)
+            self.values.append(value)
+        return self.literals[key]
+
+    def frame(self) -> Frame:
+        """Return a frame in which every variable has its first value."""
+        return [list(v) if type(v) is list else {} if type(v) is dict else v for v in self.values]
+
+
+def scope_of(program: Program) -> Scope:
+    """Return where the variables and constants of a Program stand, in this order."""
+    value = ARITHMETIC[program.number].value
+    names = [v.name for v in program.variables] + [c.name for c in program.constants]
+    initial = {kind: value(number) for kind, number in INITIAL.items()}
+    values: Frame = [
+        [initial[v.type]] * v.size if v.size else initial[v.type] for v in program.variables
+    ]
+    values += [_constant(program, constant) for constant in program.constants]
+    return Scope({name: slot for slot, name in enumerate([*names, LEFT_RANGE])}, [*values, {}])
+
+
+def _constant(program: Program, constant: Constant) -> Any:
+    value = ARITHMETIC[program.number].value
+    if constant.items:
+        return tuple(value(item) for item in constant.items)
+    return value(constant.value)
