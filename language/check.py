@@ -11,29 +11,27 @@ from language.check_element import check_laid_on
 from language.check_memory import check_memory
 from language.check_observer import check_observer
 from language.check_region import check_regions
+from language.check_unused import check_unused
 from language.check_writer import (
     check_continued,
     check_outputs,
     check_scaled,
     check_writers,
-    equations_of,
 )
-from language.declaration import Formula, Input, LookupTable, Parameter, State
-from language.declared import declared_kind
+from language.declaration import Formula, LookupTable
+from language.declared import declared_names
 from language.dimension import DimensionCheck, Scope
 from language.guards import report_overlaps
 from language.kind import Enumeration, Kind, Whole
 from language.model import Automaton, Mode, Region
-from language.names import report_case_twins
 from language.order import equation_order, report_circle, unreached
 from language.parameter import parameter_kinds
-from language.problem import Problems, Span, nearest
+from language.problem import Problems, nearest
 from language.region import sources, with_regions
 from language.syntax import EDGES, KEPT, MEMORY, Tree, names, whole_literal
 from language.units import SECOND, Dimension, Unit, common, fits
 from language.witness import report_refiring
 
-RESERVED_OUTPUTS = ("mode", "faults")
 WHOLES = (Whole, Enumeration)
 
 
@@ -60,6 +58,7 @@ def check_automaton(automaton: Automaton, problems: Problems) -> Automaton:
     if checked.model:
         check_automaton(checked.model, problems)
     problems.stop_if_any()
+    check_unused(checked, problems)
     return checked
 
 
@@ -74,15 +73,14 @@ class _Check:
         self.automaton = automaton
         self.problems = problems
         self.names: dict[str, Kind] = {}
-        self.first: dict[str, Span] = {}
-        self.bare: dict[str, bool] = {}
         self.literals: dict[str, Kind] = {}
+        self.bare: dict[str, bool] = {}
         modes = reversed(tuple(automaton.modes.values()))
         self.owners = {name: mode.name for mode in modes for name in sources(mode)}
 
     def run(self) -> Automaton:
         automaton = self.automaton
-        self._declare()
+        self.names, self.literals = declared_names(automaton, self.problems)
         self._parameters()
         self._initials()
         check_regions(automaton, self.problems)
@@ -119,59 +117,6 @@ class _Check:
             for name, formula in mode.equations.items()
         }
         return dataclasses.replace(mode, equations=marked)
-
-    def _declare(self) -> None:
-        automaton = self.automaton
-        groups = (automaton.parameters, automaton.inputs, automaton.carried)
-        for group in groups:
-            for name, thing in group.items():
-                self._new(name, declared_kind(thing), thing.span)
-        for group in groups:
-            for thing in group.values():
-                if thing.values:
-                    self._literals(thing)
-        for name in equations_of(automaton.all_modes):
-            for mode in automaton.all_modes:
-                if name in mode.equations:
-                    self._clash(name, mode.equations[name].span)
-                    break
-        for region in automaton.regions:
-            self._clash(region.name, region.span)
-        self._case_twins()
-
-    def _case_twins(self) -> None:
-        automaton = self.automaton
-        named = list(self.first.items())
-        for mode in automaton.all_modes:
-            named += [(name, formula.span) for name, formula in mode.equations.items()]
-        report_case_twins(named, self.problems)
-        report_case_twins([(m.name, m.span) for m in automaton.all_modes], self.problems)
-
-    def _new(self, name: str, kind: Kind, span: Span) -> None:
-        self._clash(name, span)
-        self.names[name] = kind
-        self.first.setdefault(name, span)
-
-    def _literals(self, thing: Parameter | Input | State) -> None:
-        """The names of an enumeration are known; two that share a name have the same list."""
-        kind = Enumeration(thing.values)
-        for value in thing.values:
-            known = self.names.get(value)
-            if known is None:
-                self.names[value] = kind
-                self.first[value] = thing.span
-                self.literals[value] = kind
-            elif known != kind or value not in self.literals:
-                self._clash(value, thing.span)
-
-    def _clash(self, name: str, span: Span) -> None:
-        if name in self.first:
-            hint = f"it is given first at {self.first[name]}"
-            self.problems.error(
-                "duplicate", span, f"`{name}` is already the name of something", hint
-            )
-        elif name in RESERVED_OUTPUTS:
-            self.problems.error("name", span, f"`{name}` is a word of the language")
 
     def _scope(self, groups: Iterable[Iterable[str]], place: str) -> Scope:
         known = {name: self.names[name] for group in groups for name in group}

@@ -28,6 +28,8 @@ def check_domains(automaton: Automaton, problems: Problems) -> None:
         if not fixed:
             fixed.update({name: domains.look(name) for name in parameter_order(automaton)})
         domains.check()
+        if mode is automaton.all_modes[0]:
+            domains.check_starts()
 
 
 class _ModeDomains:
@@ -56,6 +58,15 @@ class _ModeDomains:
                 interval = ranging.of(factor)
                 if interval.meets_zero:
                     self._report("divisor", factor, interval)
+
+    def check_starts(self) -> None:
+        """Report start values that lie outside of their range, whatever tunables are."""
+        for state in self.automaton.carried.values():
+            if state.range:
+                start, (low, high) = self.quiet.of(state.initial.tree), map(float, state.range)
+                if start.high < low or start.low > high:
+                    label = f"`{state.name}` starts outside of its range"
+                    self.problems.error("range", state.initial.span, label)
 
     def look(self, name: str) -> Interval:
         """Return the interval of a name; called in order, so that a long chain needs no stack."""

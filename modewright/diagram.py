@@ -5,6 +5,7 @@ It is read from the laid-out text, so that guards stand in it as their author wr
 
 from __future__ import annotations
 
+import dataclasses
 import re
 import textwrap
 from collections.abc import Iterator
@@ -89,11 +90,22 @@ def diagram_of(document: Document) -> Diagram:
     """
     templates = document.root.get("templates")
     root = _filled(document.root, templates) if isinstance(templates, Table) else document.root
-    regions = _regions(root, ())
+    regions = [_with_fault(r, _text(root.get("fault_mode"))) for r in _regions(root, ())]
     known = set(_paths(regions))
     arrows = [arrow for path, table in _modes(root, ()) for arrow in _arrows(path, table, known)]
     about = document.root.get("about")
     return Diagram(document.name, _text(about), tuple(regions), tuple(arrows))
+
+
+def _with_fault(region: RegionBox, fault_mode: str) -> RegionBox:
+    """Return a region in which the mode that faults lead to says so."""
+    boxes = tuple(
+        dataclasses.replace(box, lines=("entered on a fault", *box.lines))
+        if box.name == fault_mode
+        else box
+        for box in region.modes
+    )
+    return dataclasses.replace(region, modes=boxes)
 
 
 def _filled(owner: Table, templates: Table) -> Table:

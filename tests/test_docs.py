@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
+import subprocess
 from functools import partial
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import pytest
 from typer.testing import CliRunner
 
 import modewright as mw
+from codegen.build import compile_program
 from modewright.cli import app
 from modewright.exits import exit_code
 
@@ -34,7 +36,8 @@ def test_every_command_in_the_readme_exists() -> None:
 
 
 @pytest.mark.parametrize(
-    "page", ["README.md", "docs/ARCHITECTURE.md", "docs/guide.md", "docs/recordings.md"]
+    "page",
+    ["README.md", "docs/ARCHITECTURE.md", "docs/guide.md", "docs/recordings.md", "docs/c_code.md"],
 )
 def test_every_file_that_a_page_names_exists(page: str) -> None:
     text = (ROOT / page).read_text()
@@ -88,3 +91,13 @@ def test_the_commands_and_the_python_of_the_guide_work_as_it_says(
         exec(compile(block, "guide.md", "exec"), {})
     for name in re.findall(r"--(?:out|plot) ([\w./]+)", guide):
         assert Path(name).exists(), name
+
+
+def test_the_program_on_the_page_on_c_compiles_and_runs(tmp_path: Path) -> None:
+    (program,) = re.findall(r"```c\n(.*?)```", (ROOT / "docs" / "c_code.md").read_text(), re.DOTALL)
+    files = {**mw.generate("estimator", root=ROOT), "main.c": program}
+    for name, text in files.items():
+        (tmp_path / name).write_text(text)
+    sources = [tmp_path / name for name in files if name.endswith(".c")]
+    compile_program(sources, tmp_path / "run")
+    assert subprocess.run([tmp_path / "run"], timeout=60, check=False).returncode == 0

@@ -100,7 +100,7 @@ def test_discrete_variables_are_delayed_like_states(tmp_path: Path) -> None:
 
 def test_a_region_reads_discrete_variables(tmp_path: Path) -> None:
     root = spec(tmp_path, pair=REGIONS, run=SCENARIO % "pair")
-    assert not mw.check("pair", root)
+    assert not [told for told in mw.check("pair", root) if told.severity == "error"]
     (event,) = mw.simulate("pair", "run", root=root).events
     assert (event.transition, event.time) == ("right", 0.002)
 

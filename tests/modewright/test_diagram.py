@@ -168,3 +168,10 @@ def test_every_arrow_starts_at_its_source_and_ends_at_its_target(
             (x, y), (w, h) = placed.boxes[node], boxes[node]
             assert min(abs(px - x), abs(px - x - w)) < 1e-6
             assert y - 1e-6 <= py <= y + h + 1e-6
+
+
+def test_the_mode_that_faults_lead_to_says_so() -> None:
+    rule = "a_fault_enters_the_fault_mode_before_any_other_transition"
+    text = mw.graph("guarded", ROOT / "tests" / "rules" / rule).mermaid()
+    (line,) = (line for line in text.splitlines() if "entered on a fault" in line)
+    assert line.strip().startswith('state "safe<br/>entered on a fault')

@@ -52,6 +52,11 @@ def cases() -> list[Case]:
     return [Case(path) for path in found if ".repaired" not in path.suffixes]
 
 
+def beside(case: Case) -> set[str]:
+    """Return the warnings that a case is not about: its neighbour may have them too."""
+    return {"unused", "unwritten"} - {problem.kind for problem in problems_of(case.path)}
+
+
 @cache
 def problems_of(path: Path) -> tuple[Problem, ...]:
     """Return what the user is told of a file, errors and warnings; paths relative to the root."""

@@ -13,6 +13,7 @@ from tests.refused.book import (
     HERE,
     ROOT,
     Case,
+    beside,
     cases,
     errors,
     problems_of,
@@ -44,7 +45,8 @@ def test_the_user_is_told_exactly_this(case: Case, update: bool) -> None:
 @pytest.mark.parametrize("case", CASES)
 def test_the_nearest_neighbour_passes(case: Case) -> None:
     assert case.repaired.is_file(), f"write {case.repaired.name}: {case.path.name}, just repaired"
-    assert problems_of(case.repaired) == (), mw.render_all(problems_of(case.repaired))
+    told = [problem for problem in problems_of(case.repaired) if problem.kind not in beside(case)]
+    assert not told, mw.render_all(told)
 
 
 @pytest.mark.parametrize("case", CASES)

@@ -1,0 +1,103 @@
+"""Check of what nobody reads and what nothing writes: warnings, it may be meant for later."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
+from language.model import Automaton, Mode
+from language.problem import Problems, Span
+from language.syntax import Name
+
+HINT = "make it an output, or remove it"
+
+
+def check_unused(automaton: Automaton, problems: Problems) -> None:
+    """Warn of parameters, inputs, states and equations without a reader, and of states without a
+    writer. What an automaton has from its model is looked at there.
+    """
+    model = automaton.model
+    read = {*_names(automaton), *map(automaton.source_of, automaton.outputs)}
+    read |= {*_observed(automaton), *(_run_names(automaton) if model else ())}
+    for name, parameter in automaton.parameters.items():
+        if not (model and name in model.parameters) and name not in read:
+            problems.warning("unused", parameter.span, f"parameter `{name}` is read nowhere")
+    for name, thing in automaton.inputs.items():
+        if name not in read:
+            problems.warning("unused", thing.span, f"input `{name}` is read nowhere")
+    for name, state in automaton.carried.items():
+        if name not in read:
+            problems.warning("unused", state.span, f"state `{name}` is read nowhere", HINT)
+    _check_equations(automaton, read, problems)
+    _check_unwritten(automaton, problems)
+
+
+def _check_equations(automaton: Automaton, read: set[str], problems: Problems) -> None:
+    told = set()
+    for mode in automaton.all_modes:
+        for name, formula in mode.equations.items():
+            if name not in read and name not in told:
+                told.add(name)
+                label = f"equation `{name}` is read nowhere"
+                problems.warning("unused", formula.span, label, HINT)
+
+
+def _check_unwritten(automaton: Automaton, problems: Problems) -> None:
+    written = {name for mode in automaton.all_modes for name in _written(automaton, mode)}
+    for name, state in automaton.carried.items():
+        if name not in written:
+            label = f"`{name}` is written nowhere: it keeps its start value"
+            problems.warning("unwritten", state.span, label, "declare it as a parameter")
+
+
+def _written(automaton: Automaton, mode: Mode) -> Iterator[str]:
+    """Yield what a mode or a transition out of it writes."""
+    for group in (mode.update, mode.entry, mode.exit, mode.flow):
+        yield from group
+    for transition in mode.transitions:
+        yield from transition.reset
+    if mode.observer:
+        yield from mode.observer.states
+    if mode.run and automaton.model:
+        yield from automaton.model.states
+
+
+def _observed(automaton: Automaton) -> Iterator[str]:
+    """Yield the inputs and states that observers name beside their formulas."""
+    for mode in automaton.modes.values():
+        if mode.observer:
+            yield from mode.observer.states
+            yield from mode.observer.inputs
+            yield from mode.observer.measures
+            if mode.observer.of and automaton.model:
+                yield from automaton.model.inputs
+            yield from (mode.observer.correct,) if mode.observer.correct else ()
+
+
+def _run_names(automaton: Automaton) -> Iterator[str]:
+    """Yield the inputs and states that runs share with the model by name."""
+    assert automaton.model
+    if any(mode.run for mode in automaton.modes.values()):
+        yield from automaton.model.inputs
+        yield from automaton.model.states
+
+
+def _names(thing: Any) -> Iterator[str]:
+    """Yield the names in all expressions of a tree of declarations; its own ones, no model's."""
+    if isinstance(thing, Name):
+        yield thing.path
+    elif isinstance(thing, Span):
+        return
+    elif isinstance(thing, Mapping):
+        yield from _names_of(thing.values())
+    elif isinstance(thing, tuple):
+        yield from _names_of(thing)
+    elif dataclasses.is_dataclass(thing):
+        parts = [field.name for field in dataclasses.fields(thing) if field.name != "model"]
+        yield from _names_of(getattr(thing, name) for name in parts)
+
+
+def _names_of(things: Iterable[Any]) -> Iterator[str]:
+    for thing in things:
+        yield from _names(thing)
