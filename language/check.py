@@ -11,6 +11,7 @@ from language.check_element import check_laid_on
 from language.check_memory import check_memory
 from language.check_observer import check_observer
 from language.check_region import check_regions
+from language.check_rewind import check_reach, check_rewind
 from language.check_unused import check_unused
 from language.check_writer import (
     check_continued,
@@ -45,6 +46,7 @@ def check_automaton(automaton: Automaton, problems: Problems) -> Automaton:
     checked = _declared(automaton, problems)
     problems.stop_if_any()
     check_memory(checked, problems)
+    check_reach(checked, problems)
     check_domains(checked, problems)
     problems.stop_if_any()
     for region in checked.all_regions:
@@ -264,6 +266,11 @@ class _Check:
                 constant.quantity(transition.wait.tree, SECOND, "wait")
                 self._fixed_wait(transition.wait)
             self._assignments(transition.reset, check)
+            if transition.rewind:
+                check.truth(transition.rewind.until.tree, "until")
+                constant.quantity(transition.rewind.within.tree, SECOND, "within")
+                self._fixed_wait(transition.rewind.within)
+                check_rewind(automaton, transition, self.problems)
             if transition.memory == "continue":
                 check_continued(automaton, transition, self.problems)
         for invariant in mode.invariants.values():

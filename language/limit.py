@@ -36,7 +36,7 @@ MAX_FAULTS = 32
 """Fault bits of an instance: one word."""
 PENDING = "memory.fault_pending"
 HAPPENED = "work.fault_happened"
-OWN_FAULTS = ("event_limit", "stale_calibration")
+OWN_FAULTS = ("event_limit", "rewind_limit", "stale_calibration")
 """Faults that the product names itself."""
 
 

@@ -51,6 +51,8 @@ from language.syntax import (
 
 MAX_DELAY = 4096
 """Longest delay in values kept: 32 kB of an instance."""
+MAX_REWIND = 64
+"""Longest rewind in ticks kept."""
 KEPT_ONCE = Ref("memory.kept")
 
 
@@ -98,6 +100,8 @@ def formulas(mode: Mode) -> Iterator[Formula]:
     for transition in mode.transitions:
         yield transition.when
         yield from transition.reset.values()
+        if transition.rewind:
+            yield transition.rewind.until
 
 
 def applications(automaton: Automaton, functions: tuple[str, ...]) -> dict[str, Application]:

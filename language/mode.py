@@ -7,7 +7,7 @@ from typing import Literal, cast
 
 from language.declaration import Formula
 from language.document import Entry, Node, Table
-from language.model import CHART, Automaton, Balance, Invariant, Mode, Region, Transition
+from language.model import CHART, Automaton, Balance, Invariant, Mode, Region, Rewind, Transition
 from language.observer import read_observer, read_run
 from language.overlay import lay, without
 from language.parse import parse_balance
@@ -20,7 +20,7 @@ REGION_KEYS = ("initial", "modes")
 ALWAYS = "always"
 """The mode of an automaton that has none of its own."""
 ACTION_KEYS = ("entry", "exit", "invariant")
-TRANSITION_KEYS = ("to", "when", "wait", "priority", "reset", "memory")
+TRANSITION_KEYS = ("to", "when", "wait", "priority", "reset", "memory", "rewind")
 Keeping = Literal["reset", "continue"]
 
 
@@ -208,6 +208,18 @@ class ModeReader(Reader):
                         at,
                         region,
                         memory,
+                        self._rewind(table.get("rewind"), f"{key}.rewind"),
                     )
                 )
         return found
+
+    def _rewind(self, node: Node | None, key: str) -> Rewind | None:
+        """Read how far back a transition reaches, and to what."""
+        if node is None:
+            return None
+        table = self.table(node, key, ("until", "within"))
+        parts = [
+            self.expression(table.get(part), f"{key}.{part}", node.span)
+            for part in ("until", "within")
+        ]
+        return Rewind(parts[0], parts[1], node.span) if parts[0] and parts[1] else None

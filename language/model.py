@@ -42,6 +42,15 @@ class Invariant:
 
 
 @dataclass(frozen=True)
+class Rewind:
+    """Back to where `until` turned true, at most `within` [s] ago (language/rewind.py)."""
+
+    until: Formula
+    within: Formula
+    span: Span
+
+
+@dataclass(frozen=True)
 class Transition:
     """From its mode to `target` when the guard held for `wait`, with resets."""
 
@@ -56,6 +65,7 @@ class Transition:
     span: Span
     region: str = CHART
     memory: Literal["reset", "continue"] = "reset"
+    rewind: Rewind | None = None
 
 
 @dataclass(frozen=True)

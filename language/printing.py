@@ -111,7 +111,8 @@ def _program_lines(program: Program) -> Iterator[str]:
         yield f"run mode {mode.number} {mode.name}"
     for t in program.transitions:
         wait = f" wait {t.wait} s = {t.ticks} ticks" if t.wait else ""
-        yield f"transition {t.number} {t.name}: {t.source} -> {t.target}{wait}"
+        back = f" rewind {t.rewind} ticks" if t.rewind else ""
+        yield f"transition {t.number} {t.name}: {t.source} -> {t.target}{wait}{back}"
     for alarm in program.alarms:
         yield f"alarm {alarm.variable}: {alarm.time} s in {alarm.region} mode {alarm.mode}"
     for info in program.invariants:

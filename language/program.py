@@ -85,7 +85,8 @@ class RegionInfo:
 class TransitionInfo:
     """A transition: number (from 1), modes, wait in seconds (exact) and in ticks.
 
-    `slot` is the ending of the variables of its guard, see language/region.py.
+    `slot` is the ending of the variables of its guard, see language/region.py; `rewind` are the
+    ticks that it looks back.
     """
 
     number: int
@@ -98,6 +99,7 @@ class TransitionInfo:
     key: str
     region: str = CHART
     slot: str = "0"
+    rewind: int = 0
 
 
 @dataclass(frozen=True)

@@ -109,22 +109,24 @@ def run_motion(
     return Motion(made, variables, method.constants, dataclasses.replace(info, events=events))
 
 
-def run_block(automaton: Automaton, run: ModelRun) -> Block:
-    """Return the advance of a mode that runs the model: the whole period, through its events."""
+def run_block(automaton: Automaton, run: ModelRun, rest: Expr | None = None) -> Block:
+    """Return the advance of a mode that runs the model: the whole period, through its events.
+
+    Or `rest`, a part of the period [s]: then the run has one substep.
+    """
     model = automaton.model
     assert model and automaton.period is not None
     field = Field(model, {}, {}, MODE, "")
-    body = (
-        _through_events(automaton, field, run) if run.follow else _one_flow(automaton, field, run)
-    )
+    length = real(automaton.period / run.substeps) if rest is None else rest
+    through = _through_events if run.follow else _one_flow
+    body = through(automaton, field, run, length)
     before, after = kept(automaton, model.states)
     moved: Block = body if run.substeps == 1 else (Loop(run.substeps, "work.substep", body),)
     return (*before, *moved, *after)
 
 
-def _through_events(automaton: Automaton, field: Field, run: ModelRun) -> Block:
+def _through_events(automaton: Automaton, field: Field, run: ModelRun, length: Expr) -> Block:
     """One substep, segment by segment, at most `events` jumps."""
-    assert automaton.period is not None
     may_jump = Compare("<", Ref("work.event"), whole(run.events))
     at_limit: Block = (FaultBit(EVENT_LIMIT), Assign("work.left", real(0.0)))
     after: Block = (Branch(may_jump, (by_mode(field, "switch"),), at_limit),)
@@ -135,9 +137,8 @@ def _through_events(automaton: Automaton, field: Field, run: ModelRun) -> Block:
         Branch(Ref("work.crossed"), after),
     )
     left = Compare(">", Ref("work.left"), real(0.0))
-    substep = real(automaton.period / run.substeps)
     return (
-        Assign("work.left", substep, f"{automaton.name} {run.key}"),
+        Assign("work.left", length, f"{automaton.name} {run.key}"),
         Loop(run.events + 1, "work.event", (Branch(left, segment),)),
     )
 
@@ -168,13 +169,11 @@ def _inputs(automaton: Automaton, problems: Problems) -> dict[str, Expr]:
     return found
 
 
-def _one_flow(automaton: Automaton, field: Field, run: ModelRun) -> Block:
+def _one_flow(automaton: Automaton, field: Field, run: ModelRun, length: Expr) -> Block:
     """One substep in the flow of one mode: no guard of the model is looked at."""
-    assert automaton.period is not None
-    substep = real(automaton.period / run.substeps)
     ends = [Assign(f"state.{name}", Ref(f"work.end_{name}")) for name in field.states]
     step = Run(f"step_{run.mode}")
-    return (Assign("work.h", substep, f"{automaton.name} {run.key}"), step, *ends)
+    return (Assign("work.h", length, f"{automaton.name} {run.key}"), step, *ends)
 
 
 def _way(run: ModelRun) -> tuple[object, ...]:

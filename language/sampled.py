@@ -45,6 +45,7 @@ from language.operation import (
     whole,
 )
 from language.parameter import constant_names
+from language.past import keep_past
 from language.problem import Problems
 from language.program import (
     Constant,
@@ -55,7 +56,8 @@ from language.program import (
 )
 from language.recursive import recursive
 from language.region import in_modes
-from language.run import EVENT_LIMIT, run_block, run_motion, start_regions
+from language.rewind import REWIND_LIMIT, advance_blocks, rewind_blocks, rewind_variables
+from language.run import EVENT_LIMIT, run_motion, start_regions
 from language.stamp import STALE_CALIBRATION, STAMPS, stamps_block, stamps_of
 from language.tick import by_mode, tick_block
 from language.transition import enter_run, sampled_commit, sampled_jump, transition_infos
@@ -150,6 +152,10 @@ class _Sampled:
         if mode.region == CHART:
             ops = equations(mode, dict(self.now), "equation.", self.prefix)
             found[f"equations_{mode.name}"] = tuple(ops)
+        back = rewind_blocks(self.automaton, mode, self.now)
+        if back and REWIND_LIMIT not in self.faults:
+            self.faults.append(REWIND_LIMIT)
+        found.update(back)
         jump = sampled_jump(self.automaton, mode, self.transitions, self.now)
         found[f"jump_{mode.label}"] = jump
         if mode.update:
@@ -172,7 +178,7 @@ class _Sampled:
                 for n, ref in variable_names(self.automaton, "input").items()
                 if n in inputs
             ),
-            "keep": keep_block(self.automaton, self.delays, self.all),
+            "keep": self._keep(),
             "start": self._start(),
             "derive": derive_block(self.automaton),
             "init": self._init(bool(stamps)),
@@ -196,6 +202,7 @@ class _Sampled:
         found += observer_variables(automaton)
         found += covariance_variables(automaton)
         found += memory_variables(automaton, self.delays)
+        found += rewind_variables(automaton)
         found += mode_and_fired(automaton, "tick")
         found.append(Variable("memory.started", "truth", about="the first tick is done"))
         found.append(Variable("memory.faults", "whole", about="latched fault bits"))
@@ -214,7 +221,7 @@ class _Sampled:
         if mode.run:
             if mode.run.follow and EVENT_LIMIT not in self.faults:
                 self.faults.append(EVENT_LIMIT)
-            found[f"run_{mode.name}"] = run_block(self.automaton, mode.run)
+            found.update(advance_blocks(self.automaton, mode))
         if mode.observer:
             make = recursive if mode.observer.gain == "recursive" else kalman
             made = make(self.automaton, mode, self.before, self.now, self.values, self.problems)
@@ -270,8 +277,12 @@ class _Sampled:
     def _step(self) -> Block:
         carried = {mode.name: self._carried(mode) for mode in self.automaton.modes.values()}
         found = (name for o in self.observers.values() for name in o.info.measures)
-        keeps = bool(keep_block(self.automaton, self.delays, self.all))
-        return tick_block(self.automaton, carried, dict.fromkeys(found), keeps)
+        return tick_block(self.automaton, carried, dict.fromkeys(found), bool(self._keep()))
+
+    def _keep(self) -> Block:
+        """What is kept of a tick once it has jumped."""
+        delayed = keep_block(self.automaton, self.delays, self.all)
+        return (*delayed, *keep_past(self.automaton))
 
     def _carried(self, mode: Mode) -> Block:
         if mode.name in self.observers:

@@ -25,9 +25,11 @@ from language.operation import (
     Run,
     whole,
 )
+from language.past import Rewinding, rewinds_of
 from language.problem import Problems
 from language.program import TransitionInfo, fired_variable, mode_variable
 from language.region import by_priority, slot
+from language.rewind import carry_on, equations_there, known_there
 
 MAX_TICKS = 65534
 """Longest wait: the counters are uint16 and count one further (semantics, rule 4)."""
@@ -36,6 +38,7 @@ MAX_TICKS = 65534
 def transition_infos(automaton: Automaton, problems: Problems) -> tuple[TransitionInfo, ...]:
     """Return the transitions, numbered from 1 in the order of the file, waits exact."""
     found: list[TransitionInfo] = []
+    back = rewinds_of(automaton)
     for mode in automaton.all_modes:
         for k, transition in enumerate(mode.transitions):
             wait = Fraction(0)
@@ -61,6 +64,7 @@ def transition_infos(automaton: Automaton, problems: Problems) -> tuple[Transiti
                     key=f"{automaton.name} {transition.key}",
                     region=mode.region,
                     slot=slot(mode.region, k),
+                    rewind=next((r.ticks for r in back if r.transition is transition), 0),
                 )
             )
     return tuple(found)
@@ -97,13 +101,40 @@ def sampled_jump(
             enabled = Compare(">", Ref(info.timer), whole(info.ticks))
         fire: list[Op] = [Assign(fired_variable(mode.region), whole(info.number), info.key)]
         if not automaton.regions:
-            target = automaton.target(transition)
-            before = _at_once(automaton, mode, transition, known)
-            fire = [*before, *_taken(automaton, transition, infos), *fire]
-            fire += enter_run(automaton, target)
-            fire += entry(automaton, target, target.entry, now)
+            fire = _micro_step(automaton, transition, infos, (now, known), fire)
         chain = (Branch(enabled, tuple(fire), chain),)
     return (*edges, *counters, *chain)
+
+
+def _micro_step(
+    automaton: Automaton,
+    transition: Transition,
+    infos: tuple[TransitionInfo, ...],
+    names: tuple[Mapping[str, Expr], Mapping[str, Expr]],
+    fired: list[Op],
+) -> list[Op]:
+    """Return what a transition does that nothing else fires beside; it may go back for that.
+
+    `names` are those of now, without equations and with them.
+    """
+    source, target = automaton.source(transition), automaton.target(transition)
+    now, known = names
+    back: list[Op] = []
+    on: Block = ()
+    if transition.rewind:
+        rewinding = Rewinding(automaton, source, transition, transition.rewind)
+        now = known_there(automaton, now)
+        known = {**now, **equations_there(rewinding)}
+        back, on = [Run(f"back_{rewinding.label}")], carry_on(rewinding)
+    return [
+        *back,
+        *_at_once(automaton, source, transition, known),
+        *_taken(automaton, transition, infos),
+        *fired,
+        *enter_run(automaton, target),
+        *entry(automaton, target, target.entry, now),
+        *on,
+    ]
 
 
 def sampled_commit(

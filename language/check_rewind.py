@@ -1,0 +1,119 @@
+"""Check of a rewind: how far it goes back, along which flow, and what carries on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from fractions import Fraction
+
+from language.constants import exact_value
+from language.declaration import Formula
+from language.lower import closure
+from language.memory import MAX_REWIND
+from language.model import Automaton, Mode, Rewind, Run, Transition
+from language.problem import Problems
+from language.region import sources
+from language.syntax import MEMORY, Application, Tree, walk
+
+
+def check_rewind(automaton: Automaton, transition: Transition, problems: Problems) -> None:
+    """Report what the rewind of a transition cannot do."""
+    rewind = transition.rewind
+    if rewind is None:
+        return
+    if not automaton.is_sampled:
+        label = "`rewind` belongs to a sampled automaton: a continuous one locates its crossings"
+        problems.error("form", rewind.span, label)
+        return
+    _one_chart(automaton, rewind, problems)
+    region = automaton.region(transition.region)
+    source, target = region.modes[transition.source], region.modes.get(transition.target)
+    _without_memory(source, rewind, problems)
+    _flow_back(automaton, source, rewind, problems)
+    if target is not None:
+        _carried_on(automaton, target, rewind, problems)
+
+
+def check_reach(automaton: Automaton, problems: Problems) -> None:
+    """Report how far the rewinds of a checked automaton cannot go."""
+    for mode in automaton.all_modes:
+        for transition in mode.transitions:
+            if transition.rewind and automaton.period is not None:
+                with problems.collecting():
+                    _reach(automaton, automaton.period, transition.rewind.within, problems)
+
+
+def _reach(automaton: Automaton, period: Fraction, within: Formula, problems: Problems) -> None:
+    time = exact_value(within, automaton)
+    ticks = math.ceil(time / period)
+    if time <= 0:
+        problems.error("rewind", within.span, "`within` is above zero")
+    elif ticks > MAX_REWIND:
+        label = f"a rewind of {ticks} ticks: at most {MAX_REWIND} are kept"
+        problems.error("rewind", within.span, label, "a smaller `within`")
+
+
+def _one_chart(automaton: Automaton, rewind: Rewind, problems: Problems) -> None:
+    """What runs beside the chart has acted meanwhile: it is not taken back."""
+    for thing in (automaton, automaton.model):
+        if thing and thing.regions:
+            label = f"`{thing.name}` has parallel regions: what they did meanwhile stays done"
+            problems.error("rewind", rewind.span, label, "a `wait` in place of `rewind`")
+
+
+def _without_memory(source: Mode, rewind: Rewind, problems: Problems) -> None:
+    """`until` is looked up in the past: what remembers has no past of its own."""
+    found: Mapping[str, tuple[Tree, ...]] = {
+        name: tuple(formula.tree for formula in formulas)
+        for name, formulas in sources(source).items()
+    }
+    read = [tree for name in closure(source, rewind.until.reads) for tree in found[name]]
+    for tree in (rewind.until.tree, *read):
+        for part in walk(tree):
+            if isinstance(part, Application) and part.function in MEMORY:
+                label = f"`until` reads `{part.function}`: it is asked of states and inputs alone"
+                problems.error("rewind", part.span, label)
+                return
+
+
+def _flow_back(automaton: Automaton, source: Mode, rewind: Rewind, problems: Problems) -> None:
+    """Between two ticks the source has one flow, or its states stand still."""
+    if source.run:
+        _one_substep(source, rewind, problems)
+        model = automaton.model
+        own = model.modes.get(source.run.mode) if model else None
+        if own and own.transitions and source.run.follow:
+            label = f"the run of `{source.name}` may leave its flow: the way back would be another"
+            hint = f"write `follow: false` in `runs` of `{source.name}`"
+            problems.error("rewind", rewind.span, label, hint)
+    elif source.observer and source.observer.of is None:
+        label = f"the observer of `{source.name}` has written matrices: no flow leads back"
+        hint = "`of: <model>.<mode>` takes them from a flow"
+        problems.error("rewind", rewind.span, label, hint)
+    _no_update(automaton, source, rewind, problems)
+
+
+def _carried_on(automaton: Automaton, target: Mode, rewind: Rewind, problems: Problems) -> None:
+    if target.run is None:
+        label = f"mode `{target.name}` has no `runs`: nothing carries the states on from there"
+        problems.error("rewind", rewind.span, label, "a `wait` in place of `rewind`")
+        return
+    _one_substep(target, rewind, problems)
+    _no_update(automaton, target, rewind, problems)
+
+
+def _one_substep(mode: Mode, rewind: Rewind, problems: Problems) -> None:
+    run: Run | None = mode.run
+    if run and run.substeps != 1:
+        label = (
+            f"the run of `{mode.name}` has {run.substeps} substeps: a rewind takes whole periods"
+        )
+        problems.error("rewind", rewind.span, label, "`substeps: 1` with a shorter `period`")
+
+
+def _no_update(automaton: Automaton, mode: Mode, rewind: Rewind, problems: Problems) -> None:
+    """What is taken back are the states of the model: a flow moves them, nothing else."""
+    written = [name for name in mode.update if automaton.model and name in automaton.model.states]
+    if written:
+        label = f"`update` of mode `{mode.name}` writes `{written[0]}`: it is not taken back"
+        problems.error("rewind", rewind.span, label, "let the run move it")
