@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from fractions import Fraction
 from typing import Protocol
 
+from engine.cruise import Cruise
 from engine.firing import event, fired
 from engine.interpreter import Stepper
 from engine.invariant_watch import InvariantWatch
@@ -17,11 +18,15 @@ from engine.trajectory import Event
 from language.program import Program, TransitionInfo, short
 from language.stepping import EVENTS_PER_STEP
 
+Flow = tuple[Fraction, Fraction, Sequence[float], float]
+"""Where a flow began and was to end, and the states and age of the records at its start."""
+
 
 class Around(Protocol):
     """What surrounds a continuous automaton: who sets its inputs and who watches it."""
 
     is_watching: bool
+    is_still: bool
 
     def aim(self, start: Fraction, stop: Fraction) -> None:
         """Set the inputs for a flow from `start` to `stop`."""
@@ -40,6 +45,7 @@ class Alone:
     """Surroundings in which nothing changes and nobody watches."""
 
     is_watching = False
+    is_still = True
 
     def aim(self, start: Fraction, stop: Fraction) -> None:
         """Leave the inputs as they are."""
@@ -95,6 +101,9 @@ class ContinuousRun:
         self._read_states = stepper.reader(states)
         self._ranges = RangeWatch(name, program, stepper, log)
         self._invariants = InvariantWatch(name, program, stepper, log)
+        is_plain = not (program.invariants or self._records.is_needed)
+        is_alone = self._around.is_still and not self._around.is_watching
+        self._cruise = Cruise(program, stepper, self._ranges) if is_plain and is_alone else None
 
     def start(self) -> None:
         """Put the states where they start; `settle` enters the initial mode (rule 16)."""
@@ -113,10 +122,12 @@ class ContinuousRun:
         self._looks = deque(looks)
         step = self.program.major_step
         while self.time < time:
-            boundary = (self.time // step + 1) * step
-            self._major_step(min(boundary, time), time)
+            is_begun = self._cruise_to(time)
             if self.time < time:
-                self.end_step()
+                boundary = (self.time // step + 1) * step
+                self._major_step(min(boundary, time), time, is_begun)
+                if self.time < time:
+                    self.end_step()
         if time % step and self.off_step is None:
             self.off_step = time
 
@@ -149,13 +160,38 @@ class ContinuousRun:
         self._around.watch(self.time)
         self.is_settled = True
 
-    def _major_step(self, end: Fraction, horizon: Fraction) -> None:
+    def _cruise_to(self, horizon: Fraction) -> bool:
+        """Take whole steps before the horizon; tell whether one is begun where something happens.
+
+        A step inside which someone looks is not taken.
+        """
+        step = self.program.major_step
+        if self._cruise is None or self.time % step:
+            return False
+        now, last = int(self.time / step), int(horizon // step)
+        while now < last:
+            look = self._looks[0] if self._looks else horizon
+            stop = now + 1 if self.stepped else min(int(look // step), last)
+            if stop == now or look < stop * step:
+                return False
+            now, is_begun = self._cruise.go(now, stop)
+            self.time = now * step
+            if is_begun:
+                return True
+            self._look_here(horizon)
+            if self.time < horizon:
+                self.end_step()
+        return False
+
+    def _major_step(self, end: Fraction, horizon: Fraction, is_begun: bool) -> None:
+        """Flow to the end of a step, through all events in it; its first segment may be done."""
         self._in_step = []
-        self.stepper.set("work.left", float(end - self.time))
-        for _ in range(EVENTS_PER_STEP + 1):
+        if not is_begun:
+            self.stepper.set("work.left", float(end - self.time))
+        for piece in range(EVENTS_PER_STEP + 1):
             if self.time >= end:
                 return
-            is_event = self._segment(end)
+            is_event = self._arrive(end) if is_begun and piece == 0 else self._segment(end)
             if is_event and self.time < horizon:
                 self.settle()
             self.is_settled = self.is_settled and not (is_event and self.time == horizon)
@@ -176,13 +212,18 @@ class ContinuousRun:
         self._around.aim(start, stop)
         stepper.run("latch")
         stepper.run("flow")
-        self._require_finite()
         stepper.run("elapse")
+        return self._arrive(end, (start, stop, states, age))
+
+    def _arrive(self, end: Fraction, flow: Flow | None = None) -> bool:
+        """Time has elapsed up to the end of the step or an event, which it tells."""
+        self._require_finite()
+        stepper = self.stepper
         is_over = stepper.get("work.left") <= 0.0
-        self.time = end if is_over else start + Fraction(stepper.get("work.elapsed"))
+        self.time = end if is_over else self.time + Fraction(stepper.get("work.elapsed"))
         self._ranges.look(self.time)
-        if self._looks and self._looks[0] < self.time:
-            self._look_inside(start, stop, states, age)
+        if flow and self._looks and self._looks[0] < self.time:
+            self._look_inside(*flow)
         self._place(self.time)
         if self._around.is_watching or self.program.invariants:
             stepper.run("equations")

@@ -16,7 +16,7 @@ class Records:
         """Take the Program; one without delays records nothing."""
         self._stepper = stepper
         self._step = program.major_step
-        self._is_needed = "record" in program.blocks
+        self.is_needed = "record" in program.blocks
         self._last: Fraction | None = None
 
     def start(self) -> None:
@@ -25,15 +25,15 @@ class Records:
 
     def leave(self, time: Fraction) -> None:
         """Record at a major step that time is about to leave."""
-        if self._is_needed and time != self._last and time % self._step == 0:
+        if self.is_needed and time != self._last and time % self._step == 0:
             self._stepper.run("record")
             self._last = time
 
     def age(self) -> float:
         """Return how long ago [s] the last record was."""
-        return float(self._stepper.get(AGE.name)) if self._is_needed else 0.0
+        return float(self._stepper.get(AGE.name)) if self.is_needed else 0.0
 
     def put_age(self, age: float) -> None:
         """Say how long ago [s] the last record was: to look at another time."""
-        if self._is_needed:
+        if self.is_needed:
             self._stepper.set(AGE.name, age)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from fractions import Fraction
 
@@ -12,6 +13,9 @@ from language.program import Program, short
 SLACK = 1e-9
 """Part of a range's width by which a state may pass a bound unreported: what a crossing of a guard
 on that bound is located within, over ten digits above the rounding of a double."""
+
+FINITE = (-sys.float_info.max, sys.float_info.max)
+"""The range of a state that has none of its own."""
 
 
 class RangeWatch:
@@ -25,6 +29,17 @@ class RangeWatch:
         self._bounds = {v.name: v.range for v in program.variables if v.range is not None}
         self._read = stepper.reader(tuple(self._bounds))
         self._outside: set[str] = set()
+        states = [v.name for v in program.variables if v.name.startswith("state.")]
+        limits = {**dict.fromkeys(states, FINITE), **self._bounds}
+        self._read_all = stepper.reader(tuple(limits))
+        self._limits = tuple(limits.values())
+
+    def is_inside(self) -> bool:
+        """Tell whether all states are finite, and nothing is or was outside its range."""
+        for value, (low, high) in zip(self._read_all(), self._limits, strict=True):
+            if not low <= value <= high:
+                return False
+        return not self._outside
 
     def look(self, time: Fraction) -> None:
         """Report what has left its range since the last look."""

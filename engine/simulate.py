@@ -156,13 +156,15 @@ class _Simulation:
 
     def _keep(self, between: Sequence[Fraction]) -> None:
         """Keep the rows that every continuous instance has reached."""
-        for row in between:
+        arounds = list(self.around.values())
+        reached = min((len(around.looked) for around in arounds), default=len(between))
+        for number, row in enumerate(between[:reached]):
             found: dict[str, Any] = {}
-            for around in self.around.values():
-                if row not in around.looked:
-                    return
-                found.update(around.looked.pop(row))
+            for around in arounds:
+                found.update(zip(around.names, around.looked[number], strict=True))
             self.rows.add(row, partial(self._seen_at, row, found), self.signals.formula)
+        for around in arounds:
+            around.looked.clear()
 
     def _seen_at(self, row: Fraction, found: Mapping[str, Any], name: str) -> Any:
         return found[name] if name in found else self.signals.at(row, row)(name)

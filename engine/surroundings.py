@@ -23,9 +23,12 @@ class Surroundings:
         connections: Sequence[Connection],
         program: Program,
     ) -> None:
-        """Take the instance with its Program, and the connections of its inputs."""
+        """Take the instance with its Program, and the connections of its inputs.
+
+        `looked` has the values of `names` at each look.
+        """
         self.name = name
-        self.looked: dict[Fraction, dict[str, Any]] = {}
+        self.looked: list[tuple[Any, ...]] = []
         self._stepper = stepper
         self._signals = signals
         variables = {variable.name for variable in program.variables}
@@ -34,8 +37,11 @@ class Surroundings:
         own = [run for run in signals.sensors.values() if run.sensor.source in self._outputs]
         self._lagging = [run for run in own if run.sensor.lag]
         self._unsampled = [run for run in own if run.sensor.period is None]
+        self.names = (*self._outputs, *(run.sensor.name for run in self._unsampled))
+        self._read = stepper.reader(tuple(wire.source for wire in program.outputs))
         self._since = Fraction(0)
         self.is_watching = bool(self._lagging)
+        self.is_still = not self._varying
 
     def aim(self, start: Fraction, stop: Fraction) -> None:
         """Lay a parabola through an input at the start, the middle and the end of a flow."""
@@ -62,10 +68,11 @@ class Surroundings:
 
     def look(self, time: Fraction) -> None:
         """Keep the outputs, and the sensors that give their value whenever they are read."""
-        found = {name: self._signals.now(name) for name in self._outputs}
+        found = self._read()
         for run in self._unsampled:
-            found[run.sensor.name] = run.look(time, found[run.sensor.source])
-        self.looked[time] = found
+            value = found[self._outputs.index(run.sensor.source)]
+            found = (*found, run.look(time, value))
+        self.looked.append(found)
 
     def _valued(self, connection: Connection) -> Callable[[Fraction], Any]:
         return lambda time: self._signals.connected(connection, self._signals.at(time, self._since))

@@ -1,0 +1,40 @@
+"""Cruise: whole major steps, one after the other, as long as nothing happens in them."""
+
+from __future__ import annotations
+
+from engine.interpreter import Stepper
+from engine.range_watch import RangeWatch
+from language.program import Program
+
+
+class Cruise:
+    """The common case of a continuous automaton whose inputs stand still and nobody watches.
+
+    Steps are counted, so no exact time is needed between them.
+    """
+
+    def __init__(self, program: Program, stepper: Stepper, ranges: RangeWatch) -> None:
+        """Take the automaton and what tells that all of it is finite and in its range."""
+        self._stepper = stepper
+        self._ranges = ranges
+        self._h = float(program.major_step)
+        self._happened = stepper.reader(("work.event", "work.left"))
+
+    def go(self, step: int, last: int) -> tuple[int, bool]:
+        """Go from one major step to another; return the one reached, and whether more was done.
+
+        That is the first segment of a step in which something happens: it flowed and elapsed.
+        """
+        run, put, h = self._stepper.run, self._stepper.set, self._h
+        is_inside, happened = self._ranges.is_inside, self._happened
+        run("latch")
+        while step < last:
+            put("work.left", h)
+            run("limit")
+            run("flow")
+            run("elapse")
+            is_event, left = happened()
+            if is_event or left > 0.0 or not is_inside():
+                return step, True
+            step += 1
+        return step, False

@@ -1,0 +1,67 @@
+"""Cruise: major steps in which nothing happens are the same steps, whoever takes them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import modewright as mw
+from engine.continuous import ContinuousRun
+from engine.trajectory import Trajectory
+
+PLANT = """
+language: 1
+variant: coarse
+extends: driveline
+step: 2 ms
+states: {w_em: {range: [-400, 310.6]}}
+---
+language: 1
+system: plant_alone
+inputs: {T_req: {unit: N*m}}
+instances: {plant: {of: coarse}}
+connections: {plant.T_em: T_req}
+---
+language: 1
+scenario: pull
+of: plant_alone
+horizon: 0.3013 s
+initial: {plant.theta_d: 0.074 rad}
+inputs: {T_req: {start: 30 N*m, steps: {0.1013 s: -20 N*m}}}
+record: {every: 5 ms}
+"""
+"""Rows on and inside steps, an input that steps inside one, contact lost and found again, and
+a range that is left for a while."""
+
+
+def run(folder: Path) -> Trajectory:
+    (folder / "spec").mkdir(exist_ok=True)
+    for number, text in enumerate(PLANT.split("---")):
+        (folder / "spec" / f"{number}.yaml").write_text(text)
+    return mw.simulate("plant_alone", "pull", root=folder)
+
+
+def test_it_changes_no_bit_and_no_event(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    taken: list[int] = []
+    cruise_to = ContinuousRun._cruise_to
+
+    def counted(flow: ContinuousRun, horizon: object) -> bool:
+        before = flow.time
+        found = cruise_to(flow, horizon)  # type: ignore[arg-type]
+        taken.append(int((flow.time - before) / flow.program.major_step))
+        return found
+
+    monkeypatch.setattr(ContinuousRun, "_cruise_to", counted)
+    cruised = run(tmp_path)
+    assert sum(taken) > 20
+    monkeypatch.setattr(ContinuousRun, "_cruise_to", lambda flow, horizon: False)
+    walked = run(tmp_path)
+    assert [event.kind for event in cruised.events].count("transition") >= 3
+    assert [event.kind for event in cruised.events].count("range") >= 2
+    assert cruised.events == walked.events
+    assert cruised.times.tobytes() == walked.times.tobytes()
+    for name, values in cruised.signals.items():
+        assert values.tobytes() == walked.signals[name].tobytes()
+    assert np.isfinite(cruised.signals["plant.w_em"]).all()
