@@ -26,7 +26,8 @@ def test_a_random_system_is_in_lockstep(texts: Specs) -> None:
         spec.mkdir()
         for name in ("automaton", "system", "scenario"):
             (spec / f"{name}.yaml").write_text(getattr(texts, name))
-        problems = mw.check("chance", Path(folder))
+        found = mw.check("chance", Path(folder))
+        problems = [problem for problem in found if problem.severity == "error"]
         assert not problems, mw.render_all(problems)
         trajectory, verdicts = mw.lockstep("pair", "chances", root=Path(folder))
     assert trajectory.stopped is None
