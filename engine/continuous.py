@@ -165,23 +165,26 @@ class ContinuousRun:
 
         A step inside which someone looks is not taken.
         """
-        step = self.program.major_step
-        if self._cruise is None or self.time % step:
+        cruise = self._cruise
+        if cruise is None or cruise.place(self.time)[1]:
             return False
-        now, last = int(self.time / step), int(horizon // step)
-        while now < last:
-            look = self._looks[0] if self._looks else horizon
-            stop = now + 1 if self.stepped else min(int(look // step), last)
-            if stop == now or look < stop * step:
-                return False
-            now, is_begun = self._cruise.go(now, stop)
-            self.time = now * step
-            if is_begun:
-                return True
-            self._look_here(horizon)
-            if self.time < horizon:
-                self.end_step()
-        return False
+        (now, _), (last, is_beyond) = cruise.place(self.time), cruise.place(horizon)
+        is_begun = False
+        while now < last and not is_begun:
+            look, is_inside = cruise.place(self._looks[0]) if self._looks else (last, True)
+            if look == now:
+                break
+            stop = now + 1 if self.stepped else min(look, last)
+            now, is_begun = cruise.go(now, stop)
+            if is_begun or (now == last and not is_beyond):
+                break
+            self.stepper.run("equations")
+            if now == look and not is_inside:
+                self._around.look(self._looks.popleft())
+            if self.stepped:
+                self.stepped()
+        self.time = now * self.program.major_step
+        return is_begun
 
     def _major_step(self, end: Fraction, horizon: Fraction, is_begun: bool) -> None:
         """Flow to the end of a step, through all events in it; its first segment may be done."""

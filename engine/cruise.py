@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 from engine.interpreter import Stepper
 from engine.range_watch import RangeWatch
 from language.program import Program
@@ -17,8 +19,15 @@ class Cruise:
         """Take the automaton and what tells that all of it is finite and in its range."""
         self._stepper = stepper
         self._ranges = ranges
+        self._step = program.major_step
         self._h = float(program.major_step)
         self._happened = stepper.reader(("work.event", "work.left"))
+
+    def place(self, time: Fraction) -> tuple[int, bool]:
+        """Return the last major step up to a time, and whether the time is after it."""
+        step = self._step
+        number, rest = divmod(time.numerator * step.denominator, time.denominator * step.numerator)
+        return number, rest > 0
 
     def go(self, step: int, last: int) -> tuple[int, bool]:
         """Go from one major step to another; return the one reached, and whether more was done.

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.trajectory import Values, column_array
+from engine.trajectory import Values as Column, column_array
 from language.declaration import Formula
 from language.experiment import Scenario, System
 from language.program import Program, ValueType
 from language.syntax import names
 from language.wires import output_block
+
+Values = tuple[Any, ...]
 
 
 @dataclass(frozen=True)
@@ -91,7 +94,19 @@ class Rows:
         row = [formula(c.block, read) if c.block else read(c.source) for c in self.columns]
         self._rows.append(tuple(row))
 
-    def signals(self) -> dict[str, Values]:
+    def picked_from(self, names: Sequence[str]) -> Callable[[Values], Values] | None:
+        """Return what picks a row out of the values of some signals; None if they are too few."""
+        if any(column.block or column.source not in names for column in self.columns):
+            return None
+        places = [names.index(column.source) for column in self.columns]
+        return itemgetter(*places) if len(places) > 1 else lambda values: (values[places[0]],)
+
+    def extend(self, times: Sequence[Fraction], rows: Iterable[Values]) -> None:
+        """Add rows that are complete."""
+        self.times += times
+        self._rows += rows
+
+    def signals(self) -> dict[str, Column]:
         """Return the values of each signal (n_rows,)."""
         columns = list(zip(*self._rows, strict=True)) if self._rows else [()] * len(self.columns)
         return {

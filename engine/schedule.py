@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import heapq
 import itertools
+import math
 from collections.abc import Iterator, Mapping
 from fractions import Fraction
 
@@ -34,7 +35,9 @@ class Grid:
 
     def __iter__(self) -> Iterator[Fraction]:
         """Yield the instants for ever."""
-        return (self.start + k * self.period for k in itertools.count())
+        whole = math.lcm(self.start.denominator, self.period.denominator)
+        start, period = int(self.start * whole), int(self.period * whole)
+        return (Fraction(start + k * period, whole) for k in itertools.count())
 
 
 class Schedule:

@@ -158,6 +158,10 @@ class _Simulation:
         """Keep the rows that every continuous instance has reached."""
         arounds = list(self.around.values())
         reached = min((len(around.looked) for around in arounds), default=len(between))
+        picked = self.rows.picked_from(arounds[0].names) if len(arounds) == 1 else None
+        if picked:
+            self.rows.extend(between[:reached], map(picked, arounds[0].looked))
+            reached = 0
         for number, row in enumerate(between[:reached]):
             found: dict[str, Any] = {}
             for around in arounds:
