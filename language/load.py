@@ -9,6 +9,7 @@ from language.check import check_automaton
 from language.check_number import check_numbers
 from language.continuous import continuous_program
 from language.document import Document, Scalar
+from language.hoist import hoisted
 from language.model import Automaton
 from language.problem import Problems, Source, Span
 from language.program import Program
@@ -42,6 +43,11 @@ def program_of(automaton: Automaton, varying: Collection[str] = ()) -> Program:
 
     Raises SpecError.
     """
+    return hoisted(lowered(automaton, varying))
+
+
+def lowered(automaton: Automaton, varying: Collection[str] = ()) -> Program:
+    """Return the Program of a checked automaton before it is optimised. Raises SpecError."""
     problems = Problems()
     check_numbers(automaton, problems)
     if automaton.is_sampled:

@@ -9,7 +9,8 @@ from typing import Any, Literal
 
 from language.calibration import read_calibration
 from language.document import Document
-from language.load import automaton_of, command_line_value, program_of
+from language.hoist import PASSES
+from language.load import automaton_of, command_line_value, lowered, program_of
 from language.model_text import model_text
 from language.numbers_text import numbers_text
 from language.parameter import parameter_kinds
@@ -19,7 +20,7 @@ from language.project import Project, expanded, read_document, with_calibrations
 from language.provenance import Row, difference_text, differences, rows, spec_text
 from language.system import read_system
 
-Pass = Literal["document", "model", "program", "numbers"]
+Pass = Literal["document", "model", "lowered", "parameters", "inputs", "program", "numbers"]
 Values = Mapping[str, str]
 
 
@@ -35,8 +36,16 @@ def explained(spec: str, stage: Pass, values: Values, root: Path | None = None) 
     automaton = automaton_of(document, project, given)
     if stage == "model":
         return model_text(automaton)
-    program = program_of(automaton)
-    return numbers_text(program) if stage == "numbers" else program_text(program)
+    if stage == "numbers":
+        return numbers_text(program_of(automaton))
+    program = lowered(automaton)
+    for name, run in PASSES.items():
+        if stage == "lowered":
+            break
+        program = run(program)
+        if stage == name:
+            break
+    return program_text(program)
 
 
 def _calibration_text(document: Document, project: Project) -> str:

@@ -9,7 +9,7 @@ import typer
 
 from modewright.commands.options import Json, Sets, values_of
 
-PASSES = ("document", "model", "program", "numbers")
+PASSES = ("document", "model", "lowered", "parameters", "inputs", "program", "numbers")
 
 
 def explain(

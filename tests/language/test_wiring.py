@@ -86,7 +86,7 @@ def test_a_start_value_reads_inputs_parameters_and_other_start_values() -> None:
 
 def test_a_constant_that_nothing_reads_is_left_out() -> None:
     made = program(TEXT)
-    assert names_of(made, "constant") == ["used"]
+    assert names_of(made, "constant") == ["used", "per_used"]
     assert names_of(made, "calibration") == ["tuned"]
     assert names_of(made, "derived") == ["follows"]
 

@@ -88,10 +88,8 @@ def test_one_ulp_in_a_constant_is_found(tape: Tape, change: Change) -> None:
 
 
 def test_one_swapped_pair_of_operands_is_found(tape: Tape, change: Change) -> None:
-    old = """self->state.heat + (self->equation.P * constant.t_tick)
-        - (constant.P_loss * constant.t_tick);"""
-    new = """self->state.heat - (constant.P_loss * constant.t_tick)
-        + (self->equation.P * constant.t_tick);"""
+    old = "self->state.heat + (self->equation.P * constant.t_tick) - constant.P_loss_t_tick;"
+    new = "self->state.heat - constant.P_loss_t_tick + (self->equation.P * constant.t_tick);"
     change(old, new)
     found = first_difference(tape)
     assert (found.mode, found.signal) == ("heating", "heat")

@@ -1,0 +1,207 @@
+"""Hoist: what does not change is computed once (decision 0029). Three passes, each a Program.
+
+    parameters  what reads parameters alone becomes a constant, or is derived where one is tunable;
+                a division by such a value becomes a multiplication by its reciprocal
+    inputs      what reads inputs that are frozen during the flow is computed where they are latched
+    common      what a block computes twice is computed once (language/common.py)
+
+Both back ends run the result, so both have its bits.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Mapping
+from typing import Literal
+
+from language.common import common_once
+from language.evaluate import Scalar, evaluate
+from language.formula_name import formula_name, formula_text
+from language.lower import is_whole
+from language.number import NumberType
+from language.operation import Assign, Binary, Block, Call, Expr, Ref, Unary, Value
+from language.printing import expr_text
+from language.program import Constant, Program, Variable
+from language.substitution import parts, with_expressions, with_parts
+from language.traversal import block_names, block_writes, expr_names
+
+SMALLEST_NORMAL: Mapping[NumberType, float] = {"float64": 2.0**-1022, "float32": 2.0**-126}
+"""A reciprocal below it has lost digits: then division stays division."""
+ONCE = ("derive", "init", "start", "compare_stamps", "latch")
+"""Blocks that run once, or where what is hoisted is computed."""
+FIXED = "constant."
+TUNABLE = ("calibration.", "derived.")
+FROZEN = "before."
+LATCH = "latch"
+
+
+def hoisted(program: Program) -> Program:
+    """Return a Program that computes what does not change once."""
+    for run in PASSES.values():
+        program = run(program)
+    return program
+
+
+def inputs_once(program: Program) -> Program:
+    """Return a continuous Program that computes with its inputs where they are latched.
+
+    Nothing tunable is in it: a page turns between two latches.
+    """
+    if program.period is not None:
+        return program
+    latched = set(block_writes(program.blocks[LATCH]))
+    found = _Found(program)
+
+    def is_latched(name: str) -> bool | None:
+        return name in latched or (None if name.startswith(FIXED) else False)
+
+    def change(expr: Expr) -> Expr:
+        return found.ref(FROZEN, expr)
+
+    blocks = _changed(program, is_latched, change)
+    ops = [Assign(name, expr, formula_text(expr)) for name, expr in found.made.items()]
+    blocks[LATCH] = (*blocks[LATCH], *ops)
+    variables = [Variable(op.target, "real", about=op.key) for op in ops]
+    return _with(program, blocks=blocks, variables=(*program.variables, *variables))
+
+
+def parameters_once(program: Program) -> Program:
+    """Return a Program in which what follows from parameters is a constant or derived."""
+    number = program.number
+    values: dict[str, Scalar] = {c.name: c.value for c in program.constants if not c.items}
+    real = {c.name for c in program.constants if c.type == "real" and not c.items}
+    found = _Found(program)
+
+    def is_parameter(name: str) -> bool | None:
+        return name in real and name.startswith((FIXED, *TUNABLE))
+
+    def change(expr: Expr) -> Expr:
+        value = float(evaluate(expr, values, number))
+        if not math.isfinite(value):
+            return expr
+        is_fixed = all(name.startswith((FIXED, "call ")) for name in expr_names(expr))
+        ref = found.ref(FIXED if is_fixed else "derived.", expr)
+        values[ref.name] = value
+        return ref
+
+    def reciprocal(divisor: Expr) -> Expr | None:
+        inverse = Binary("/", Value(1.0), divisor)
+        size = abs(float(evaluate(inverse, values, number)))
+        is_normal = SMALLEST_NORMAL[number] <= size < math.inf
+        return change(inverse) if is_normal else None
+
+    blocks = _changed(program, is_parameter, change, reciprocal)
+    constants, derived = [], []
+    for name, expr in found.made.items():
+        is_fixed, text = name.startswith(FIXED), formula_text(expr)
+        kind: Literal["fixed", "derived"] = "fixed" if is_fixed else "derived"
+        constants.append(Constant(name, kind, float(values[name]), unit="", about=text))
+        if not is_fixed:
+            derived.append(Assign(name, expr, text))
+    if derived:
+        blocks["derive"] = (*blocks.get("derive", ()), *derived)
+    return _with(program, blocks=blocks, constants=(*program.constants, *constants))
+
+
+def finally_common(program: Program) -> Program:
+    """Return a Program whose blocks compute nothing twice, without constants that nothing reads."""
+    return _without_idle(common_once(program))
+
+
+def _without_idle(program: Program) -> Program:
+    """Leave out the fixed parameters that are read no more: the comment of a value has them."""
+    used = {name for block in program.blocks.values() for name in block_names(block)}
+    kept = tuple(c for c in program.constants if c.name in used or not c.name.startswith(FIXED))
+    return _with(program, constants=kept)
+
+
+class _Found:
+    """What was hoisted: the expression of each new name."""
+
+    def __init__(self, program: Program) -> None:
+        names = [v.name for v in program.variables] + [c.name for c in program.constants]
+        names += [f"block.{name}" for name in program.blocks]
+        self._taken = {name.partition(".")[2].lower() for name in names}
+        self._names: dict[str, str] = {}
+        self.made: dict[str, Expr] = {}
+
+    def ref(self, group: str, expr: Expr) -> Ref:
+        """Return what reads the value of an expression, by a name that no other has."""
+        text = expr_text(expr)
+        if text not in self._names:
+            base = formula_name(expr)
+            name, number = base, 1
+            while name.lower() in self._taken:
+                number += 1
+                name = f"{base}_{number}"
+            self._taken.add(name.lower())
+            self._names[text] = group + name
+            self.made[group + name] = expr
+        return Ref(self._names[text])
+
+
+def _changed(
+    program: Program,
+    reads: Callable[[str], bool | None],
+    change: Callable[[Expr], Expr],
+    reciprocal: Callable[[Expr], Expr | None] = lambda divisor: None,
+) -> dict[str, Block]:
+    """Return the blocks of a Program with the largest hoistable expressions changed.
+
+    `reads` tells of a name whether a value that reads it can be hoisted, None if that alone is no
+    reason to; `reciprocal` gives the inverse of a divisor that can be.
+    """
+
+    def visit(expr: Expr) -> tuple[Expr, bool | None]:
+        """Return an expression with its parts changed, and whether it can be hoisted itself."""
+        match expr:
+            case Value():
+                return expr, None
+            case Ref(name):
+                return expr, reads(name)
+            case Unary("-") | Binary() | Call():
+                inner = [visit(part) for part in parts(expr)]
+                kinds = [kind for _, kind in inner]
+                if False not in kinds:
+                    return expr, True if True in kinds else None
+                return _with_changed(expr, inner), False
+            case _:
+                return with_parts(expr, lambda part: settled(*visit(part))), False
+
+    def settled(expr: Expr, kind: bool | None) -> Expr:
+        return change(expr) if kind and _is_real_operation(expr) else expr
+
+    def _with_changed(expr: Expr, inner: list[tuple[Expr, bool | None]]) -> Expr:
+        if isinstance(expr, Binary) and expr.operator == "/" and inner[1][1]:
+            inverse = reciprocal(inner[1][0])
+            if inverse is not None:
+                return Binary("*", settled(*inner[0]), inverse)
+        pending = iter(inner)
+        return with_parts(expr, lambda _: settled(*next(pending)))
+
+    return {
+        name: block if name in ONCE else with_expressions(block, lambda e: settled(*visit(e)))
+        for name, block in program.blocks.items()
+    }
+
+
+def _is_real_operation(expr: Expr) -> bool:
+    """Tell whether an expression computes a real: more than a sign."""
+    if isinstance(expr, Unary):
+        return expr.operator == "-" and _is_real_operation(expr.operand)
+    if isinstance(expr, Binary):
+        return expr.operator in "+-*/" and not is_whole(expr)
+    return isinstance(expr, Call) and expr.function != "whole"
+
+
+def _with(program: Program, **changes: object) -> Program:
+    return dataclasses.replace(program, **changes)  # type: ignore[arg-type]
+
+
+PASSES: Mapping[str, Callable[[Program], Program]] = {
+    "parameters": parameters_once,
+    "inputs": inputs_once,
+    "program": finally_common,
+}
+"""The passes in their order, as `modewright explain --pass` names them."""
