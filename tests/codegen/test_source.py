@@ -24,7 +24,7 @@ from modewright.api import load, program
 
 GOLDEN = Path(__file__).parent / "golden"
 HEATER = GOLDEN / "heater.yaml"
-AUTOMATA = ("estimator", "estimator_simple", "leaf", str(HEATER))
+AUTOMATA = ("estimator", "estimator_simple", "hko", "leaf", str(HEATER))
 WIDEST = 120
 """Longest line of generated C, its comment included."""
 KEYWORDS = """

@@ -151,7 +151,9 @@ def test_warnings_are_errors(tmp_path: Path) -> None:
     assert wanted <= {*WARNINGS}
 
 
-@pytest.mark.parametrize("name", ["estimator", "estimator_simple", "leaf", "estimator_float32"])
+@pytest.mark.parametrize(
+    "name", ["estimator", "estimator_simple", "leaf", "estimator_float32", "hko"]
+)
 def test_objects_need_nothing_inexact_from_a_library(name: str, tmp_path: Path) -> None:
     for found in objects(name, tmp_path, FLAGS):
         lines = output("nm", "--undefined-only", str(found)).splitlines()
