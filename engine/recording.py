@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import gzip
 import io
 import math
 import re
 import zlib
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
-from language.experiment import Column, RecordingMap
+from language.experiment import Column, RecordingMap, Window
 from language.problem import Problems, Source, Span, nearest
 from language.project import shown
 
@@ -38,11 +40,37 @@ class Channel:
 
 @dataclass(frozen=True)
 class Recording:
-    """The channels that a map takes from a file, by the name in the map."""
+    """The channels that a map takes from a file, by the name in the map.
+
+    `windows` [s] are the times to use, in order; where there is none, all is used.
+    """
 
     name: str
     channels: dict[str, Channel]
     end: Fraction
+    start: Fraction = Fraction(0)
+    windows: tuple[Window, ...] = ()
+
+    def uses(self, time: Fraction) -> bool:
+        """Tell whether a time [s] is in one of the windows."""
+        return not self.windows or any(start <= time <= end for start, end in self.windows)
+
+
+def pieces(recording: Recording) -> list[Recording]:
+    """Return a recording as one for each of its windows."""
+    return [_cut(recording, window) for window in recording.windows] or [recording]
+
+
+def _cut(recording: Recording, window: Window) -> Recording:
+    channels = {}
+    for name, channel in recording.channels.items():
+        first = bisect_left(channel.times, window[0])
+        last = bisect_right(channel.times, window[1])
+        if first < last:
+            cut = slice(first, last)
+            channels[name] = Channel(channel.column, channel.times[cut], channel.values[cut])
+    start, end = max(window[0], recording.start), min(window[1], recording.end)
+    return Recording(recording.name, channels, end, start, (window,))
 
 
 def read_recording(path: Path, mapping: RecordingMap, used: Sequence[str]) -> Recording:
@@ -62,7 +90,29 @@ def read_recording(path: Path, mapping: RecordingMap, used: Sequence[str]) -> Re
     for column in columns:
         channels[column.name] = rows.channel(column, clock, mapping, problems)
     problems.stop_if_any()
-    return Recording(path.name, channels, max(time for time in clock if time is not None))
+    stamps = [time for time in clock if time is not None]
+    windows = mapping.windows_of(path.name)
+    return within(Recording(path.name, channels, max(stamps), min(stamps), windows), mapping)
+
+
+def within(recording: Recording, mapping: RecordingMap) -> Recording:
+    """Return a recording from the start of its first window to the end of its last one.
+
+    Raises SpecError for a window in which a channel has no value.
+    """
+    if not recording.windows:
+        return recording
+    problems = Problems()
+    for piece in pieces(recording):
+        for name in recording.channels.keys() - piece.channels.keys():
+            (start, end), *_ = piece.windows
+            label = f"`{name}` has no value from {float(start):g} s to {float(end):g} s"
+            hint = f"{recording.name} goes from {float(recording.start):g} s to "
+            hint += f"{float(recording.end):g} s"
+            problems.error("range", mapping.span, label + ", a window of this map", hint)
+    problems.stop_if_any()
+    whole = _cut(recording, (recording.windows[0][0], recording.windows[-1][1]))
+    return dataclasses.replace(whole, windows=recording.windows)
 
 
 def _read_lines(path: Path, source: Source) -> list[str]:

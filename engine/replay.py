@@ -120,7 +120,7 @@ def replay(
     faults = fault_names(automaton.name, program, word)
     trajectory = dataclasses.replace(keep.trajectory(automaton.name), faults=faults)
     compared = [c for c in recording.channels.values() if c.column.compare is not None]
-    found = [_compared(channel, trajectory, start, program) for channel in compared]
+    found = [_compared(channel, trajectory, start, program, recording) for channel in compared]
     return Replay(trajectory, keep.innovation_rms(), tuple(one for one in found if one))
 
 
@@ -256,15 +256,19 @@ class _Kept:
 
 
 def _compared(
-    channel: Channel, trajectory: Trajectory, start: Fraction, program: Program
+    channel: Channel,
+    trajectory: Trajectory,
+    start: Fraction,
+    program: Program,
+    recording: Recording,
 ) -> Comparison | None:
-    """Compare an output with a column at the ticks in which it has a new value; None without."""
+    """Compare an output with a column at the ticks in which it has a new value to use, if any."""
     assert program.period is not None and channel.column.compare is not None
     output = trajectory.signals[channel.column.compare]
     differences = []
     for time, value in zip(channel.times, channel.values, strict=True):
         tick = math.ceil((time - start) / program.period)
-        if 0 <= tick < len(output):
+        if 0 <= tick < len(output) and recording.uses(time):
             differences.append(float(output[tick]) - value)
     if not differences:
         return None

@@ -74,19 +74,20 @@ def resolved(system: System, scenario: Scenario) -> Scenario:
             for name, value in scenario.initial.items()
         },
         inputs={
-            name: _pieces(recording.channels[s.column], start, s) if s.column else s
+            name: stimulus_of(recording.channels[s.column], start, s.truth) if s.column else s
             for name, s in scenario.inputs.items()
         },
         recording=None,
     )
 
 
-def _pieces(channel: Channel, start: Fraction, stimulus: Stimulus) -> Stimulus:
+def stimulus_of(channel: Channel, start: Fraction, truth: bool = False) -> Stimulus:
+    """Return a channel as an input from `start` [s] on, held or linear as its column says."""
     values = [Fraction(value) for value in channel.values]
     points = [(time - start, value) for time, value in zip(channel.times, values, strict=True)]
     pieces = linear(points) if channel.column.hold == "linear" else held(points)
     first = max(0, bisect_right([piece.start for piece in pieces], Fraction(0)) - 1)
-    return Stimulus(pieces[first:], truth=stimulus.truth)
+    return Stimulus(pieces[first:], truth=truth)
 
 
 def _first(recording: Recording, column: str, start: Fraction) -> Fraction:

@@ -27,6 +27,7 @@ from language.variable import VariableReader
 COMMON_KEYS = ("language", "automaton", "parameters", "inputs", "states", "discrete", "equations")
 LOGIC_KEYS = ("flow", "terms", "initial", "modes", "regions", "templates", "outputs")
 LAID_KEYS = ("elements", "places")
+RECORDING_KEYS = ("recording_map",)
 FAULT_KEYS = ("faults", "fault_mode")
 CLOCK_KEYS = ("period", "step", "method", "numbers", "model")
 FITTING_KEYS = ("neutral", "starts", "per", "form")
@@ -52,7 +53,16 @@ def read_automaton(
         problems.error("form", document.name_span, label)
     problems.stop_if_any()
     tree, model = _with_model(document.root, project, values or {}, problems)
+    _find_recording_map(tree, project, problems)
     return _AutomatonReader(problems).read(document, tree, model)
+
+
+def _find_recording_map(tree: Table, project: Project, problems: Problems) -> None:
+    """Report a map of recordings that is not there; it is read when a recording is."""
+    node = tree.get("recording_map")
+    if isinstance(node, Scalar):
+        with problems.collecting():
+            project.path_of(node.text, node.span)
 
 
 def _with_model(
@@ -113,7 +123,7 @@ class _AutomatonReader(Reader):
     """The sections of an automaton, one method each."""
 
     def read(self, document: Document, tree: Table, model: Automaton | None) -> Automaton:
-        keys = (*COMMON_KEYS, *LOGIC_KEYS, *LAID_KEYS, *CLOCK_KEYS, *FAULT_KEYS)
+        keys = (*COMMON_KEYS, *LOGIC_KEYS, *LAID_KEYS, *CLOCK_KEYS, *FAULT_KEYS, *RECORDING_KEYS)
         tree = self.table(tree, f"automaton {document.name}", keys)
         self.at = document.name_span
         check_file_name(document.name, document.name_span, self.problems)
@@ -148,6 +158,7 @@ class _AutomatonReader(Reader):
             numbers=numbers,
             faults=variables.faults,
             fault_mode=variables.fault_mode,
+            recording_map=self._recording_map(tree.get("recording_map")),
         )
         self._check_sections(tree)
         return automaton
@@ -158,6 +169,10 @@ class _AutomatonReader(Reader):
         if node is None and self.sampled:
             self.scalar(node, "numbers", self.at)
         return cast(NumberType, self.choice(node, "numbers", NUMBERS, "float64"))
+
+    def _recording_map(self, node: Node | None) -> Scalar | None:
+        """The map by which recordings are read where no other is given."""
+        return self.scalar(node, "recording_map", self.at) if node else None
 
     def _check_sections(self, tree: Table) -> None:
         first = ("flow", "terms", "step", "method")

@@ -144,9 +144,18 @@ class Column:
     hold: Literal["previous", "linear"] = "previous"
 
 
+Window = tuple[Fraction, Fraction]
+"""From and to, both included [s], in the time of the recording."""
+EVERY_FILE = ""
+"""The key of windows that are not those of one file."""
+
+
 @dataclass(frozen=True)
 class RecordingMap:
-    """How the columns of a recording become signals."""
+    """How the columns of a recording become signals.
+
+    `windows` are the times to use, by file name or `EVERY_FILE`; where there is none, all is used.
+    """
 
     name: str
     time: str
@@ -154,3 +163,8 @@ class RecordingMap:
     columns: Mapping[str, Column]
     constants: Mapping[str, tuple[Fraction, Dimension]]
     span: Span
+    windows: Mapping[str, tuple[Window, ...]] = field(default_factory=dict)
+
+    def windows_of(self, file: str) -> tuple[Window, ...]:
+        """Return the windows of a file; none where all of it is used."""
+        return self.windows.get(file, self.windows.get(EVERY_FILE, ()))

@@ -5,15 +5,15 @@ from __future__ import annotations
 from fractions import Fraction
 from typing import Literal, cast
 
-from language.document import Document, Entry, Items, Table
-from language.experiment import Column, RecordingMap
+from language.document import Document, Entry, Items, Node, Table
+from language.experiment import EVERY_FILE, Column, RecordingMap, Window
 from language.literal import constant
 from language.problem import Problems, Span
 from language.project import Project, expanded
 from language.reader import Reader
 from language.units import NO_UNIT, NUMBER, SECOND, Dimension, fits, product
 
-MAP_KEYS = ("language", "map", "time", "columns", "constants")
+MAP_KEYS = ("language", "map", "time", "columns", "constants", "windows")
 COLUMN_KEYS = (
     "column mean to compare unit scale sign delay hold blank time".split()  # noqa: SIM905
 )
@@ -62,7 +62,43 @@ class _MapReader(Reader):
             columns={column.name: column for column in columns},
             constants=constants,
             span=at,
+            windows=self._windows(tree.get("windows")),
         )
+
+    def _windows(self, node: Node | None) -> dict[str, tuple[Window, ...]]:
+        """A list of windows for every file, or a mapping from file names to such lists."""
+        if node is None:
+            return {}
+        if not isinstance(node, Table):
+            return {EVERY_FILE: self._list_of_windows(node)}
+        return {entry.key: self._list_of_windows(entry.node) for entry in node}
+
+    def _list_of_windows(self, node: Node) -> tuple[Window, ...]:
+        found: list[Window] = []
+        if not isinstance(node, Items) or not node.nodes:
+            label = "`windows` is a list like `[[1 s, 8 s]]`, or such a list for each file"
+            self.problems.error("form", node.span, label)
+            return ()
+        for item in node.nodes:
+            if not isinstance(item, Items) or len(item.nodes) != 2:
+                self.problems.error(
+                    "form", item.span, "a window is `[from, to]`, like `[1 s, 8 s]`"
+                )
+                continue
+            start, end = (self._time_of(part) for part in item.nodes)
+            if end <= start:
+                self.problems.error("range", item.span, "a window ends after it starts")
+            elif found and start <= found[-1][1]:
+                label = "this window starts before the one above it ends"
+                self.problems.error("range", item.span, label, "windows stand in order")
+            found.append((start, end))
+        return tuple(found)
+
+    def _time_of(self, node: Node) -> Fraction:
+        value, unit = self.quantity(node, "a window", node.span, None)
+        if value and not fits(unit.dimension, SECOND):
+            self.problems.error("dimension", node.span, "a window is in time, like `[1 s, 8 s]`")
+        return value
 
     def _column(self, entry: Entry) -> Column:
         what = f"columns.{entry.key}"

@@ -13,6 +13,7 @@ from language.declaration import (
     Parameter,
     State,
 )
+from language.document import Scalar
 from language.kind import Kind as ValueKind
 from language.number import NumberType
 from language.problem import Span
@@ -203,6 +204,7 @@ class Automaton:
     places: Mapping[str, Mapping[str, Formula]] = field(default_factory=dict)
     regions: tuple[Region, ...] = ()
     numbers: NumberType = "float64"
+    recording_map: Scalar | None = field(default=None, repr=False)
 
     def source_of(self, output: str) -> str:
         """Return the state or equation that an output reads: its own name unless it says more."""

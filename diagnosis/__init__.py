@@ -1,0 +1,1 @@
+"""Diagnosis: recordings against simulation."""
