@@ -15,8 +15,8 @@ from language.inside import exists, require_inside
 from language.problem import Problems, Source, Span, SpecError, nearest
 from language.yaml_tree import parse
 
-KINDS = ("automaton", "system", "scenario", "map", "variant", "effect", "calibration")
-LATER_KINDS = ("study", "test")
+KINDS = ("automaton", "system", "scenario", "map", "variant", "effect", "calibration", "study")
+LATER_KINDS = ("test",)
 HEAD = re.compile(rf"^({'|'.join(KINDS + LATER_KINDS)}):\s*([^\s#]+)", re.MULTILINE)
 VERSION = "1"
 

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from modewright.api import Loaded, Replayed, check, generate, load, lockstep, replay, simulate
     from modewright.diagram import Diagram, graph
     from modewright.runs import compare, plot, read, save
+    from modewright.studies import study_pictures, study_summary, sweep
 
 __all__ = [
     "Diagram",
@@ -43,6 +44,9 @@ __all__ = [
     "replay",
     "save",
     "simulate",
+    "study_pictures",
+    "study_summary",
+    "sweep",
 ]
 
 PLACES = {
@@ -61,6 +65,9 @@ PLACES = {
     "graph": "modewright.diagram",
     "render_all": "language.problem",
     "save": "modewright.runs",
+    "study_pictures": "modewright.studies",
+    "study_summary": "modewright.studies",
+    "sweep": "modewright.studies",
 }
 """Where a name of the public API is defined, if not in `modewright.api`."""
 

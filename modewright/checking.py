@@ -16,6 +16,7 @@ from language.problem import Problem, Problems, SpecError
 from language.project import Project, expanded, read_document, with_calibrations
 from language.scenario import read_scenario
 from language.system import read_system
+from sweep.study_reader import read_study
 
 
 def check(reference: str, root: Path | None = None) -> list[Problem]:
@@ -37,6 +38,8 @@ def check(reference: str, root: Path | None = None) -> list[Problem]:
         elif base.kind == "effect":
             read_effect(document, problems)
             problems.stop_if_any()
+        elif base.kind == "study":
+            read_study(document, project, problems=problems)
         else:
             _check_scenario(reference, project)
     except SpecError as error:

@@ -24,12 +24,14 @@ from modewright.commands.new import new
 from modewright.commands.plot import plot
 from modewright.commands.replay import replay
 from modewright.commands.simulate import simulate
+from modewright.commands.sweep import sweep
 from modewright.console import configure
 from modewright.exits import EXIT_CODES, exit_code
 from modewright.files import require_writable
 
 COMMANDS = (
-    new, check, simulate, lockstep, replay, plot, compare, graph, generate, explain, demo, doctor,
+    new, check, simulate, sweep, lockstep, replay, plot, compare, graph, generate, explain, demo,
+    doctor,
 )  # fmt: skip
 
 app = typer.Typer(

@@ -6,7 +6,7 @@ import logging
 import os
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
@@ -61,6 +61,36 @@ def working(what: str) -> Iterator[None]:
     with Progress(*columns, console=screen, transient=True, disable=is_hidden) as progress:
         progress.add_task(what, total=None)
         yield
+    log.info("%s: %.2f s", what, time.monotonic() - start)
+
+
+@contextmanager
+def counting(what: str, noun: str) -> Iterator[Callable[[int, int, int], None]]:
+    """Show on a terminal how much of a work is done, its rate and the time left.
+
+    What is yielded is told: how much is done, how much of it was before, how much it is in all.
+    """
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    screen = Console(stderr=True)
+    is_hidden = not screen.is_terminal or console().quiet
+    columns = (
+        TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[count]}"),
+        TextColumn("{task.fields[rate]}"), TimeRemainingColumn(),
+    )  # fmt: skip
+    start = time.monotonic()
+    with Progress(*columns, console=screen, transient=True, disable=is_hidden) as progress:
+
+        def tell(done: int, before: int, total: int) -> None:
+            if not progress.tasks:
+                progress.add_task(what, total=total, completed=before, count="", rate="")
+            rate = (done - before) / max(time.monotonic() - start, 1e-9)
+            shown = f"{rate:.3g} {noun}/s" if done > before else ""
+            count, bar = f"{done}/{total}", progress.tasks[0].id
+            progress.update(bar, total=total, completed=done, count=count, rate=shown)
+
+        yield tell
     log.info("%s: %.2f s", what, time.monotonic() - start)
 
 

@@ -37,7 +37,14 @@ def test_every_command_in_the_readme_exists() -> None:
 
 @pytest.mark.parametrize(
     "page",
-    ["README.md", "docs/ARCHITECTURE.md", "docs/guide.md", "docs/recordings.md", "docs/c_code.md"],
+    [
+        "README.md",
+        "docs/ARCHITECTURE.md",
+        "docs/guide.md",
+        "docs/recordings.md",
+        "docs/c_code.md",
+        "docs/studies.md",
+    ],
 )
 def test_every_file_that_a_page_names_exists(page: str) -> None:
     text = (ROOT / page).read_text()

@@ -16,6 +16,7 @@ from pathlib import Path
 
 import modewright as mw
 from language.problem import Problem, SpecError
+from modewright import studies
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent.parent
@@ -83,6 +84,8 @@ def run_command(words: Sequence[str]) -> None:
             mw.load(names[0], names[1], values, root=ROOT)
         case "generate":
             mw.generate(names[0], values, root=ROOT)
+        case "summary":
+            studies.study_summary(names[0])
         case "replay":
             trace = ROOT / "tests" / "data" / "paper" / "est_paper_step_100Hz.csv.gz"
             name, map, variant = names[0], names[1], (names[2] if len(names) > 2 else None)

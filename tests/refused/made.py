@@ -15,6 +15,28 @@ modes: {only: {flow: {x: der(x) = 1 m/s}}}
 outputs: [x]
 """
 Pair = tuple[Path, Path]
+STUDY = """language: 1
+study: made_study
+of: made.yaml
+scenarios: [still.yaml]
+measures: {last: {final: x}}
+"""
+
+
+def store(folder: Path) -> Pair:
+    """A folder without results of a study, and one with them."""
+    from modewright.studies import sweep
+
+    (folder / "made.yaml").write_text(SPEC)
+    (folder / "still.yaml").write_text(
+        "language: 1\nscenario: still\nof: made.yaml\nhorizon: 1 ms\n"
+    )
+    (folder / "study.yaml").write_text(STUDY)
+    sweep(str(folder / "study.yaml"), folder / "results", root=folder, workers=1)
+    refused, neighbour = folder / "empty.command", folder / "full.command"
+    refused.write_text(f"summary {folder / 'nothing'}\n")
+    neighbour.write_text(f"summary {folder / 'results'}\n")
+    return refused, neighbour
 
 
 def huge(folder: Path) -> Pair:
@@ -101,6 +123,7 @@ def outside(folder: Path) -> Pair:
 
 
 MADE: dict[str, Callable[[Path], Pair]] = {
+    "store": store,
     "huge": huge,
     "absent": absent,
     "folder": folder_as_file,

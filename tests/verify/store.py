@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-CODE = ("language", "engine", "codegen", "lockstep", "modewright", "spec")
+CODE = ("language", "engine", "codegen", "lockstep", "sweep", "modewright", "spec")
 SUFFIXES = (".py", ".yaml", ".lark", ".jinja", ".txt")
 Figure = dict[str, Any]
 

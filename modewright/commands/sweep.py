@@ -1,0 +1,137 @@
+"""Command sweep: many variants of a system, run into a folder."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from modewright.commands.options import Json, Sets, values_of
+from modewright.console import announce, console, counted, counting
+from modewright.exits import PROBLEMS
+from modewright.files import OutputError, make_folder, write_files
+
+if TYPE_CHECKING:
+    from sweep.study_run import StudyRun
+
+PLOTS = "plots"
+FORMATS = ("svg", "png", "pdf")
+
+
+def sweep(
+    study: Annotated[str | None, typer.Argument(help="a study: its name or its file")] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="the folder of the results")
+    ] = None,
+    workers: Annotated[
+        int, typer.Option("--workers", "-j", min=0, help="processes; 0: one for each core")
+    ] = 0,
+    sets: Sets = None,
+    summary: Annotated[
+        Path | None, typer.Option("--summary", help="sum up a folder, run nothing")
+    ] = None,
+    block: Annotated[
+        int | None, typer.Option(min=1, max=1_000_000, help="variants that are kept at once")
+    ] = None,
+    table: Annotated[
+        Path | None, typer.Option("--csv", help="write the summary as CSV, numbers in SI")
+    ] = None,
+    form: Annotated[str, typer.Option("--format", help="of the pictures: svg, png or pdf")] = "svg",
+    as_json: Json = False,
+) -> None:
+    """Run a study into a folder of Parquet files; the same command goes on where it ended.
+
+    Pictures that the study asks for are in the folder `plots` there.
+
+    \b
+    modewright sweep tip_out_stiffness_and_gap --out build/tip_out
+    modewright sweep my_study.yaml --out results --workers 4 --set 'c_hs=20 N*m*s/rad'
+    modewright sweep --summary results --csv summary.csv
+    """
+    if (study is None) == (summary is None):
+        raise typer.BadParameter("name a study, or a folder with --summary", param_hint="STUDY")
+    if study is not None and out is None:
+        raise typer.BadParameter("say where the results go", param_hint="--out")
+    if form not in FORMATS:
+        raise typer.BadParameter(f"one of {', '.join(FORMATS)}", param_hint="--format")
+    lost = 0
+    if study is not None:
+        assert out is not None
+        lost = _run(study, out, workers, values_of(sets), block, as_json)
+    folder = out or summary
+    assert folder is not None
+    _show(folder, table, form, as_json)
+    if lost:
+        raise typer.Exit(PROBLEMS)
+
+
+def _run(
+    study: str,
+    out: Path,
+    workers: int,
+    values: dict[str, str],
+    block: int | None,
+    as_json: bool,
+) -> int:
+    """Run the study; return how many blocks could not be computed."""
+    from modewright import studies
+
+    done = [0, 0]
+
+    def tell(now: int, before: int, total: int) -> None:
+        done[:] = [now, total]
+        progress(now, before, total)
+
+    try:
+        with counting(f"sweep {study}", "variants") as progress:
+            found = studies.sweep(
+                study, out, values, workers=workers or None, block=block, progress=tell
+            )
+    except KeyboardInterrupt:
+        _tell_kept(out, *done)
+        raise
+    except OutputError as error:
+        kept = f"{done[0]} of {done[1]} variants are kept; the same command goes on"
+        raise OutputError(f"{error}; {kept}" if done[1] else str(error)) from None
+    if not as_json:
+        _tell_run(found)
+    for part, reason in found.lost:
+        console_error(f"variants {part.start} to {part.stop - 1} are not done: {reason}")
+    return len(found.lost)
+
+
+def _tell_kept(out: Path, now: int, total: int) -> None:
+    if total:
+        console_error(f"{now} of {total} variants are kept in {out}; the same command goes on")
+
+
+def _tell_run(found: StudyRun) -> None:
+    before = f", {found.before} were there" if found.before else ""
+    console().print(f"{counted(found.computed, 'variant')} computed{before}", highlight=False)
+
+
+def console_error(text: str) -> None:
+    """Print a line to stderr."""
+    import sys
+
+    print(text, file=sys.stderr)
+
+
+def _show(folder: Path, table: Path | None, form: str, as_json: bool) -> None:
+    from modewright import show_study, studies
+    from modewright.show import print_json
+
+    found = studies.study_summary(folder)
+    drawn = studies.study_pictures(folder)
+    files = {folder / PLOTS / f"{name}.{form}": p.data(form) for name, p in drawn.items()}
+    if files:
+        make_folder(folder / PLOTS)
+    if table:
+        files[table] = found.csv().encode()
+    write_files(files)
+    if as_json:
+        print_json(show_study.summary_json(found))
+    else:
+        show_study.print_summary(console(), found)
+        announce(list(files))

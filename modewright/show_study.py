@@ -1,0 +1,91 @@
+"""Show study: the summary of a study as tables and as plain data."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Any
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from sweep.summary import Line, Rate, Summary
+
+
+def print_summary(console: Console, summary: Summary) -> None:
+    """Print how variants ended, the measures by group, and rates."""
+    total = sum(summary.counts.values())
+    ended = ", ".join(f"{count} {name}" for name, count in summary.counts.items())
+    text = f"{summary.study}: {total} of {summary.expected} variants: {ended or 'none yet'}"
+    console.print(text, highlight=False, markup=False)
+    if summary.lines:
+        console.print(_lines(summary))
+    if summary.rates:
+        console.print(_rates(summary))
+
+
+def summary_json(summary: Summary) -> dict[str, Any]:
+    """Return a summary as plain data; what is not there is null."""
+    return {
+        "study": summary.study,
+        "digest": summary.digest,
+        "expected": summary.expected,
+        "counts": dict(summary.counts),
+        "confidence": summary.confidence,
+        "measures": [_plain(asdict(line)) for line in summary.lines],
+        "rates": [_plain(asdict(rate)) for rate in summary.rates],
+    }
+
+
+def _plain(data: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        key: None if isinstance(value, float) and not math.isfinite(value) else value
+        for key, value in data.items()
+    }
+
+
+def _lines(summary: Summary) -> Table:
+    groups = list(summary.lines[0].group)
+    sure = f"{summary.confidence * 100:g} %"
+    table = Table(
+        *groups, "measure", escape("[unit]"), "n", "median", sure, "mean", sure, "sd", "p95",
+        "min", "max", box=None, pad_edge=False, header_style="bold",
+    )  # fmt: skip
+    for line in summary.lines:
+        table.add_row(*(escape(line.group[name]) for name in groups), *_cells(line))
+    return table
+
+
+def _cells(line: Line) -> list[str]:
+    numbers = (line.mean, line.deviation, line.p95, line.low, line.high)
+    mean, deviation, p95, low, high = (_short(number) for number in numbers)
+    return [
+        line.measure, escape(line.unit), str(line.count), _short(line.median),
+        _interval(line.median_interval), mean, _interval(line.mean_interval), deviation, p95, low,
+        high,
+    ]  # fmt: skip
+
+
+def _rates(summary: Summary) -> Table:
+    groups = list(summary.rates[0].group)
+    sure = f"{summary.confidence * 100:g} % (Wilson)"
+    table = Table(*groups, "rate", "hits", "of", "share", sure, box=None, pad_edge=False,
+                  header_style="bold")  # fmt: skip
+    for rate in summary.rates:
+        table.add_row(*(escape(rate.group[name]) for name in groups), *_rate_cells(rate))
+    return table
+
+
+def _rate_cells(rate: Rate) -> list[str]:
+    share = rate.hits / rate.count if rate.count else math.nan
+    return [rate.measure, str(rate.hits), str(rate.count), _short(share), _interval(rate.interval)]
+
+
+def _interval(interval: tuple[float, float] | None) -> str:
+    return f"{_short(interval[0])} .. {_short(interval[1])}" if interval else "-"
+
+
+def _short(number: float) -> str:
+    return "-" if math.isnan(number) else f"{number:.5g}"

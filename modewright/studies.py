@@ -1,0 +1,71 @@
+"""Studies: many variants run into a folder, gone on with, summed up and drawn."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from engine.variants import run_variants
+from language.document import Scalar
+from language.load import command_line_value
+from language.project import Project, read_document
+from modewright.files import OutputError
+from sweep.executor import Executor, InProcess
+from sweep.preparation import prepared
+from sweep.processes import Processes
+from sweep.store import read_store
+from sweep.study_reader import read_study
+from sweep.study_run import Progress, StudyRun, run_study
+from sweep.summary import Summary, summary_of
+
+if TYPE_CHECKING:
+    from engine.plot import Picture
+
+WORKER = (sys.executable, "-P", "-m", "modewright.worker")
+"""What starts a process that computes blocks."""
+
+
+def sweep(
+    study: str,
+    out: str | Path,
+    values: Mapping[str, str] | None = None,
+    root: Path | None = None,
+    *,
+    workers: int | None = None,
+    block: int | None = None,
+    progress: Progress | None = None,
+    executor: Executor | None = None,
+) -> StudyRun:
+    """Run a study into a folder, or go on with it there; what is finished is never lost.
+
+    `workers` processes (all cores), 1: in this process; `block` variants are kept at once.
+    Raises SpecError, OutputError (a full disk: what is finished is kept), ToolMissing.
+    """
+    project = Project(root or Path())
+    document = read_document(project.path_of(study))
+    scalars: dict[str, Scalar] = {
+        name: command_line_value(text, name=name) for name, text in (values or {}).items()
+    }
+    ready = prepared(read_study(document, project, scalars))
+    count = workers or os.cpu_count() or 1
+    local: Executor = Processes(count, WORKER) if count > 1 else InProcess(run_variants)
+    try:
+        return run_study(ready, Path(out), executor or local, block, progress)
+    except OSError as error:
+        where = f" {error.filename}" if error.filename else ""
+        raise OutputError(f"{out}: cannot write{where}: {error.strerror}") from None
+
+
+def study_summary(out: str | Path) -> Summary:
+    """Return the summary of what is in the folder of a study so far. Raises SpecError."""
+    return summary_of(read_store(Path(out)))
+
+
+def study_pictures(out: str | Path) -> dict[str, Picture]:
+    """Return the pictures that the study asks for, by name. Raises SpecError."""
+    from sweep.picture import pictures
+
+    return pictures(read_store(Path(out)))

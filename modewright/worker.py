@@ -1,0 +1,18 @@
+"""Worker: the process that `modewright sweep` starts to compute blocks of a study."""
+
+from __future__ import annotations
+
+from modewright.neighbours import claim_neighbours
+
+
+def main() -> None:
+    """Answer blocks until who started us is gone."""
+    claim_neighbours()
+    from engine.variants import run_variants
+    from sweep.worker import serve
+
+    serve(run_variants)
+
+
+if __name__ == "__main__":
+    main()

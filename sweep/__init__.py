@@ -1,0 +1,1 @@
+"""sweep: studies of many variants of a system - what varies, what is measured, the store."""

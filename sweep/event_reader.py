@@ -1,0 +1,59 @@
+"""Event reader: the name of an event in a study - the entry of a mode, from one mode or any."""
+
+from __future__ import annotations
+
+from language.document import Scalar
+from language.experiment import System
+from language.model import CHART
+from language.problem import Problems, nearest
+from sweep.measure import EventName
+
+
+def read_event(scalar: Scalar, system: System, problems: Problems) -> EventName | None:
+    """Return the event of `plant.no_contact`, `gap.upper`, `plant.drive -> plant.coast`.
+
+    None with the problem reported where there is no such mode or transition.
+    """
+    head, arrow, tail = (part.strip() for part in scalar.text.partition("->"))
+    known = modes_of(system)
+    place = known.get(head)
+    if place is None:
+        label = f"`{head}` is not a mode of an instance of `{system.name}`"
+        problems.error("name", scalar.span, label, nearest(head, known))
+        return None
+    instance, region, mode = place
+    automaton = system.instances[instance].automaton
+    source = ""
+    if arrow:
+        source, mode = mode, tail.rpartition(".")[2]
+        if mode not in automaton.region(region).modes:
+            label = f"`{tail}` is not a mode beside `{source}`"
+            problems.error(
+                "name", scalar.span, label, nearest(mode, automaton.region(region).modes)
+            )
+            return None
+    taken = [
+        (transition.source, transition.target)
+        for each in automaton.region(region).modes.values()
+        for transition in each.transitions
+    ]
+    taken.append(("", automaton.fault_mode or ""))
+    if not any(to == mode and source in ("", of) for of, to in taken):
+        label = f"no transition enters `{mode}`" + (f" from `{source}`" if source else "")
+        problems.error("event", scalar.span, label, "an event is the entry of a mode")
+        return None
+    return EventName(instance, region, mode, source)
+
+
+def modes_of(system: System) -> dict[str, tuple[str, str, str]]:
+    """Return instance, region and mode by name: `instance.mode`, `instance.region.mode`."""
+    found = {}
+    for name, instance in system.instances.items():
+        for region in instance.automaton.all_regions:
+            for mode in region.modes:
+                place = (name, region.name, mode)
+                inner = mode if region.name == CHART else f"{region.name}.{mode}"
+                found[f"{name}.{inner}"] = place
+                if system.alone:
+                    found[inner] = place
+    return found

@@ -1,0 +1,39 @@
+"""Executor: what computes the blocks of a study - the protocol, and one in this process."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from engine.batch import Runner
+from sweep.block import Block, Row, block_rows
+from sweep.study import Study
+
+
+@dataclass(frozen=True)
+class Finished:
+    """The rows of a block in the order of their numbers; `lost` says why there are none."""
+
+    block: Block
+    rows: Sequence[Row]
+    lost: str = ""
+
+
+class Executor(Protocol):
+    """Computes blocks; results do not depend on which executor does, nor on their order."""
+
+    def __call__(self, study: Study, blocks: Iterable[Block]) -> Iterator[Finished]:
+        """Yield each block as it is finished; closing the iterator ends the work."""
+
+
+@dataclass(frozen=True)
+class InProcess:
+    """One block after another in this process."""
+
+    run: Runner
+
+    def __call__(self, study: Study, blocks: Iterable[Block]) -> Iterator[Finished]:
+        """Yield each block as it is finished."""
+        for block in blocks:
+            yield Finished(block, block_rows(study, block, self.run))

@@ -1,0 +1,253 @@
+"""Measure reader: the section `measures` of a study, each measure checked against its systems."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from fractions import Fraction
+
+from language.connection import output_kinds
+from language.declaration import Formula
+from language.declared import declared_kind
+from language.dimension import DimensionCheck, Scope
+from language.document import Entry, Node, Scalar, Table
+from language.experiment import System
+from language.kind import Kind, Whole
+from language.problem import Problems, Span, nearest
+from language.reader import Reader
+from language.rewrite import reads, renamed
+from language.syntax import Name
+from language.units import NUMBER, SECOND, Dimension, Unit, fits, product
+from sweep.event_reader import read_event
+from sweep.measure import (
+    Bound,
+    DelayMeasure,
+    EventMeasure,
+    EventName,
+    MatchMeasure,
+    Measure,
+    SignalKind,
+    SignalMeasure,
+    ValueMeasure,
+    columns_of,
+)
+
+WINDOW = ("from", "until")
+SIGNAL_KINDS: tuple[SignalKind, ...] = (
+    "peak", "max", "min", "mean", "rms", "final", "settling", "frequency",
+)  # fmt: skip
+KEYS: dict[str, tuple[str, ...]] = {
+    "time": ("number",),
+    "count": (),
+    "delay": ("after", "number", "before", "within"),
+    "match": ("truth", "before", "within"),
+    **{kind: () for kind in SIGNAL_KINDS},
+    "settling": ("within",),
+    "frequency": ("by",),
+    "value": (),
+}
+"""What stands beside each kind of measure, and `from` and `until` but for `value`."""
+MOST_EVENTS = 1_000_000
+
+
+class MeasureReader(Reader):
+    """Reads measures in their order: each may read those before it."""
+
+    def __init__(self, problems: Problems, systems: Sequence[System]) -> None:
+        """Check against all systems of the study; units are those of the first."""
+        super().__init__(problems)
+        self.systems = systems
+        self.dimensions: dict[str, Kind | None] = {}
+        self.expressions: dict[str, tuple[Formula, Dimension]] = {}
+
+    def measures(self, node: Node | None, at: Span) -> tuple[Measure, ...]:
+        """Return the measures; an expression of signals is in `expressions` by its new name."""
+        found = []
+        for entry in self.named(node, "measures"):
+            measure = self._measure(entry)
+            self.dimensions[entry.key] = None  # what has a problem is not reported again
+            if measure:
+                del self.dimensions[entry.key]
+                found.append(measure)
+                for column in columns_of(measure):
+                    if column.type != "list":
+                        self.dimensions[column.name] = self._dimension(measure, column.unit)
+        if node is None or (isinstance(node, Table) and not node.entries):
+            self.problems.error("missing", at, "a study has `measures`", "like `{final: plant.w}`")
+        return tuple(found)
+
+    def _dimension(self, measure: Measure, unit: str) -> Dimension:
+        if isinstance(measure, SignalMeasure | ValueMeasure):
+            return self._last
+        return SECOND if unit == "s" else NUMBER
+
+    def _measure(self, entry: Entry) -> Measure | None:
+        told = len(self.problems.found)
+        every = {key for keys in KEYS.values() for key in keys}
+        table = self.table(entry.node, f"measures.{entry.key}", (*KEYS, *every, *WINDOW))
+        kinds = [key for key in table.entries if key in KEYS]
+        if len(kinds) != 1:
+            if len(self.problems.found) == told:
+                place = table.entries[kinds[1]].span if kinds else entry.span
+                label = f"`{entry.key}` measures one thing"
+                self.problems.error("form", place, label, f"one of {', '.join(KEYS)}")
+            return None
+        kind = kinds[0]
+        own = self.table(table, kind, (kind, *KEYS[kind], *WINDOW))
+        scalar = self.scalar(own.get(kind), kind, entry.span)
+        if scalar is None:
+            return None
+        if kind == "value":
+            return self._value(entry, scalar)
+        since, until = (self._bound(own.get(key), key) for key in WINDOW)
+        if kind in SIGNAL_KINDS:
+            return self._signal(entry, kind, scalar, own, since, until)
+        return self._event(entry, kind, scalar, own, since, until)
+
+    def _bound(self, node: Node | None, what: str) -> Bound:
+        if node is None:
+            return None
+        if isinstance(node, Scalar) and not node.text[:1].isdecimal():
+            kind = self.dimensions.get(node.text)
+            if isinstance(kind, Dimension) and fits(kind, SECOND):
+                return node.text
+            if kind is None and node.text in self.dimensions:
+                return None
+            label = f"`{node.text}` is not an earlier measure that is a time"
+            self.problems.error("name", node.span, label, nearest(node.text, self.dimensions))
+            return None
+        return self._time(node, what)
+
+    def _time(self, node: Node | None, what: str) -> Fraction:
+        if node is None:
+            return Fraction(0)
+        value, unit = self.quantity(node, what, node.span, None)
+        if value < 0 or (value and not fits(unit.dimension, SECOND)):
+            self.problems.error("range", node.span, f"`{what}` is a time, like `15 ms`")
+        return value
+
+    def _event(
+        self, entry: Entry, kind: str, scalar: Scalar, own: Table, since: Bound, until: Bound
+    ) -> Measure | None:
+        event = self._named_event(scalar)
+        if event is None:
+            return None
+        number = self.whole(own.get("number"), "number", 1, 1, MOST_EVENTS)
+        if kind in ("time", "count"):
+            unit = "s" if kind == "time" else "1"
+            return EventMeasure(
+                entry.key, kind, event, number, since, until, unit, entry.span  # type: ignore[arg-type]
+            )  # fmt: skip
+        other = self.scalar(
+            own.get("after" if kind == "delay" else "truth"), "the other event", entry.span
+        )
+        truth = self._named_event(other) if other else None
+        if truth is None:
+            return None
+        before = self._time(own.get("before"), "before")
+        within = self._time(own.get("within"), "within") if own.get("within") else None
+        if kind == "match":
+            return MatchMeasure(
+                entry.key, event, truth, before, within, since, until, "s", entry.span
+            )
+        return DelayMeasure(
+            entry.key, event, truth, number, before, within, since, until, "s", entry.span
+        )
+
+    def _named_event(self, scalar: Scalar) -> EventName | None:
+        found = [read_event(scalar, system, self.problems) for system in self.systems]
+        return found[0] if all(found) else None
+
+    def _signal(
+        self, entry: Entry, kind: SignalKind, scalar: Scalar, own: Table, since: Bound, until: Bound
+    ) -> Measure | None:
+        signal, dimension = self._recorded(entry.key, scalar)
+        if dimension is None:
+            return None
+        unit = Unit(str(dimension), Fraction(1), dimension)
+        within = Fraction(0)
+        if kind == "settling":
+            told = len(self.problems.found)
+            within, _ = self.quantity(own.get("within"), "within", entry.span, unit)
+            if within <= 0 and len(self.problems.found) == told:
+                self.problems.error("range", entry.span, "`within` of `settling` is above zero")
+        by = self.choice(own.get("by"), "by", ("crossings", "spectrum"), "crossings")
+        self._last = dimension
+        if kind in ("settling", "frequency"):
+            self._last = SECOND if kind == "settling" else product(NUMBER, SECOND, -1)
+        return SignalMeasure(
+            entry.key, kind, signal, since, until, float(within), by, str(self._last), entry.span  # type: ignore[arg-type]
+        )  # fmt: skip
+
+    def _recorded(self, name: str, scalar: Scalar) -> tuple[str, Dimension | None]:
+        """Return the recorded signal of a text, and its dimension; None with a problem told."""
+        found: list[tuple[str, Dimension | None]] = []
+        for system in self.systems:
+            known = signal_kinds(system)
+            text = scalar.text
+            if system.alone:
+                short = {n.partition(".")[2]: n for n in known if "." in n}
+                text = renamed(text, {n: full for n, full in short.items() if n in reads(text)})
+            whole = scalar if text == scalar.text else dataclasses.replace(scalar, text=text)
+            formula = self.expression(whole, name, scalar.span)
+            if formula is None:
+                return "", None
+            if isinstance(formula.tree, Name) and formula.tree.path not in known:
+                path = formula.tree.path
+                label = f"`{path}` is not a signal of `{system.name}`"
+                self.problems.error("name", scalar.span, label, nearest(path, known))
+                return "", None
+            with self.problems.collecting():
+                check = DimensionCheck(Scope(known, place="in a measure"), self.problems)
+                kind = check.kind(formula.tree)
+                found.append(self._named_signal(name, formula, kind, system))
+        return found[0] if len(found) == len(self.systems) else ("", None)
+
+    def _named_signal(
+        self, name: str, formula: Formula, kind: Kind | None, system: System
+    ) -> tuple[str, Dimension | None]:
+        if kind is None:
+            return "", None
+        if isinstance(kind, Whole):
+            kind = NUMBER
+        if not isinstance(kind, Dimension):
+            self.problems.error("type", formula.span, "a signal that is measured is a quantity")
+            return "", None
+        if isinstance(formula.tree, Name):
+            return formula.tree.path, kind
+        self.expressions[f"measured_{name}"] = formula, kind
+        return f"measured_{name}", kind
+
+    def _value(self, entry: Entry, scalar: Scalar) -> Measure | None:
+        formula = self.expression(scalar, entry.key, scalar.span)
+        if formula is None:
+            return None
+        told = len(self.problems.found)
+        check = DimensionCheck(
+            Scope(self.dimensions, place="among the measures before"), self.problems
+        )
+        kind = check.kind(formula.tree)
+        if len(self.problems.found) > told or kind is None:
+            return None
+        if not isinstance(kind, Dimension):
+            label = f"`{entry.key}` is a quantity"
+            self.problems.error("type", scalar.span, label, "like `if late then 1 else 0`")
+            return None
+        self._last = kind
+        return ValueMeasure(entry.key, formula, str(kind), entry.span)
+
+    _last: Dimension = NUMBER
+
+
+def signal_kinds(system: System) -> dict[str, Kind]:
+    """Return what each signal of a system is: inputs, outputs of instances, sensors, outputs."""
+    found: dict[str, Kind] = {name: declared_kind(thing) for name, thing in system.inputs.items()}
+    for instance in system.instances.values():
+        found.update(output_kinds(instance))
+    found.update({name: sensor.dimension for name, sensor in system.sensors.items()})
+    for name, output in system.outputs.items():
+        if isinstance(output, str) and output in found:
+            found[name] = found[output]
+        elif name in system.dimensions:
+            found[name] = system.dimensions[name]
+    return found

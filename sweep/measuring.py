@@ -1,0 +1,131 @@
+"""Measuring: the measures of one observed run. None: there is no such number in this run."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from language.evaluate import evaluate
+from language.lower import assigned
+from language.operation import Ref
+from sweep.measure import (
+    Bound,
+    DelayMeasure,
+    EventMeasure,
+    MatchMeasure,
+    Measure,
+    SignalMeasure,
+    ValueMeasure,
+)
+from sweep.observation import Observation
+from sweep.waveform import signal_number
+
+Cell = float | int | list[float] | None
+Window = tuple[float, float] | None
+
+
+def measured(measures: Sequence[Measure], run: Observation) -> dict[str, Cell]:
+    """Return the value of every column of the measures."""
+    found: dict[str, Cell] = {}
+    for measure in measures:
+        if isinstance(measure, ValueMeasure):
+            found[measure.name] = _value(measure, found)
+            continue
+        window = _window(measure.since, measure.until, found, run.horizon)
+        match measure:
+            case EventMeasure():
+                found[measure.name] = _event(measure, run, window)
+            case DelayMeasure():
+                found[measure.name] = _delay(measure, run, window)
+            case MatchMeasure():
+                found |= _match(measure, run, window)
+            case SignalMeasure():
+                found[measure.name] = _signal(measure, run, window)
+    return found
+
+
+def _window(since: Bound, until: Bound, found: Mapping[str, Cell], horizon: float) -> Window:
+    """Return from when to when [s]; None where an end is a measure that has no value."""
+    ends = []
+    for bound, default in ((since, 0.0), (until, horizon)):
+        value = found[bound] if isinstance(bound, str) else bound
+        if isinstance(bound, str) and value is None:
+            return None
+        ends.append(default if value is None else float(value))  # type: ignore[arg-type]
+    return ends[0], ends[1]
+
+
+def _inside(times: Sequence[float], window: Window) -> list[float]:
+    return [] if window is None else [t for t in times if window[0] <= t <= window[1]]
+
+
+def _event(measure: EventMeasure, run: Observation, window: Window) -> Cell:
+    times = _inside(run.times_of(measure.event), window)
+    if measure.kind == "count":
+        return None if window is None else len(times)
+    return times[measure.number - 1] if len(times) >= measure.number else None
+
+
+def _delay(measure: DelayMeasure, run: Observation, window: Window) -> Cell:
+    truths = _inside(run.times_of(measure.after), window)
+    if len(truths) < measure.number:
+        return None
+    truth = truths[measure.number - 1]
+    last = math.inf if measure.within is None else float(measure.within)
+    for time in run.times_of(measure.event):
+        if -float(measure.before) <= time - truth <= last:
+            return time - truth
+    return None
+
+
+def _match(measure: MatchMeasure, run: Observation, window: Window) -> dict[str, Cell]:
+    """Each truth takes the first detection in its window that no truth before has taken."""
+    before, within = float(measure.before), measure.within
+    longest = math.inf if within is None else float(within)
+    stays = run.stays(measure.truth)
+    spans = [(start, start - before, min(end, start + longest)) for start, end in stays]
+    times = run.times_of(measure.event)
+    detections = _inside(times, window)
+    counted = [s for s in spans if window is not None and window[0] <= s[0] <= window[1]]
+    free = list(times)
+    delays: list[float] = []
+    firsts: list[float | None] = []
+    for start, low, high in counted:
+        taken = next((time for time in free if low <= time <= high), None)
+        firsts.append(None if taken is None else taken - start)
+        if taken is not None:
+            free.remove(taken)
+            delays.append(taken - start)
+    near = [(start - before, end + before) for start, end in stays]
+    false = sum(not any(low <= t <= high for low, high in near) for t in detections)
+    name = measure.name
+    return {
+        f"{name}.truths": len(counted),
+        f"{name}.matched": len(delays),
+        f"{name}.missed": len(counted) - len(delays),
+        f"{name}.detections": len(detections),
+        f"{name}.false_events": false,
+        f"{name}.first": firsts[0] if firsts else None,
+        f"{name}.first_missed": int(firsts[0] is None) if firsts else None,
+        f"{name}.delays": delays,
+    }
+
+
+def _signal(measure: SignalMeasure, run: Observation, window: Window) -> Cell:
+    if window is None:
+        return None
+    kept = (run.times >= window[0]) & (run.times <= window[1])
+    return signal_number(measure, run.times[kept], run.signals[measure.signal][kept])
+
+
+def _value(measure: ValueMeasure, found: Mapping[str, Cell]) -> Cell:
+    """Return an expression of measures; None where it reads one that has no value."""
+    read: dict[str, float] = {}
+    for name in dict.fromkeys(measure.formula.reads):
+        cell = found[name]
+        if cell is None or isinstance(cell, list):
+            return None
+        read[name] = float(cell)
+    known = {name: Ref(name) for name in read}
+    value = float(evaluate(assigned(measure.formula.tree, known, False), read))
+    return value if math.isfinite(value) else None

@@ -1,0 +1,249 @@
+"""Picture: the plots of a study - heat map, parallel coordinates, tornado, histogram."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from engine.band import PALETTE
+from engine.plot import QUANTITIES, Picture
+from language.text import visible
+from sweep.store import Store
+from sweep.summary import group_values
+from sweep.table import Reals, Table
+
+MOST_LINES = 2000
+"""Lines of parallel coordinates; of more variants evenly spread ones are drawn."""
+BINS = 12
+"""Bins along each axis of a heat map of drawn values, and of histograms at most."""
+MOST_ANNOTATED = 144
+"""Cells of a heat map up to which each has its number written in it."""
+
+
+def pictures(store: Store) -> dict[str, Picture]:
+    """Return the pictures of a study by name, from the variants that are done so far."""
+    table = Table(store)
+    draw = {
+        "heat_map": _heat_map, "parallel": _parallel, "tornado": _tornado, "histogram": _histogram,
+    }  # fmt: skip
+    found = {}
+    for name, plot in store.manifest.presentation.plots.items():
+        figure = draw[plot["kind"]](table, plot)
+        count = int(np.sum(table.is_done))
+        title = f"{store.manifest.study}: {name} ({count} variants)"
+        figure.suptitle(visible(title), x=0.01, ha="left", fontsize=11, parse_math=False)
+        found[name] = Picture(figure)
+    return found
+
+
+def _unit(table: Table, name: str) -> str:
+    manifest = table.store.manifest
+    return next((c.unit for c in (*manifest.varied, *manifest.measures) if c.name == name), "1")
+
+
+def _label(table: Table, name: str) -> str:
+    unit = _unit(table, name)
+    quantity = QUANTITIES.get(unit, "")
+    extra = f", {quantity}" if quantity not in ("", "number") else ""
+    return visible(f"{name}{extra} [{unit}]" if unit != "1" else name)
+
+
+def _done(table: Table, name: str) -> Reals:
+    return table.reals(name)[table.is_done]
+
+
+# Heat map.
+
+
+def _heat_map(table: Table, plot: Mapping[str, Any]) -> Figure:
+    """Each cell is the median of its variants; white: no variant, or none with this measure."""
+    (x_name, y_name), measure = plot["over"], plot["of"][0]
+    x, y, z = (_done(table, name) for name in (x_name, y_name, measure))
+    (xs, x_ticks), (ys, y_ticks) = _binned(x), _binned(y)
+    cells = np.full((len(y_ticks), len(x_ticks)), np.nan)
+    for row in range(len(y_ticks)):
+        for column in range(len(x_ticks)):
+            own = z[(xs == column) & (ys == row) & ~np.isnan(z)]
+            if len(own):
+                cells[row, column] = np.median(own)
+    figure = Figure(figsize=(7.5, 5.0), layout="constrained")
+    axis = figure.subplots()
+    image = axis.imshow(cells, origin="lower", aspect="auto", cmap="viridis")
+    axis.set_xticks(range(len(x_ticks)), [f"{v:.4g}" for v in x_ticks], fontsize=8)
+    axis.set_yticks(range(len(y_ticks)), [f"{v:.4g}" for v in y_ticks], fontsize=8)
+    axis.set_xlabel(_label(table, x_name), parse_math=False)
+    axis.set_ylabel(_label(table, y_name), parse_math=False)
+    bar = figure.colorbar(image, ax=axis)
+    bar.set_label(f"median {_label(table, measure)}", parse_math=False)
+    _annotate(axis, cells)
+    return figure
+
+
+def _annotate(axis: Axes, cells: Reals) -> None:
+    if cells.size > MOST_ANNOTATED or not np.any(np.isfinite(cells)):
+        return
+    middle = (np.nanmin(cells) + np.nanmax(cells)) / 2.0
+    for (row, column), value in np.ndenumerate(cells):
+        if np.isfinite(value):
+            colour = "black" if value > middle else "white"
+            axis.text(
+                column, row, f"{value:.4g}", ha="center", va="center", fontsize=8, color=colour
+            )
+
+
+def _binned(values: Reals) -> tuple[NDArray[np.int64], Reals]:
+    """Return the bin of each value, and the middles of the bins: the values where they are few."""
+    unique, places = np.unique(values, return_inverse=True)
+    if len(unique) <= 2 * BINS:
+        return places.reshape(-1).astype(np.int64), unique
+    ends = np.linspace(unique[0], unique[-1], BINS + 1)
+    places = np.clip(np.searchsorted(ends, values, side="right") - 1, 0, BINS - 1)
+    return places.astype(np.int64), (ends[:-1] + ends[1:]) / 2.0
+
+
+# Parallel coordinates.
+
+
+def _parallel(table: Table, plot: Mapping[str, Any]) -> Figure:
+    """One line a variant, over what varies and the measures; coloured by the last measure."""
+    manifest = table.store.manifest
+    names = [column.name for column in manifest.varied] + list(plot["of"])
+    columns = np.array([_done(table, name) for name in names])
+    kept = np.flatnonzero(~np.any(np.isnan(columns), axis=0))
+    step = max(1, -(-len(kept) // MOST_LINES))
+    columns = columns[:, kept[::step]]
+    figure = Figure(figsize=(max(6.0, 1.5 * len(names)), 5.0), layout="constrained")
+    axis = figure.subplots()
+    low, high = _ends(columns)
+    share = (columns - low[:, None]) / (high - low)[:, None]
+    colours = matplotlib.colormaps["viridis"](share[-1] if share.size else np.zeros(0))
+    for k in range(columns.shape[1]):
+        axis.plot(range(len(names)), share[:, k], color=colours[k], lw=0.8, alpha=0.6)
+    axis.set_xticks(range(len(names)), [_broken(_label(table, name)) for name in names], fontsize=8)
+    axis.set_yticks([])
+    axis.set_ylim(-0.08, 1.08)
+    for place in range(len(names)):
+        axis.axvline(place, color="black", lw=0.8)
+        for value, height, where in ((low[place], -0.02, "top"), (high[place], 1.02, "bottom")):
+            axis.text(place, height, f"{value:.4g}", ha="center", va=where, fontsize=8)
+    for side in ("top", "right", "bottom", "left"):
+        axis.spines[side].set_visible(False)
+    return figure
+
+
+def _broken(label: str) -> str:
+    """Return a label in two lines: the name, then what it is."""
+    head, comma, rest = label.partition(", ")
+    return f"{head}\n{rest}" if comma else label
+
+
+def _ends(columns: Reals) -> tuple[Reals, Reals]:
+    """Return low and high of each row; a row of one value has room around it."""
+    if columns.shape[1] == 0:
+        return np.zeros(len(columns)), np.ones(len(columns))
+    low, high = columns.min(axis=1), columns.max(axis=1)
+    flat = high == low
+    room = np.where(np.abs(low) > 0.0, np.abs(low), 1.0) * 1e-6
+    return np.where(flat, low - room, low), np.where(flat, high + room, high)
+
+
+# Tornado.
+
+
+def _tornado(table: Table, plot: Mapping[str, Any]) -> Figure:
+    """How far each thing that varies moves a measure.
+
+    One at a time: from its lowest to its highest result; else Spearman's rank correlation.
+    """
+    measure = plot["of"][0]
+    result = _done(table, measure)
+    alone = _alone(table)
+    figure = Figure(layout="constrained")
+    axis = figure.subplots()
+    bars = []
+    for column in table.store.manifest.varied:
+        values = _done(table, column.name)
+        fine = ~np.isnan(values) & ~np.isnan(result)
+        if not fine.any():
+            continue
+        if alone:
+            bars.append((column.name, float(result[fine].min()), float(result[fine].max())))
+        elif len(np.unique(values[fine])) > 1:
+            bars.append((column.name, 0.0, rank_correlation(values[fine], result[fine])))
+    bars.sort(key=lambda bar: abs(bar[2] - bar[1]))
+    figure.set_size_inches(7.5, 1.4 + 0.4 * max(3, len(bars)))
+    for place, (_, low, high) in enumerate(bars):
+        colour = PALETTE[0] if high >= low else PALETTE[1]
+        axis.barh(place, high - low, left=low, height=0.6, color=colour)
+        text = f"{low:.4g} ... {high:.4g}" if alone else f"{high:.2f}"
+        axis.annotate(
+            text, (max(low, high), place), (4, 0), textcoords="offset points", va="center",
+            fontsize=8,
+        )  # fmt: skip
+    axis.set_yticks(range(len(bars)), [visible(name) for name, _, _ in bars], fontsize=9)
+    nominal = _nominal(table, result)
+    axis.axvline(nominal if alone else 0.0, color="black", lw=1.0)
+    axis.margins(x=0.18)
+    shown = _label(table, measure)
+    axis.set_xlabel(shown if alone else f"rank correlation with {measure}", parse_math=False)
+    return figure
+
+
+def _alone(table: Table) -> bool:
+    """Tell whether things vary one at a time: then no variant has a value of two."""
+    columns = [table.reals(column.name) for column in table.store.manifest.varied]
+    return bool(columns) and int(np.max(np.sum(~np.isnan(np.array(columns)), axis=0))) <= 1
+
+
+def _nominal(table: Table, result: Reals) -> float:
+    """Return the result of the variant in which all is left alone."""
+    columns = [_done(table, column.name) for column in table.store.manifest.varied]
+    left = np.all(np.isnan(np.array(columns)), axis=0) if columns else np.zeros(0, dtype=bool)
+    return float(result[left][0]) if left.any() else float("nan")
+
+
+def rank_correlation(a: Reals, b: Reals) -> float:
+    """Return Spearman's rank correlation of two columns (n,); ties share their mean rank."""
+    from scipy.stats import rankdata
+
+    x, y = rankdata(a), rankdata(b)
+    x, y = x - x.mean(), y - y.mean()
+    spread = float(np.sqrt(np.sum(x * x) * np.sum(y * y)))
+    return float(np.sum(x * y)) / spread if spread else 0.0
+
+
+# Histogram.
+
+
+def _histogram(table: Table, plot: Mapping[str, Any]) -> Figure:
+    """How often which values came, with the median; one panel for each group."""
+    measure = plot["of"][0]
+    pooled = table.pooled(measure)
+    by = plot.get("by") or []
+    groups: Sequence[tuple[str, Any]] = [("", np.ones(len(table.is_done), dtype=bool))]
+    if by:
+        places, names = group_values(table, by[0])
+        groups = [(f"{by[0]}: {name}", places == k) for k, name in enumerate(names)]
+    kept = table.is_done[pooled.rows]
+    ends = np.histogram_bin_edges(pooled.values[kept], bins="auto") if kept.any() else [0.0, 1.0]
+    if len(ends) > 60:
+        ends = np.linspace(ends[0], ends[-1], 61)
+    figure = Figure(figsize=(7.5, 1.0 + 2.2 * len(groups)), layout="constrained")
+    axes = figure.subplots(len(groups), 1, sharex=True, squeeze=False)[:, 0]
+    for axis, (title, chosen) in zip(axes, groups, strict=True):
+        values = pooled.values[kept & chosen[pooled.rows]]
+        axis.hist(values, bins=ends, color=PALETTE[0], edgecolor="white", linewidth=0.4)
+        if len(values):
+            middle = float(np.median(values))
+            axis.axvline(middle, color=PALETTE[1], lw=1.5, label=f"median {middle:.4g}")
+            axis.legend(fontsize=8, frameon=False)
+        axis.set_ylabel("number", fontsize=9)
+        axis.set_title(visible(title), fontsize=9, loc="left", parse_math=False)
+    axes[-1].set_xlabel(_label(table, measure), parse_math=False)
+    return figure

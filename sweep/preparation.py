@@ -1,0 +1,62 @@
+"""Preparation: a study made ready to run - recordings read, rows chosen, its digest."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+from collections.abc import Mapping
+from fractions import Fraction
+
+from engine.starting import programs_of
+from engine.stimulus import resolved
+from language.experiment import Scenario
+from language.printing import digest as program_digest
+from sweep.study import Course, Kind, Study
+from sweep.study_reader import signals_of
+
+FORMAT = 1
+"""Form of the results: those of another one are not continued."""
+
+
+def prepared(study: Study) -> Study:
+    """Return a study that needs its files no longer, with the digest of every Program.
+
+    Raises SpecError: for what is wrong with a recording, or a Program that cannot be made.
+    """
+    identity = dict(study.identity)
+    kinds = []
+    for kind in study.kinds:
+        courses = {}
+        for name, course in kind.courses.items():
+            scenario = _rows(study, resolved(kind.system, course.scenario))
+            courses[name] = Course(scenario, course.document)
+            identity |= _identity(kind, name, scenario)
+        kinds.append(Kind(kind.name, kind.system, courses))
+    return dataclasses.replace(study, kinds=tuple(kinds), identity=identity)
+
+
+def digest_of(identity: Mapping[str, str]) -> str:
+    """Return the SHA-256 of all that results depend on."""
+    return hashlib.sha256(json.dumps([FORMAT, dict(sorted(identity.items()))]).encode()).hexdigest()
+
+
+def _rows(study: Study, scenario: Scenario) -> Scenario:
+    """Return the scenario with the rows that the study asks for; two where it reads no signal."""
+    assert scenario.horizon is not None
+    every = study.every or scenario.every
+    if not signals_of(study.measures):
+        every = scenario.horizon
+    return dataclasses.replace(scenario, every=Fraction(every))
+
+
+def _identity(kind: Kind, name: str, scenario: Scenario) -> dict[str, str]:
+    found = {}
+    for instance, program in programs_of(kind.system, scenario).items():
+        key = f"Program of `{instance}` in variant `{kind.name}`, scenario `{name}`"
+        found[key] = program_digest(program)
+    if any(stimulus.column for stimulus in scenario.inputs.values()):
+        found[f"recording of scenario `{name}`"] = hashlib.sha256(
+            repr(sorted(scenario.inputs.items())).encode()
+        ).hexdigest()
+    return found

@@ -1,0 +1,97 @@
+"""Presentation reader: the sections `summary` and `plots` of a study."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from language.document import Entry, Node, Scalar
+from language.problem import Problems, nearest
+from language.reader import Reader
+from sweep.measure import Measure, columns_of
+from sweep.study import Axis, Kind, Presentation, Varied
+
+PLOTS: dict[str, tuple[str, ...]] = {
+    "heat_map": ("over", "by"),
+    "parallel": (),
+    "tornado": (),
+    "histogram": ("by",),
+}
+"""The pictures and what stands beside each: the axes, and what is told apart."""
+
+
+class PresentationReader(Reader):
+    """How results are shown; `by` may name what has few values."""
+
+    def __init__(
+        self,
+        problems: Problems,
+        kinds: Sequence[Kind],
+        varied: Sequence[Varied],
+        measures: Sequence[Measure],
+    ) -> None:
+        """Read against what varies and what is measured."""
+        super().__init__(problems)
+        self.groups = ["variant", "scenario", *(v.name for v in varied if not v.is_drawn)]
+        self.groups += [v.name for v in varied if getattr(v.course, "shape", "") == "choice"]
+        self.axes = [v.name for v in varied if isinstance(v.course, Axis)]
+        self.varied = [v.name for v in varied]
+        columns = [column for measure in measures for column in columns_of(measure)]
+        self.columns = [column.name for column in columns]
+        self.numbers = [column.name for column in columns if column.type != "list"]
+        self.is_plural = len(kinds) > 1
+
+    def presentation(self, summary: Node | None, plots: Node | None) -> Presentation:
+        """Return what the sections say."""
+        table = self.table(summary, "summary", ("by", "confidence"))
+        by = self._names(table.get("by"), "by", self.groups, True)
+        confidence = 0.95
+        node = table.get("confidence")
+        if node is not None:
+            confidence = float(self.quantity(node, "confidence", node.span, None)[0])
+            if not 0.5 <= confidence < 1.0:
+                label = "`confidence` is a share from 0.5 to below 1, like 0.95"
+                self.problems.error("range", node.span, label)
+        found = {entry.key: self._plot(entry) for entry in self.named(plots, "plots")}
+        return Presentation(tuple(by), confidence, found)
+
+    def _plot(self, entry: Entry) -> dict[str, Any]:
+        told = len(self.problems.found)
+        options = {key for keys in PLOTS.values() for key in keys}
+        table = self.table(entry.node, f"plots.{entry.key}", (*PLOTS, *options))
+        kinds = [key for key in table.entries if key in PLOTS]
+        if len(kinds) != 1:
+            if len(self.problems.found) == told:
+                label = f"`{entry.key}` is one picture"
+                self.problems.error("form", entry.span, label, f"one of {', '.join(PLOTS)}")
+            return {}
+        kind = kinds[0]
+        own = self.table(table, kind, (kind, *PLOTS[kind]))
+        node = own.get(kind)
+        many = kind == "parallel" and not isinstance(node, Scalar)
+        of = self._names(
+            node, kind, self.columns if kind == "histogram" else self.numbers, not many
+        )
+        found: dict[str, Any] = {"kind": kind, "of": of}
+        if kind == "heat_map":
+            found["over"] = self._names(own.get("over"), "over", self.varied)
+            if len(found["over"]) != 2:
+                label = "a heat map is `over: [x, y]`, two things that vary"
+                self.problems.error("form", entry.span, label)
+        if own.get("by"):
+            found["by"] = self._names(own.get("by"), "by", self.groups, True)
+        return found
+
+    def _names(
+        self, node: Node | None, what: str, known: Sequence[str], is_single: bool = False
+    ) -> list[str]:
+        items: list[Scalar] = []
+        if is_single and isinstance(node, Scalar):
+            items = [node]
+        elif node is not None:
+            items = self.items(node, what)
+        for item in items:
+            if item.text not in known:
+                label = f"`{item.text}` is not one of {', '.join(known) or 'nothing'}"
+                self.problems.error("choice", item.span, label, nearest(item.text, known))
+        return [item.text for item in items]

@@ -1,0 +1,150 @@
+"""Processes: an executor of several processes on this machine.
+
+A worker that dies is replaced and its block given to another one; a block that has ended three
+workers is left out, and said to be.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import queue
+import subprocess
+import threading
+from collections import deque
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+
+from sweep.block import Block
+from sweep.executor import Finished
+from sweep.study import Study
+from sweep.worker import receive, send
+
+MOST_DEATHS = 3
+"""Workers that may die of one block."""
+
+
+class WorkerError(Exception):
+    """A defect of our code in a worker: the message is its traceback."""
+
+
+@dataclass(frozen=True)
+class Processes:
+    """`count` processes that are started by `command`, see sweep/worker.py."""
+
+    count: int
+    command: Sequence[str]
+
+    def __call__(self, study: Study, blocks: Iterable[Block]) -> Iterator[Finished]:
+        """Yield each block as it is finished; closing the iterator ends all processes."""
+        pool = _Pool(study, self.command, deque(blocks))
+        try:
+            yield from pool.results(self.count)
+        finally:
+            pool.stop()
+
+
+@dataclass
+class _Pool:
+    """What the threads share that look after one process each."""
+
+    study: Study
+    command: Sequence[str]
+    waiting: deque[Block]
+    answers: queue.Queue[Finished | BaseException | None] = field(default_factory=queue.Queue)
+    running: list[subprocess.Popen[bytes]] = field(default_factory=list)
+    deaths: dict[Block, int] = field(default_factory=dict)
+    lock: threading.Lock = field(default_factory=threading.Lock)
+    is_over: bool = False
+
+    def results(self, count: int) -> Iterator[Finished]:
+        count = max(1, min(count, len(self.waiting)))
+        for _ in range(count):
+            threading.Thread(target=self._look_after, daemon=True).start()
+        ended = 0
+        while ended < count:
+            answer = self.answers.get()
+            if isinstance(answer, BaseException):
+                raise answer
+            if answer is None:
+                ended += 1
+            else:
+                yield answer
+
+    def stop(self) -> None:
+        """End all processes now."""
+        with self.lock:
+            self.is_over = True
+            running = list(self.running)
+        for process in running:
+            process.kill()
+        for process in running:
+            process.wait()
+
+    def _look_after(self) -> None:
+        """Give blocks to one process after another of our own until there are none."""
+        process: subprocess.Popen[bytes] | None = None
+        try:
+            while True:
+                block = self._next()
+                if block is None:
+                    break
+                try:
+                    process = process or self._started()
+                    self._one(process, block)
+                except (EOFError, OSError):
+                    if process is not None:
+                        _end(process)
+                    process = None
+                    self._died(block)
+        except BaseException as error:
+            self.answers.put(error)
+        finally:
+            if process is not None:
+                _end(process)
+            self.answers.put(None)
+
+    def _next(self) -> Block | None:
+        with self.lock:
+            return self.waiting.popleft() if self.waiting and not self.is_over else None
+
+    def _started(self) -> subprocess.Popen[bytes]:
+        with self.lock:
+            if self.is_over:
+                raise EOFError
+            pipe = subprocess.PIPE
+            process = subprocess.Popen(self.command, stdin=pipe, stdout=pipe)
+            self.running.append(process)
+        assert process.stdin
+        send(process.stdin, self.study)
+        return process
+
+    def _one(self, process: subprocess.Popen[bytes], block: Block) -> None:
+        assert process.stdin and process.stdout
+        send(process.stdin, block)
+        answer = receive(process.stdout)
+        if isinstance(answer, str):
+            raise WorkerError(answer)
+        self.answers.put(Finished(block, answer))
+
+    def _died(self, block: Block) -> None:
+        """Give the block to another worker, at most three times."""
+        with self.lock:
+            if self.is_over:
+                return
+            self.deaths[block] = self.deaths.get(block, 0) + 1
+            if self.deaths[block] < MOST_DEATHS:
+                self.waiting.append(block)
+                return
+        reason = f"{MOST_DEATHS} worker processes died while they computed it"
+        self.answers.put(Finished(block, (), reason))
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    """Close the input of a process, which ends it."""
+    with contextlib.suppress(OSError):
+        if process.stdin:
+            process.stdin.close()
+    process.kill()
+    process.wait()
+    if process.stdout:
+        process.stdout.close()

@@ -1,0 +1,169 @@
+"""Study: what varies, in which systems and scenarios, and what is measured of each variant."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Any, Literal
+
+from language.declaration import Formula
+from language.document import Document
+from language.experiment import Scenario, System
+from language.problem import Span
+from sweep.measure import Measure
+
+Method = Literal["random", "latin_hypercube", "sobol"]
+TargetKind = Literal["parameter", "initial", "input", "sensor", "clock"]
+Shape = Literal["uniform", "log_uniform", "normal", "lognormal", "choice"]
+
+
+@dataclass(frozen=True)
+class Target:
+    """A place where a value goes: a parameter of an instance, a start value, a part of an input.
+
+    `path` is (instance, parameter), (instance, state), (input, part ...), (sensor, field) or
+    (instance, period | step | offset).
+    """
+
+    kind: TargetKind
+    path: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Values [SI] that are taken one after the other: an axis of the grid."""
+
+    values: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Distribution:
+    """What is drawn from, in SI; `within` truncates it, `weights` are those of the choices.
+
+    `numbers` are low and high, mean and sd, median and sigma of the logarithm, or the choices.
+    """
+
+    shape: Shape
+    numbers: tuple[float, ...]
+    within: tuple[float, float] | None = None
+    weights: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class Varied:
+    """Something that varies: `targets` is empty for a name that only `set` reads.
+
+    `words` are the values of an enumeration, `unit` is in SI.
+    """
+
+    name: str
+    course: Axis | Distribution
+    targets: tuple[Target, ...]
+    unit: str
+    span: Span
+    words: tuple[str, ...] = ()
+
+    @property
+    def is_drawn(self) -> bool:
+        """Tell whether values are drawn, not taken from a list."""
+        return isinstance(self.course, Distribution)
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A value that follows from what varies and from parameters: an expression in SI."""
+
+    name: str
+    targets: tuple[Target, ...]
+    formula: Formula
+    unit: str
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """How many points are drawn, how, and from which seed; 0 points: nothing is drawn.
+
+    `one_at_a_time`: instead of the product of the axes, each value with all others left alone.
+    """
+
+    method: Method = "random"
+    count: int = 0
+    seed: int = 0
+    one_at_a_time: bool = False
+
+
+@dataclass(frozen=True)
+class Course:
+    """A scenario as one system reads it; `document` is there where parts of inputs vary."""
+
+    scenario: Scenario
+    document: Document | None = None
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One of the variants of a study: a system with the study's scenarios for it."""
+
+    name: str
+    system: System
+    courses: Mapping[str, Course] = field(repr=False)
+
+
+@dataclass(frozen=True)
+class Presentation:
+    """How results are shown: no influence on them. `plots` are options by name."""
+
+    by: tuple[str, ...] = ()
+    confidence: float = 0.95
+    plots: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Study:
+    """A checked study: everything that a worker needs, without its files.
+
+    `recorded` are the signals that measures read, by measure; `identity` says what the results
+    depend on, by part.
+    """
+
+    name: str
+    kinds: tuple[Kind, ...]
+    scenarios: tuple[str, ...]
+    varied: tuple[Varied, ...]
+    settings: tuple[Setting, ...]
+    sampling: Sampling
+    replicates: int
+    measures: tuple[Measure, ...]
+    every: Fraction | None
+    presentation: Presentation
+    identity: Mapping[str, str]
+    span: Span
+
+    @property
+    def axes(self) -> tuple[Varied, ...]:
+        """What takes its values from a list."""
+        return tuple(varied for varied in self.varied if not varied.is_drawn)
+
+    @property
+    def drawn(self) -> tuple[Varied, ...]:
+        """What is drawn."""
+        return tuple(varied for varied in self.varied if varied.is_drawn)
+
+    @property
+    def grid_count(self) -> int:
+        """The number of points of the grid, 1 where there are no axes."""
+        sizes = [len(v.course.values) for v in self.axes if isinstance(v.course, Axis)]
+        if self.sampling.one_at_a_time:
+            return 1 + sum(sizes)
+        total = 1
+        for size in sizes:
+            total *= size
+        return total
+
+    @property
+    def count(self) -> int:
+        """The number of variants."""
+        samples = max(1, self.sampling.count)
+        shared = self.grid_count * samples * self.replicates
+        return len(self.kinds) * len(self.scenarios) * shared

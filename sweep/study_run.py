@@ -1,0 +1,65 @@
+"""Study run: the blocks of a study that are not there yet, computed and kept one by one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from sweep.block import Block
+from sweep.executor import Executor
+from sweep.store import Store, locked, manifest_of, open_store
+from sweep.study import Study
+
+Progress = Callable[[int, int, int], None]
+"""Told how many variants are done, how many of these were there before, and how many in all."""
+
+
+@dataclass(frozen=True)
+class StudyRun:
+    """The store after a run; `lost` are blocks that could not be computed, with the reason."""
+
+    store: Store
+    before: int
+    computed: int
+    lost: tuple[tuple[Block, str], ...] = ()
+
+
+def run_study(
+    study: Study,
+    folder: Path,
+    executor: Executor,
+    block: int | None = None,
+    progress: Progress | None = None,
+) -> StudyRun:
+    """Run a prepared study into a folder, or go on where another run of it ended.
+
+    Raises SpecError where the folder is of another study, OSError where it cannot be written.
+    """
+    with locked(folder):
+        store = open_store(folder, manifest_of(study, block))
+        total = study.count
+        there = store.finished()
+        missing = [each for each in store.manifest.blocks if each.start not in there]
+        before = total - sum(each.stop - each.start for each in missing)
+        done, lost = before, []
+        tell = progress or _silent
+        tell(done, before, total)
+        finished = executor(study, missing)
+        try:
+            for part in finished:
+                if part.lost:
+                    lost.append((part.block, part.lost))
+                    continue
+                store.write(part.block, part.rows)
+                done += len(part.rows)
+                tell(done, before, total)
+        finally:
+            close = getattr(finished, "close", None)
+            if close:
+                close()
+        return StudyRun(store, before, done - before, tuple(lost))
+
+
+def _silent(done: int, before: int, total: int) -> None:
+    """Tell nobody."""

@@ -1,0 +1,84 @@
+"""Table: columns of a store, read one at a time: a million variants fit into little memory."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sweep.block import DONE
+from sweep.store import Store, arrow_module
+
+Reals = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Pooled:
+    """Numbers of a column: one of each variant, or several from a list; `rows` says of which."""
+
+    values: Reals
+    rows: NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Table:
+    """The finished variants of a store, in the order of their numbers."""
+
+    store: Store
+
+    def reals(self, name: str) -> Reals:
+        """Return a column (n_variants,) as reals; NaN where a variant has no such number."""
+        parts = [
+            np.asarray(part.cast("float64").to_numpy(zero_copy_only=False), dtype=np.float64)
+            for part in self._parts(name)
+        ]
+        return np.concatenate(parts) if parts else np.zeros(0)
+
+    def pooled(self, name: str) -> Pooled:
+        """Return the numbers of a column of reals, whole numbers or lists; none are left out."""
+        if next((c.type for c in self.store.manifest.measures if c.name == name), "") != "list":
+            values = self.reals(name)
+            rows = np.flatnonzero(~np.isnan(values))
+            return Pooled(values[rows], rows)
+        found, places, first = [], [], 0
+        for part in self._parts(name):
+            found.append(np.asarray(part.flatten().to_numpy(), dtype=np.float64))
+            sizes = part.value_lengths().fill_null(0).to_numpy(zero_copy_only=False)
+            places.append(np.repeat(np.arange(first, first + len(part)), sizes))
+            first += len(part)
+        if not found:
+            return Pooled(np.zeros(0), np.zeros(0, dtype=np.int64))
+        return Pooled(np.concatenate(found), np.concatenate(places))
+
+    def words(self, name: str) -> tuple[NDArray[np.int64], list[str]]:
+        """Return a column of texts as places (n_variants,) in a list of the different ones."""
+        known: dict[str, int] = {}
+        parts = []
+        for part in self._parts(name):
+            coded = part.dictionary_encode()
+            own = [known.setdefault(text, len(known)) for text in coded.dictionary.to_pylist()]
+            places = np.asarray(own, dtype=np.int64)
+            parts.append(places[coded.indices.to_numpy(zero_copy_only=False)])
+        return (np.concatenate(parts) if parts else np.zeros(0, dtype=np.int64)), list(known)
+
+    @cached_property
+    def counts(self) -> dict[str, int]:
+        """How many variants ended how."""
+        places, names = self.words("status")
+        return {name: int(np.sum(places == k)) for k, name in enumerate(names)}
+
+    @cached_property
+    def is_done(self) -> NDArray[np.bool_]:
+        """Tell of which variants (n_variants,) the measures count."""
+        places, names = self.words("status")
+        return places == names.index(DONE) if DONE in names else np.zeros(len(places), dtype=bool)
+
+    def _parts(self, name: str) -> list[Any]:
+        parquet = arrow_module().parquet
+        paths = self.store.paths()
+        return [
+            parquet.read_table(path, columns=[name]).column(0).combine_chunks() for path in paths
+        ]

@@ -1,0 +1,98 @@
+"""Waveform: one number of a sampled signal over a window - peak, RMS, settling, frequency.
+
+Sums are exactly rounded (math.fsum): the same bits on every machine.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sweep.measure import SignalMeasure
+
+Reals = NDArray[np.float64]
+FEWEST = 8
+"""Rows of the shortest spectrum."""
+ROUNDING = 1.0e-12
+"""A signal that is as near to a line as this share of its peak is one: thousands of roundings."""
+
+
+def signal_number(measure: SignalMeasure, times: Reals, values: Reals) -> float | None:
+    """Return the number of a signal [its unit] (n,) over times [s] (n,); None if there is none."""
+    if not len(values) or not np.all(np.isfinite(values)):
+        return None
+    match measure.kind:
+        case "peak":
+            return float(np.max(np.abs(values)))
+        case "max":
+            return float(np.max(values))
+        case "min":
+            return float(np.min(values))
+        case "final":
+            return float(values[-1])
+        case "mean":
+            return math.fsum(values) / len(values)
+        case "rms":
+            return math.sqrt(math.fsum(values * values) / len(values))
+        case "settling":
+            return settling(times, values, measure.within)
+        case "frequency":
+            find = by_spectrum if measure.by == "spectrum" else by_crossings
+            return find(times, values)
+
+
+def settling(times: Reals, values: Reals, within: float) -> float:
+    """Return the time [s] from the start until the signal stays in a band around its last value."""
+    outside = np.flatnonzero(np.abs(values - values[-1]) > within)
+    first = int(outside[-1]) + 1 if len(outside) else 0
+    return float(times[first] - times[0])
+
+
+def by_crossings(times: Reals, values: Reals) -> float | None:
+    """Return the frequency [1/s] from upward crossings of the straight line through the signal."""
+    level = _without_line(times, values)
+    if not len(level):
+        return None
+    ups = np.flatnonzero((level[:-1] < 0.0) & (level[1:] >= 0.0))
+    if len(ups) < 2:
+        return None
+    share = level[ups] / (level[ups] - level[ups + 1])
+    instants = times[ups] + share * (times[ups + 1] - times[ups])
+    return float((len(ups) - 1) / (instants[-1] - instants[0]))
+
+
+def by_spectrum(times: Reals, values: Reals) -> float | None:
+    """Return the dominant frequency [1/s]: the peak of the spectrum under a Hann window.
+
+    Between bins by the parabola through the logarithms (Smith and Serra, PARSHL, 1987).
+    """
+    count = len(values)
+    level = _without_line(times, values)
+    if len(level) < FEWEST:
+        return None
+    power = np.abs(np.fft.rfft(level * np.hanning(count))) ** 2
+    top = int(np.argmax(power[1:-1])) + 1
+    if power[top] == 0.0:
+        return None
+    left, middle, right = np.log(np.maximum(power[top - 1 : top + 2], 1e-300))
+    bend = left - 2.0 * middle + right
+    shift = 0.5 * (left - right) / bend if bend < 0.0 else 0.0
+    step = float(times[-1] - times[0]) / (count - 1)
+    return float((top + shift) / (count * step))
+
+
+def _without_line(times: Reals, values: Reals) -> Reals:
+    """Return a signal (n,) without the line that fits it best (least squares).
+
+    Empty where nothing but rounding is left.
+    """
+    count = len(values)
+    middle, mean = math.fsum(times) / count, math.fsum(values) / count
+    away = times - middle
+    spread = math.fsum(away * away)
+    slope = math.fsum(away * values) / spread if spread else 0.0
+    level = np.asarray(values - (mean + slope * away))
+    is_flat = np.max(np.abs(level)) <= ROUNDING * np.max(np.abs(values))
+    return level[:0] if is_flat else level

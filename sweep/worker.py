@@ -1,0 +1,69 @@
+"""Worker: a process that computes blocks, told by messages through its standard streams.
+
+A message is its length (8 bytes, big-endian) and a pickle: first the study, then blocks; each block
+is answered. Where who started it is gone, it ends at once, also inside a block.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import queue
+import signal
+import struct
+import sys
+import threading
+import traceback
+from typing import IO, Any
+
+from engine.batch import Runner
+from sweep.block import Block, block_rows
+
+LENGTH = struct.Struct(">Q")
+
+
+def send(stream: IO[bytes], message: object) -> None:
+    """Write a message. Raises OSError where nobody reads it."""
+    data = pickle.dumps(message, protocol=pickle.HIGHEST_PROTOCOL)
+    stream.write(LENGTH.pack(len(data)) + data)
+    stream.flush()
+
+
+def receive(stream: IO[bytes]) -> Any:
+    """Read a message. Raises EOFError where there is no other one."""
+    head = stream.read(LENGTH.size)
+    if len(head) < LENGTH.size:
+        raise EOFError
+    (length,) = LENGTH.unpack(head)
+    data = stream.read(length)
+    if len(data) < length:
+        raise EOFError
+    return pickle.loads(data)
+
+
+def serve(run: Runner) -> None:
+    """Answer blocks until the input ends. What is printed meanwhile goes to stderr."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # who started us tells us when to end
+    source = os.fdopen(os.dup(0), "rb")
+    target = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
+    messages: queue.Queue[Any] = queue.Queue()
+    threading.Thread(target=_listen, args=(source, messages), daemon=True).start()
+    study = messages.get()
+    while True:
+        block: Block = messages.get()
+        try:
+            answer: object = block_rows(study, block, run)
+        except Exception:
+            answer = traceback.format_exc()
+        send(target, answer)
+
+
+def _listen(source: IO[bytes], messages: queue.Queue[Any]) -> None:
+    """Put messages into the queue; where they end, end the process."""
+    while True:
+        try:
+            messages.put(receive(source))
+        except (EOFError, OSError):
+            sys.stderr.flush()
+            os._exit(0)

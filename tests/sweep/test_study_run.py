@@ -1,0 +1,213 @@
+"""A study loses nothing and doubles nothing, whatever ends it and whoever computes it."""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import signal
+import sys
+import time
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from engine.batch import Batch, BatchResult
+from engine.variants import run_variants
+from language.problem import SpecError
+from sweep.block import Block
+from sweep.executor import Finished, InProcess
+from sweep.processes import MOST_DEATHS, Processes
+from sweep.store import MANIFEST, Store, locked, manifest_of, open_store, read_store
+from sweep.study import Study
+from sweep.study_run import run_study
+from tests.sweep.laying import QUICK, Backwards, content, quick, study
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals and fork of POSIX")
+
+
+def bytes_of(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in sorted((folder / "blocks").iterdir())}
+
+
+def test_results_do_not_depend_on_block_size_or_order(tmp_path: Path) -> None:
+    made = study()
+    whole = run_study(made, tmp_path / "whole", QUICK)
+    assert (whole.before, whole.computed) == (0, 60)
+    rows = content(whole.store)
+    assert [row["number"] for row in rows] == list(range(60))
+    for name, size in (("sevens", 7), ("one", 60)):
+        parts = run_study(made, tmp_path / name, Backwards(), block=size)
+        assert content(parts.store) == rows
+    backwards = run_study(made, tmp_path / "backwards", Backwards())
+    assert bytes_of(backwards.store.folder) == bytes_of(whole.store.folder)
+
+
+def test_a_finished_study_is_not_computed_again(tmp_path: Path) -> None:
+    made = study()
+    run_study(made, tmp_path, QUICK)
+    before = bytes_of(tmp_path)
+    again = run_study(made, tmp_path, InProcess(lambda batch: pytest.fail("computed again")))
+    assert (again.before, again.computed) == (60, 0)
+    assert bytes_of(tmp_path) == before
+
+
+def test_another_state_of_the_study_is_refused_and_what_changed_is_named(tmp_path: Path) -> None:
+    run_study(study(), tmp_path, QUICK)
+    with pytest.raises(SpecError, match="study changed"):
+        run_study(study("grid", ("seed: 3", "seed: 4")), tmp_path, QUICK)
+    shown = study("grid", ("{histogram: t_1, by: d}", "{histogram: peak}"))
+    assert run_study(shown, tmp_path, QUICK).computed == 0
+    assert read_store(tmp_path).manifest.presentation.plots["spread"]["of"] == ["peak"]
+
+
+def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "thesis.tex").write_text("x")
+    with pytest.raises(SpecError, match="something else"):
+        run_study(study(), tmp_path, QUICK)
+    assert {path.name for path in tmp_path.iterdir()} <= {"thesis.tex", ".lock"}
+    with pytest.raises(SpecError, match="no results"):
+        read_store(tmp_path)
+
+
+def test_a_damaged_block_is_computed_again(tmp_path: Path) -> None:
+    made = study()
+    run_study(made, tmp_path, QUICK, block=10)
+    before = bytes_of(tmp_path)
+    names = list(before)
+    (tmp_path / "blocks" / names[1]).write_bytes(before[names[1]][:-20])
+    (tmp_path / "blocks" / names[3]).write_bytes(b"")
+    (tmp_path / "blocks" / names[4]).rename(tmp_path / "blocks" / names[2])
+    again = run_study(made, tmp_path, QUICK)
+    assert again.computed == 40
+    assert bytes_of(tmp_path) == before
+
+
+def test_two_processes_do_not_write_into_one_folder(tmp_path: Path) -> None:
+    made = study()
+    with locked(tmp_path), pytest.raises(SpecError, match="another process"):
+        run_study(made, tmp_path, QUICK)
+
+
+def slow(batch: Batch) -> BatchResult:
+    time.sleep(0.004)
+    return quick(batch)
+
+
+def test_killed_at_random_instants_and_gone_on_with_it_equals_the_undisturbed(
+    tmp_path: Path,
+) -> None:
+    """kill -9 of what computes and writes; 20 times through the command line: tests/verify."""
+    made = study()
+    run_study(made, tmp_path / "undisturbed", QUICK, block=2)
+    random = np.random.default_rng(4)
+    done = [0]
+    for _ in range(3):
+        child = os.fork()
+        if child == 0:
+            run_study(made, tmp_path / "killed", InProcess(slow), block=2)
+            os._exit(0)
+        time.sleep(float(random.uniform(0.02, 0.09)))
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+        made_now = (tmp_path / "killed" / MANIFEST).exists()
+        done.append(len(read_store(tmp_path / "killed").paths()) if made_now else 0)
+    assert done == sorted(done)
+    assert 0 < done[-1] < 30, done
+    last = run_study(made, tmp_path / "killed", QUICK)
+    assert last.before == 2 * done[-1]
+    assert bytes_of(tmp_path / "killed") == bytes_of(tmp_path / "undisturbed")
+
+
+def test_a_full_disk_ends_the_run_and_what_is_finished_is_kept(tmp_path: Path) -> None:
+    """Files may have no more bytes: the write itself fails in the middle, as on a full disk."""
+    made = study()
+    run_study(made, tmp_path / "undisturbed", QUICK, block=10)
+    store = open_store(tmp_path / "full", manifest_of(made, 10))
+    size = min(len(data) for data in bytes_of(tmp_path / "undisturbed").values())
+
+    def filling(study: Study, blocks: Iterable[Block]) -> Iterator[Finished]:
+        for number, finished in enumerate(QUICK(study, blocks)):
+            if number == 3:
+                resource.setrlimit(resource.RLIMIT_FSIZE, (size // 2, limits[1]))
+            yield finished
+
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    old = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    try:
+        with pytest.raises(OSError):
+            run_study(made, tmp_path / "full", filling)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+        signal.signal(signal.SIGXFSZ, old)
+    assert len(store.paths()) == 3
+    assert [path.name for path in store.folder.rglob("*.part")] == []
+    assert run_study(made, tmp_path / "full", QUICK).before == 30
+    assert bytes_of(tmp_path / "full") == bytes_of(tmp_path / "undisturbed")
+
+
+WORKER = """
+import os, sys
+import modewright
+from tests.sweep.laying import quick
+from sweep.worker import serve
+
+def run(batch):
+    mark = sys.argv[1]
+    if len(sys.argv) > 2 and batch.count == 12:
+        os.kill(os.getpid(), 9)
+    if not os.path.exists(mark):
+        open(mark, "w").close()
+        os.kill(os.getpid(), 9)
+    return quick(batch)
+
+serve(run)
+"""
+
+
+def test_a_dead_worker_is_replaced_and_its_block_computed_by_another(tmp_path: Path) -> None:
+    made = study()
+    command = [sys.executable, "-c", WORKER, str(tmp_path / "mark")]
+    run_study(made, tmp_path / "undisturbed", QUICK, block=15)
+    found = run_study(made, tmp_path / "workers", Processes(2, command), block=15)
+    assert found.lost == ()
+    assert (tmp_path / "mark").exists()
+    assert bytes_of(tmp_path / "workers") == bytes_of(tmp_path / "undisturbed")
+
+
+def test_a_block_that_ends_every_worker_is_left_out_and_told(tmp_path: Path) -> None:
+    made = study()
+    (tmp_path / "mark").touch()
+    command = [sys.executable, "-c", WORKER, str(tmp_path / "mark"), "deadly"]
+    found = run_study(made, tmp_path / "workers", Processes(1, command), block=16)
+    assert [block.start for block, _ in found.lost] == [48]
+    assert f"{MOST_DEATHS} worker processes" in found.lost[0][1]
+    assert found.computed == 48
+
+
+def test_real_workers_give_the_bits_of_this_process(tmp_path: Path) -> None:
+    from modewright.studies import WORKER as COMMAND
+
+    made = study("alone")
+    alone = run_study(made, tmp_path / "alone", InProcess(run_variants), block=2)
+    run_study(made, tmp_path / "two", Processes(2, COMMAND), block=2)
+    assert bytes_of(tmp_path / "two") == bytes_of(tmp_path / "alone")
+    rows = content(alone.store)
+    assert [row["status"] for row in rows] == ["done"] * 5
+    assert len({json.dumps(row["final"]) for row in rows}) == 5
+
+
+def test_what_cannot_be_simulated_is_a_value_of_its_row(tmp_path: Path) -> None:
+    found = run_study(study("failing_ways"), tmp_path, InProcess(run_variants))
+    rows = content(Store(tmp_path, found.store.manifest))
+    told = {row["k_now"]: (row["status"], row["message"]) for row in rows}
+    assert told[0.0] == ("done", "")
+    assert told[1.0][0] == "stopped" and "fire for ever" in str(told[1.0][1])
+    assert told[2.0][0] == "stopped" and "events in one step" in str(told[2.0][1])
+    assert told[3.0][0] == "stopped" and "state `x` is" in str(told[3.0][1])
+    assert told[9.0] == ("refused", "`plant.k` = 9 is outside its range [0, 5]")
+    faulty = {row["k_now"]: row for row in rows}[4.0]
+    assert (faulty["status"], faulty["message"]) == ("fault", "a fault bit is set")
+    assert all(row["final"] is None for row in rows if row["status"] in ("stopped", "refused"))
