@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from engine import actions, shapes
 from engine.actions import Action
@@ -39,6 +39,13 @@ AT_ONCE = 4
 """Most assignments in one function (engine/actions.py)."""
 UNROLLED = 8
 """Loops of at most so many turns have a copy of their body for each: indices become constants."""
+
+
+class _Inner(NamedTuple):
+    """An operation inside another: both operators, and its slots."""
+
+    shape: tuple[str, str]
+    slots: tuple[int, int]
 
 
 class Compiler:
@@ -176,33 +183,31 @@ class Compiler:
                 raise TypeError(f"not an expression: {expr!r}")
 
     def _pair(self, operator: str, left: Expr, right: Expr) -> Read:
+        """Return the function of two operands; an inner operation of two slots is part of it."""
         a, b = self._slot(left), self._slot(right)
         if a is not None and b is not None:
             return shapes.SLOTS[operator](a, b)
-        if a is not None:
-            three = self._inner(shapes.RIGHT, operator, right)
-            return (
-                three[0](a, *three[1])
-                if three
-                else shapes.SLOT_READ[operator](a, self._read(right))
-            )
         if b is not None:
-            three = self._inner(shapes.LEFT, operator, left)
-            return (
-                three[0](*three[1], b) if three else shapes.READ_SLOT[operator](self._read(left), b)
-            )
+            if inner := self._slots(operator, left):
+                return shapes.LEFT[inner.shape](*inner.slots, b)
+            return shapes.READ_SLOT[operator](self._read(left), b)
+        inner = self._slots(operator, right)
+        if a is not None:
+            if inner:
+                return shapes.RIGHT[inner.shape](a, *inner.slots)
+            return shapes.SLOT_READ[operator](a, self._read(right))
+        if inner:
+            return shapes.READ_PAIR[inner.shape](self._read(left), *inner.slots)
         return shapes.READS[operator](self._read(left), self._read(right))
 
-    def _inner(
-        self, table: Mapping[tuple[str, str], shapes.Triple], outer: str, inner: Expr
-    ) -> tuple[shapes.Triple, tuple[int, int]] | None:
-        """Return the shape of two operations on three slots, and two of them, if it is that."""
-        if not isinstance(inner, Binary) or (outer, inner.operator) not in table:
+    def _slots(self, outer: str, expr: Expr) -> _Inner | None:
+        """Return the operation of two slots that an operand is, if there is a shape for it."""
+        if not isinstance(expr, Binary) or (outer, expr.operator) not in shapes.LEFT:
             return None
-        a, b = self._slot(inner.left), self._slot(inner.right)
+        a, b = self._slot(expr.left), self._slot(expr.right)
         if a is None or b is None:
             return None
-        return table[outer, inner.operator], (a, b)
+        return _Inner((outer, expr.operator), (a, b))
 
     def _fold(self, expr: Expr) -> Any:
         match expr:

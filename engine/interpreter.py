@@ -58,8 +58,11 @@ class Interpreter:
     def set(self, name: str, value: float | int | bool) -> None:
         """Set a variable; a real is rounded to the number type, once."""
         if name in self._real:
-            with self._arithmetic.quiet():
-                value = self._arithmetic.real(value)
+            if self._is_plain:
+                value = float(value)
+            else:
+                with self._arithmetic.quiet():
+                    value = self._arithmetic.real(value)
         self._frame[self._slots[name]] = value
 
     def left(self) -> tuple[str, ...]:

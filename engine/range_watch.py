@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from fractions import Fraction
+from operator import le
 
 from engine.interpreter import Stepper
 from engine.trajectory import Event
@@ -32,14 +33,14 @@ class RangeWatch:
         states = [v.name for v in program.variables if v.name.startswith("state.")]
         limits = {**dict.fromkeys(states, FINITE), **self._bounds}
         self._read_all = stepper.reader(tuple(limits))
-        self._limits = tuple(limits.values())
+        self._lows = tuple(low for low, _ in limits.values())
+        self._highs = tuple(high for _, high in limits.values())
 
     def is_inside(self) -> bool:
         """Tell whether all states are finite, and nothing is or was outside its range."""
-        for value, (low, high) in zip(self._read_all(), self._limits, strict=True):
-            if not low <= value <= high:
-                return False
-        return not self._outside
+        values = self._read_all()
+        is_inside = all(map(le, self._lows, values)) and all(map(le, values, self._highs))
+        return is_inside and not self._outside
 
     def look(self, time: Fraction) -> None:
         """Report what has left its range since the last look."""

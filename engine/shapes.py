@@ -14,7 +14,7 @@ from language.evaluate import divide
 Frame = list[Any]
 Read = Callable[[Frame], Any]
 Pair = Callable[[Any, Any], Read]
-Triple = Callable[[int, int, int], Read]
+Triple = Callable[[Any, int, int], Read]
 
 SLOTS: Mapping[str, Pair] = {
     "+": lambda a, b: lambda v: v[a] + v[b],
@@ -100,6 +100,18 @@ RIGHT: Mapping[tuple[str, str], Triple] = {
     ("*", "*"): lambda a, b, c: lambda v: v[a] * (v[b] * v[c]),
 }
 """a outer (b inner c), by outer and inner."""
+READ_PAIR: Mapping[tuple[str, str], Triple] = {
+    ("+", "+"): lambda a, b, c: lambda v: a(v) + (v[b] + v[c]),
+    ("+", "-"): lambda a, b, c: lambda v: a(v) + (v[b] - v[c]),
+    ("+", "*"): lambda a, b, c: lambda v: a(v) + v[b] * v[c],
+    ("-", "+"): lambda a, b, c: lambda v: a(v) - (v[b] + v[c]),
+    ("-", "-"): lambda a, b, c: lambda v: a(v) - (v[b] - v[c]),
+    ("-", "*"): lambda a, b, c: lambda v: a(v) - v[b] * v[c],
+    ("*", "+"): lambda a, b, c: lambda v: a(v) * (v[b] + v[c]),
+    ("*", "-"): lambda a, b, c: lambda v: a(v) * (v[b] - v[c]),
+    ("*", "*"): lambda a, b, c: lambda v: a(v) * (v[b] * v[c]),
+}
+"""As RIGHT, of an expression and two slots."""
 
 
 def of_slot(slot: int) -> Read:

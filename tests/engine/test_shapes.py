@@ -71,9 +71,10 @@ def test_a_quotient_by_a_zero_is_no_exception_in_any_shape(zero: float) -> None:
 
 
 @pytest.mark.parametrize(("outer", "inner"), list(shapes.LEFT))
-def test_two_operations_on_three_places_keep_their_order(outer: Any, inner: Any) -> None:
+def test_operations_on_three_or_four_places_keep_their_order(outer: Any, inner: Any) -> None:
     for a, b, c in itertools.permutations((A, B, C)):
-        for expr in (pair(outer, pair(inner, a, b), c), pair(outer, a, pair(inner, b, c))):
+        left, right = pair(inner, a, b), pair(inner, b, c)
+        for expr in (pair(outer, left, c), pair(outer, a, right), pair(outer, left, right)):
             ours, expected = calculated(expr)
             assert ours == expected
 
