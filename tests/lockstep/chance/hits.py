@@ -24,6 +24,8 @@ BROKEN, LAST = "4 broken before it elapses", "4 elapses on its last tick"
 RULES = (
     "1 located inside a step, discrete frozen",
     "2 advance, then jump in one tick",
+    "2 rewind",
+    "2 rewind beyond what is kept",
     "3 priority against the order of the file",
     BROKEN,
     LAST,
@@ -61,6 +63,7 @@ class Hits:
         self.tree: Mapping[str, Any] = yaml.safe_load(spec.text)
         self.ticks = 0
         self._waits = [info for info in program.transitions if info.timer and info.ticks]
+        self._back = {info.number for info in program.transitions if info.rewind}
         self._timers: dict[str, int] = {}
         self._mode = -1
         self._elapsed: list[str] = []
@@ -162,6 +165,9 @@ class Hits:
         self.rules["17 observer"] += "observer" in source
         carries = self.ticks > 0 and ("runs" in source or "observer" in source)
         self.rules["2 advance, then jump in one tick"] += carries and fired[0] > 0
+        if fired[0] in self._back:
+            beyond = not stepper.get("work.back")
+            self.rules["2 rewind beyond what is kept" if beyond else "2 rewind"] += 1
         self.rules["14 two regions at once"] += sum(map(bool, fired)) > 1
         self.rules["16 guards on the first inputs"] += self.ticks == 0 and any(fired)
         again = self._fired_before and fired[0] > 0

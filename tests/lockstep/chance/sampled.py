@@ -6,6 +6,7 @@ import re
 from dataclasses import dataclass, field
 from random import Random
 
+from tests.lockstep.chance.back import with_rewinds
 from tests.lockstep.chance.models import CARRIED, Carried, advance, method_of
 from tests.lockstep.chance.spec import Aim, Spec
 from tests.lockstep.chance.words import Scope, real, truth, whole
@@ -84,6 +85,7 @@ class _Sampled:
         if self.flavour == "regions":
             found += self._regions()
         found.append(f"outputs: [{', '.join(self._outputs())}]")
+        found = with_rewinds(self.draw, found, self.model)
         return [re.sub(r"<(\w*)\.(\w+)>", self._memory, line) for line in found]
 
     def _memory(self, wish: re.Match[str]) -> str:
@@ -215,6 +217,7 @@ class _Sampled:
             if wait and "wait: 0 ms" not in wait:
                 self.waiting.add((region, mode))
             wait += f"<{region}.{target}>" if draw.random() < 0.2 else ""
+            wait += "" if region else f"<back {mode} {target}>"
             names = draw.choice(((), ("x",), ("x", "z"), ("x", "z", "k")))
             reset = ", ".join(f"{n}: {v}" for n, v in self._reset(names, region).items())
             found.append(
