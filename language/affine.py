@@ -46,6 +46,19 @@ def jacobian(
 
     Entry i j in unit_i/(unit_j s). What is not linear, or has no constant coefficient, is left out.
     """
+    return matrix_of(affine_parts(rates, states, constants), states)
+
+
+def matrix_of(parts: Mapping[str, Affine], states: tuple[str, ...]) -> Matrix:
+    """Return A (n, n) of rates whose affine parts are known."""
+    rows = [parts[f"work.rate_{name}"].slopes for name in states]
+    return tuple(tuple(row.get(column, 0.0) for column in states) for row in rows)
+
+
+def affine_parts(
+    rates: Block, states: tuple[str, ...], constants: Mapping[str, Scalar | tuple[float, ...]]
+) -> dict[str, Affine]:
+    """Return what each name of a block of rates is in the states `work.at_<state>`."""
     known: dict[str, Affine] = {}
     for name, value in constants.items():
         known[name] = OTHER if isinstance(value, tuple) else Affine({}, float(value))
@@ -55,16 +68,16 @@ def jacobian(
             known.update({target: OTHER for target in _targets(op)})
             continue
         assert isinstance(op, Assign)
-        known[op.target] = _affine(op.value, known)
-    rows = [known[f"work.rate_{name}"].slopes for name in states]
-    return tuple(tuple(row.get(column, 0.0) for column in states) for row in rows)
+        known[op.target] = affine(op.value, known)
+    return known
 
 
 def _targets(choice: Choose) -> list[str]:
     return [op.target for _, block in choice.cases for op in block if isinstance(op, Assign)]
 
 
-def _affine(expr: Expr, known: Mapping[str, Affine]) -> Affine:
+def affine(expr: Expr, known: Mapping[str, Affine]) -> Affine:
+    """Return what an expression is in the states; `OTHER` where it is not linear in them."""
     match expr:
         case Value(bool()):
             return OTHER
@@ -73,17 +86,17 @@ def _affine(expr: Expr, known: Mapping[str, Affine]) -> Affine:
         case Ref(name):
             return known.get(name, OTHER)
         case Unary("-", operand):
-            return _scaled(_affine(operand, known), -1.0)
+            return _scaled(affine(operand, known), -1.0)
         case Binary("+", left, right):
-            return _sum(_affine(left, known), _affine(right, known))
+            return _sum(affine(left, known), affine(right, known))
         case Binary("-", left, right):
-            return _sum(_affine(left, known), _scaled(_affine(right, known), -1.0))
+            return _sum(affine(left, known), _scaled(affine(right, known), -1.0))
         case Binary("*", left, right):
-            return _product(_affine(left, known), _affine(right, known))
+            return _product(affine(left, known), affine(right, known))
         case Binary("/", left, right):
-            return _quotient(_affine(left, known), _affine(right, known))
+            return _quotient(affine(left, known), affine(right, known))
         case Call(function, arguments):
-            parts = [_affine(argument, known) for argument in arguments]
+            parts = [affine(argument, known) for argument in arguments]
             if all(part.is_constant for part in parts):
                 values: list[Scalar] = [part.constant or 0.0 for part in parts]
                 return Affine({}, float(apply(function, values)))

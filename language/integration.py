@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from fractions import Fraction
 from itertools import product
 
+from language.affine import affine_parts
 from language.constants import derive_block
 from language.declaration import Formula
 from language.euler import euler
@@ -60,7 +61,8 @@ def method_of(
     solved = Solved(point, corners, h, rates, depends_on, number)
     limits = []
     for mode in field.automaton.modes:
-        limit = limit_of(field, mode, solved.matrix(field, mode), name, point)
+        parts = affine_parts(rates[mode], field.states, point.values)
+        limit = limit_of(field, mode, parts, name)
         if limit:
             check_step(limit, name, step, span, problems)
             value = limit.eigenvalue

@@ -10,10 +10,9 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from language.affine import Affine, matrix_of
 from language.eigen import eigenvalues, governing_entry
 from language.field import Field
-from language.linear import Point
-from language.matrix import Matrix
 from language.problem import Problems, Span
 from language.terms import strongest
 
@@ -45,8 +44,9 @@ class Limit:
     state: str
 
 
-def limit_of(field: Field, mode: str, a: Matrix, method: str, point: Point) -> Limit | None:
-    """Return the limit of a mode whose linear part is A (n, n) [1/s]; None where there is none."""
+def limit_of(field: Field, mode: str, parts: Mapping[str, Affine], method: str) -> Limit | None:
+    """Return the limit of a mode whose rates have these affine parts; None where there is none."""
+    a = matrix_of(parts, field.states)
     if method not in GROWTH or not a or not all(math.isfinite(x) for row in a for x in row):
         return None
     damped = [value for value in eigenvalues(a) if value.real < -UNDAMPED * abs(value)]
@@ -54,9 +54,9 @@ def limit_of(field: Field, mode: str, a: Matrix, method: str, point: Point) -> L
         return None
     fastest = min(damped, key=lambda value: largest_step(method, value))
     row, column = (field.states[k] for k in governing_entry(a, fastest))
-    term = strongest(field.automaton.modes[mode], row, column, point)
+    term = strongest(field, field.automaton.modes[mode], row, column, parts)
     step = largest_step(method, fastest)
-    return Limit(mode, step, fastest, term.text if term else "", row)
+    return Limit(mode, step, fastest, term, row)
 
 
 def largest_step(method: str, eigenvalue: complex) -> float:

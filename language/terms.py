@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import suppress
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
+from language.affine import Affine, affine
 from language.derivative import derivative
+from language.field import Field, all_known_at
 from language.linear import Point, inlined, is_too_large
+from language.lower import expression
 from language.model import Automaton, Mode
 from language.problem import SpecError
 from language.simplify import replaced
@@ -21,36 +23,38 @@ class Term:
     written: Tree
     full: Tree
 
-    @property
-    def text(self) -> str:
-        """The text of the summand in its file, with the brackets that its ends lack."""
-        span = self.written.span
-        line = span.source.lines[span.line - 1]
-        start, end = span.column - 1, span.column - 1 + span.width
-        while end < len(line) and line[start:end].count("(") > line[start:end].count(")"):
-            end += 1
-        while start > 0 and line[start:end].count("(") < line[start:end].count(")"):
-            start -= 1
-        return line[start:end]
+
+def written(tree: Tree) -> str:
+    """Return the text of an expression in its file, with the brackets that its ends lack."""
+    span = tree.span
+    line = span.source.lines[span.line - 1]
+    start, end = span.column - 1, span.column - 1 + span.width
+    while end < len(line) and line[start:end].count("(") > line[start:end].count(")"):
+        end += 1
+    while start > 0 and line[start:end].count("(") < line[start:end].count(")"):
+        start -= 1
+    return line[start:end]
 
 
 def terms_of(mode: Mode, state: str) -> list[Term]:
-    """Return the summands of a state's balance; an equation is taken apart where it is read."""
+    """Return the summands of a state's balance, with all equations put in. Raises SpecError."""
     known = inlined(mode, {})
+    return [Term(tree, replaced(tree, known)) for tree in _summands(mode, state)]
 
-    def parts(tree: Tree) -> Iterator[Tree]:
-        match tree:
+
+def _summands(mode: Mode, state: str) -> Iterator[Tree]:
+    """Yield the summands of a state's balance; an equation is taken apart where it is read."""
+    stack = [mode.flow[state].right]
+    while stack:
+        match stack.pop():
             case Negative(operand, _):
-                yield from parts(operand)
+                stack.append(operand)
             case Arithmetic("+" | "-", left, right, _):
-                yield from parts(left)
-                yield from parts(right)
+                stack += [right, left]
             case Name(path, _) if path in mode.equations:
-                yield from parts(mode.equations[path].tree)
-            case _:
+                stack.append(mode.equations[path].tree)
+            case tree:
                 yield tree
-
-    return [Term(tree, replaced(tree, known)) for tree in parts(mode.flow[state].right)]
 
 
 def other_terms(automaton: Automaton, mode: Mode, point: Point) -> list[str]:
@@ -62,22 +66,26 @@ def other_terms(automaton: Automaton, mode: Mode, point: Point) -> list[str]:
             continue
         for term in terms_of(mode, state):
             if not _is_affine(term, automaton, point):
-                found[term.text] = None
+                found[written(term.written)] = None
     return list(found)
 
 
-def strongest(mode: Mode, row: str, column: str, point: Point) -> Term | None:
-    """Return the term of a state's rate that changes most with another state."""
-    best: Term | None = None
+def strongest(field: Field, mode: Mode, row: str, column: str, parts: Mapping[str, Affine]) -> str:
+    """Return the term of a state's rate that is steepest in another state, as it is written.
+
+    `parts` is what the names of the block of rates are in the states; an empty text where no term
+    is linear with a constant coefficient, or where there are too many.
+    """
+    if row not in mode.flow or is_too_large(mode):
+        return ""
+    known = all_known_at(field)
+    best: Tree | None = None
     largest = 0.0
-    if is_too_large(mode):
-        return None
-    for term in terms_of(mode, row) if row in mode.flow else ():
-        with suppress(SpecError):
-            size = abs(float(point.value(derivative(term.full, column, point.value))))
-            if size > largest:
-                best, largest = term, size
-    return best
+    for tree in _summands(mode, row):
+        size = abs(affine(expression(tree, known), parts).slopes.get(column, 0.0))
+        if size > largest:
+            best, largest = tree, size
+    return written(best) if best else ""
 
 
 def _is_affine(term: Term, automaton: Automaton, point: Point) -> bool:

@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given, strategies as st
 
 from language.document import Scalar
-from language.parse import decimal, parse_balance, parse_expression
+from language.parse import parse_balance, parse_expression
 from language.problem import Source
+from language.quantity import decimal
 from language.syntax import (
     Application,
     Arithmetic,

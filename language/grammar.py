@@ -1,0 +1,120 @@
+"""Grammar: the shape of an expression - which tokens make which part of its tree.
+
+lark finds it, once for each sequence of kinds of tokens: `a + 2 * b` and `x_1 - 7.5 / y` have one
+shape. A text whose tokens are not plainly those of the grammar is parsed by lark itself.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache, lru_cache
+from importlib import resources
+
+import lark
+
+Shape = tuple[str, tuple["Shape | int", ...]]
+"""A rule of the grammar with its parts: other rules, or the numbers of tokens."""
+
+TOKEN = re.compile(
+    r" +"
+    r"|(?P<quantity>\d(?:[eE][-+]\d|[0-9A-Za-z_.])* (?!(?:then|else|and|or|if|not)\b)"
+    r"(?:1/)?[A-Za-z]+(?:\^-?\d)?(?:[*/][A-Za-z]+(?:\^-?\d)?)*)"
+    r"|(?P<number>\d(?:[eE][-+]\d|[0-9A-Za-z_.])*)"
+    r"|(?P<word>(?:if|then|else|and|or|not|true|false)\b)"
+    r"|(?P<name>\$?(?!(?:if|then|else|and|or|not|true|false)\b)[A-Za-z][A-Za-z0-9_]*)"
+    r"|\^ *(?P<exponent>-?\d+)(?![\d.])"
+    r"|(?P<sign><=|>=|==|!=|[-+*/<>=(),.])"
+)
+"""The tokens of `expression.lark`; an exponent with its `^`, for a digit elsewhere is a number."""
+ALIKE = {"quantity": "1 m", "number": "1", "name": "x"}
+"""What stands for all tokens of a kind; words and signs stand for themselves."""
+EXPONENT = "^ 2"
+APART = "  "
+"""Two blanks: after one, a name behind a number is its unit."""
+STARTS = ("expression", "balance")
+ALIKE_SIGNS = {"/": "*", "<=": "<", ">=": "<", ">": "<", "==": "<", "!=": "<"}
+"""Signs that make the same part of a tree. `+` is not a `-`, which may be a sign of its own."""
+
+
+@dataclass(frozen=True)
+class Parsed:
+    """The shape of a text with the text and the start of each token; `depth` of the shape."""
+
+    shape: Shape
+    texts: tuple[str, ...]
+    starts: tuple[int, ...]
+    depth: int
+
+
+def parsed(text: str, start: str) -> Parsed:
+    """Parse a text from a start of the grammar. Raises lark's UnexpectedInput."""
+    kinds: list[str] = []
+    texts: list[str] = []
+    starts: list[int] = []
+    end = 0
+    for match in TOKEN.finditer(text):
+        if match.start() != end:
+            break
+        end = match.end()
+        kind = match.lastgroup
+        if kind is None:
+            continue
+        found = match[kind]
+        texts.append(found)
+        starts.append(match.start(kind))
+        if kind == "exponent":
+            kinds.append(EXPONENT)
+        elif kind in ALIKE:
+            kinds.append(ALIKE[kind])
+        else:
+            kinds.append(ALIKE_SIGNS.get(found, found))
+    known = _shape_of(tuple(kinds), start) if end == len(text) else None
+    if known:
+        return Parsed(known[0], tuple(texts), tuple(starts), known[1])
+    tokens: list[lark.Token] = []
+
+    def number(token: lark.Token) -> int:
+        tokens.append(token)
+        return len(tokens) - 1
+
+    shape = _shape(_parser(start).parse(text), number)
+    places = tuple(token.start_pos or 0 for token in tokens)
+    return Parsed(shape, tuple(map(str, tokens)), places, _depth(shape))
+
+
+@lru_cache(maxsize=4096)
+def _shape_of(kinds: tuple[str, ...], start: str) -> tuple[Shape, int] | None:
+    """Return the shape of a sequence of kinds and its depth, None where it is no expression."""
+    places: dict[int, int] = {}
+    at = 0
+    for index, kind in enumerate(kinds):
+        places[at + kind.rindex(" ") + 1 if kind == EXPONENT else at] = index
+        at += len(kind) + len(APART)
+    try:
+        tree = _parser(start).parse(APART.join(kinds))
+    except lark.exceptions.UnexpectedInput:
+        return None
+    shape = _shape(tree, lambda token: places[token.start_pos or 0])
+    return shape, _depth(shape)
+
+
+def _shape(tree: lark.Tree[lark.Token], number: Callable[[lark.Token], int]) -> Shape:
+    parts = tuple(
+        number(part) if isinstance(part, lark.Token) else _shape(part, number)
+        for part in tree.children
+    )
+    return str(tree.data), parts
+
+
+def _depth(shape: Shape) -> int:
+    """Return a bound of the depth of the tree; a rule of a start is no part of it."""
+    deepest = max((_depth(part) for part in shape[1] if not isinstance(part, int)), default=0)
+    return deepest if shape[0] in STARTS else deepest + 1
+
+
+@cache
+def _parser(start: str) -> lark.Lark:
+    grammar = resources.files("language").joinpath("expression.lark").read_text("utf-8")
+    return lark.Lark(grammar, parser="lalr", start=start)
