@@ -6,13 +6,13 @@ from collections.abc import Mapping
 
 from language.balance import coefficient_of
 from language.interval import ANYTHING, Interval, Ranging
-from language.memory import formulas
+from language.memory import actions
 from language.model import Automaton, Mode
 from language.order import equation_order
 from language.parameter import parameter_order
 from language.problem import Problems, SpecError
 from language.region import sources
-from language.syntax import Tree
+from language.syntax import Likeness, Tree
 
 HELP = {
     "divisor": "exclude 0 by an enclosing `if`, or by `max(..., limit)`",
@@ -23,8 +23,9 @@ HELP = {
 def check_domains(automaton: Automaton, problems: Problems) -> None:
     """Report divisors and roots whose declared ranges go beyond their domain."""
     fixed: dict[str, Interval] = {}
+    likeness = Likeness()
     for mode in automaton.all_modes:
-        domains = _ModeDomains(automaton, mode, problems, fixed)
+        domains = _ModeDomains(automaton, mode, problems, fixed, likeness)
         if not fixed:
             fixed.update({name: domains.look(name) for name in parameter_order(automaton)})
         domains.check()
@@ -36,26 +37,32 @@ class _ModeDomains:
     """The intervals of the names of one mode, each equation's found once."""
 
     def __init__(
-        self, automaton: Automaton, mode: Mode, problems: Problems, fixed: Mapping[str, Interval]
+        self,
+        automaton: Automaton,
+        mode: Mode,
+        problems: Problems,
+        fixed: Mapping[str, Interval],
+        likeness: Likeness,
     ) -> None:
         self.automaton = automaton
         self.mode = mode
         self.problems = problems
         self.formulas = sources(mode)
         self.found: dict[str, Interval] = dict(fixed)
-        self.quiet = Ranging(self.look, self._table, lambda what, tree, interval: None)
+        self.ranging = Ranging(self.look, self._table, likeness, self._report)
+        self.quiet = self.ranging.quiet
 
     def check(self) -> None:
-        ranging = Ranging(self.look, self._table, self._report)
+        ranging = self.ranging
         for name in equation_order(self.mode):
             self.look(name)
-        for formula in formulas(self.mode):
-            ranging.of(formula.tree)
+        for formula in actions(self.mode):
+            ranging.expression(formula.tree)
         for balance in self.mode.flow.values():
-            ranging.of(balance.right)
+            ranging.expression(balance.right)
             factor = coefficient_of(balance.left, balance.state)
             if factor is not None and not isinstance(factor, SpecError):
-                interval = ranging.of(factor)
+                interval = ranging.expression(factor)
                 if interval.meets_zero:
                     self._report("divisor", factor, interval)
 
@@ -63,13 +70,19 @@ class _ModeDomains:
         """Report start values that lie outside of their range, whatever tunables are."""
         for state in self.automaton.carried.values():
             if state.range:
-                start, (low, high) = self.quiet.of(state.initial.tree), map(float, state.range)
+                start, (low, high) = (
+                    self.quiet.expression(state.initial.tree),
+                    map(float, state.range),
+                )
                 if start.high < low or start.low > high:
                     label = f"`{state.name}` starts outside of its range"
                     self.problems.error("range", state.initial.span, label)
 
     def look(self, name: str) -> Interval:
-        """Return the interval of a name; called in order, so that a long chain needs no stack."""
+        """Return the interval of a name; called in order, so that a long chain needs no stack.
+
+        What is outside a domain in one of the mode's own equations is reported.
+        """
         if name not in self.found:
             self.found[name] = ANYTHING
             self.found[name] = self._interval(name)
@@ -79,14 +92,15 @@ class _ModeDomains:
         automaton = self.automaton
         parameter = automaton.parameters.get(name)
         if parameter is not None and parameter.derived:
-            return self.quiet.of(parameter.derived.tree)
+            return self.quiet.expression(parameter.derived.tree)
         if parameter is not None and parameter.kind == "fixed" and parameter.value is not None:
             return Interval(float(parameter.value), float(parameter.value), True)
         thing = parameter or automaton.inputs.get(name) or automaton.carried.get(name)
         if thing is not None:
             limits = thing.range
             return Interval(float(limits[0]), float(limits[1]), True) if limits else ANYTHING
-        parts = [self.quiet.of(formula.tree) for formula in self.formulas.get(name, ())]
+        ranging = self.ranging if name in self.mode.equations else self.quiet
+        parts = [ranging.expression(formula.tree) for formula in self.formulas.get(name, ())]
         if not parts:
             return ANYTHING
         result = parts[0]

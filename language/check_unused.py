@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
-from language.model import Automaton, Mode
+from language.declaration import Formula
+from language.model import Automaton, Balance, Mode
 from language.problem import Problems, Span
-from language.syntax import Name
+from language.syntax import names
 
 HINT = "make it an output, or remove it"
 
@@ -83,21 +84,22 @@ def _run_names(automaton: Automaton) -> Iterator[str]:
         yield from automaton.model.states
 
 
-def _names(thing: Any) -> Iterator[str]:
-    """Yield the names in all expressions of a tree of declarations; its own ones, no model's."""
-    if isinstance(thing, Name):
-        yield thing.path
-    elif isinstance(thing, Span):
-        return
-    elif isinstance(thing, Mapping):
-        yield from _names_of(thing.values())
-    elif isinstance(thing, tuple):
-        yield from _names_of(thing)
-    elif dataclasses.is_dataclass(thing):
-        parts = [field.name for field in dataclasses.fields(thing) if field.name != "model"]
-        yield from _names_of(getattr(thing, name) for name in parts)
-
-
-def _names_of(things: Iterable[Any]) -> Iterator[str]:
-    for thing in things:
-        yield from _names(thing)
+def _names(automaton: Automaton) -> Iterator[str]:
+    """Yield the names in all expressions of an automaton; its own ones, no model's."""
+    stack: list[Any] = [
+        getattr(automaton, field.name)
+        for field in dataclasses.fields(automaton)
+        if field.name != "model"
+    ]
+    while stack:
+        thing = stack.pop()
+        if isinstance(thing, Formula):
+            yield from thing.reads
+        elif isinstance(thing, Balance):
+            yield from (name.path for side in (thing.left, thing.right) for name in names(side))
+        elif isinstance(thing, Mapping):
+            stack += thing.values()
+        elif isinstance(thing, tuple):
+            stack += thing
+        elif dataclasses.is_dataclass(thing) and not isinstance(thing, Span):
+            stack += [getattr(thing, field.name) for field in dataclasses.fields(thing)]

@@ -14,6 +14,7 @@ from language.syntax import (
     Application,
     Arithmetic,
     Choice,
+    Likeness,
     Logic,
     Name,
     Negative,
@@ -22,7 +23,8 @@ from language.syntax import (
     Power,
     Relation,
     Tree,
-    form,
+    alike,
+    children,
 )
 
 OPPOSITE = {"<": ">=", "<=": ">", ">": "<=", ">=": "<"}
@@ -54,29 +56,44 @@ class Interval:
 
 ANYTHING = Interval()
 Limits = Mapping[object, Interval]
-"""What enclosing conditions say of expressions, by their form."""
+"""What enclosing conditions say of expressions, by the number of what is written alike."""
+NO_LIMITS: Limits = {}
 Look = Callable[[str], Interval]
 Report = Callable[[str, Tree, Interval], None]
 
 
-@dataclass(frozen=True)
 class Ranging:
-    """Finds intervals; `look` gives those of names, `report` takes divisors and roots."""
+    """Finds intervals; `look` gives those of names, `report` takes divisors and roots.
 
-    look: Look
-    table: Callable[[str], Interval]
-    report: Report
+    A quiet one has no `report`: what conditions say is not looked into, only what they exclude.
+    """
 
-    def of(self, tree: Tree, limits: Limits | None = None) -> Interval:
+    def __init__(
+        self, look: Look, table: Look, likeness: Likeness, report: Report | None = None
+    ) -> None:
+        """Know the names; `likeness` numbers the expressions that limits are about."""
+        self.look = look
+        self.table = table
+        self.likeness = likeness
+        self.report = report
+        self.quiet = Ranging(look, table, likeness) if report else self
+        self.bounds: dict[tuple[int, int], tuple[Limits, Interval]] = {}
+
+    def expression(self, tree: Tree) -> Interval:
         """Return the interval of an expression, reporting what is outside a domain inside it."""
-        limits = limits or {}
-        found = self._of(tree, limits)
+        self.quiet.bounds.clear()
+        return self.of(tree, NO_LIMITS)
+
+    def of(self, tree: Tree, limits: Limits) -> Interval:
+        """Return the interval of a part of an expression within the limits that hold there."""
         if isinstance(tree, Relation | Logic | Not):
-            return found
-        if type(tree).__name__ not in {key[0] for key in limits if isinstance(key, tuple)}:
-            return found  # the form of a large tree takes time
-        written = form(tree)
-        return found.within(limits[written]) if written in limits else found
+            if self.report:
+                for part in children(tree):
+                    self.of(part, limits)
+            return ANYTHING
+        found = self._of(tree, limits)
+        held = limits.get(self.likeness.number(tree)) if limits else None
+        return found.within(held) if held else found
 
     def _of(self, tree: Tree, limits: Limits) -> Interval:
         match tree:
@@ -91,18 +108,14 @@ class Ranging:
                 return self._arithmetic(tree, limits)
             case Power(base, exponent, _):
                 inner = self.of(base, limits)
-                if exponent < 0 and inner.meets_zero and _excluded(base, limits):
+                if exponent < 0 and inner.meets_zero and self._excluded(base, limits):
                     return ANYTHING
                 return self._power(tree, inner, exponent)
             case Choice(condition, then, other, _):
-                self.of(condition, limits)
+                if self.report:
+                    self.of(condition, limits)
                 held = self.of(then, self._limited(condition, True, limits))
                 return held.joined(self.of(other, self._limited(condition, False, limits)))
-            case Relation(_, left, right, _) | Logic(_, left, right, _):
-                self.of(left, limits)
-                self.of(right, limits)
-            case Not(operand, _):
-                self.of(operand, limits)
             case Application():
                 return self._application(tree, limits)
         return ANYTHING
@@ -116,18 +129,19 @@ class Ranging:
             case "-":
                 return Interval(left.low - right.high, left.high - right.low, known)
             case "*":
-                if form(tree.left) == form(tree.right):
+                if alike(tree.left, tree.right):
                     return _even(left, 2)
                 return _corners(left, right, lambda a, b: a * b)
         if right.meets_zero:
-            if not _excluded(tree.right, limits):
+            if self.report and not self._excluded(tree.right, limits):
                 self.report("divisor", tree.right, right)
             return ANYTHING
         return _corners(left, right, lambda a, b: a / b)
 
     def _power(self, tree: Power, base: Interval, exponent: int) -> Interval:
         if exponent < 0 and base.meets_zero:
-            self.report("divisor", tree.base, base)
+            if self.report:
+                self.report("divisor", tree.base, base)
             return ANYTHING
         if exponent < 0:
             whole = self._power(tree, base, -exponent)
@@ -139,14 +153,14 @@ class Ranging:
     def _application(self, tree: Application, limits: Limits) -> Interval:
         name = tree.function
         if name == "lookup":
-            for part in tree.arguments[1:]:
+            for part in tree.arguments[1:] if self.report else ():
                 self.of(part, limits)
             first = tree.arguments[0]
             return self.table(first.path) if isinstance(first, Name) else ANYTHING
         if name in ("in", "after"):
             return ANYTHING
         parts = [self.of(part, limits) for part in tree.arguments]
-        if name == "sqrt" and parts[0].low < 0.0:
+        if self.report and name == "sqrt" and parts[0].low < 0.0:
             self.report("root", tree.arguments[0], parts[0])
         return _function(name, parts)
 
@@ -159,14 +173,21 @@ class Ranging:
                 return self._limited(right, holds, self._limited(left, holds, limits))
             case Relation(operator, left, right, _) if operator in OPPOSITE:
                 operator = operator if holds else OPPOSITE[operator]
-                limits = self._bounded(left, operator, right, limits)
-                return self._bounded(right, MIRRORED[operator], left, limits)
+                first, second = self.quiet.bound(left, limits), self.quiet.bound(right, limits)
+                limits = self._bounded(left, operator, second, limits)
+                return self._bounded(right, MIRRORED[operator], first, limits)
         return limits
 
-    def _bounded(self, side: Tree, operator: str, other: Tree, limits: Limits) -> Limits:
-        quiet = Ranging(self.look, self.table, lambda what, tree, interval: None)
-        bound = quiet.of(other, limits)
-        before = limits.get(form(side), ANYTHING)
+    def bound(self, side: Tree, limits: Limits) -> Interval:
+        """Return the interval of a side of a condition, found once for both its outcomes."""
+        key = id(side), id(limits)
+        if key not in self.bounds:
+            self.bounds[key] = limits, self.of(side, limits)
+        return self.bounds[key][1]
+
+    def _bounded(self, side: Tree, operator: str, bound: Interval, limits: Limits) -> Limits:
+        number = self.likeness.number(side)
+        before = limits.get(number, ANYTHING)
         low, high = -math.inf, math.inf
         if operator == ">":
             low = math.nextafter(bound.low, math.inf)
@@ -176,19 +197,17 @@ class Ranging:
             high = math.nextafter(bound.high, -math.inf)
         else:
             high = bound.high
-        made = {**limits, form(side): before.within(Interval(low, high))}
+        made = {**limits, number: before.within(Interval(low, high))}
         if isinstance(side, Application) and side.function == "abs" and low > 0.0:
-            made[_not_zero(side.arguments[0])] = ANYTHING
+            made[self._not_zero(side.arguments[0])] = ANYTHING
         return made
 
+    def _not_zero(self, tree: Tree) -> object:
+        """The key under which limits say that an expression is not 0: `abs(x) > limit`."""
+        return ("not zero", self.likeness.number(tree))
 
-def _not_zero(tree: Tree) -> object:
-    """The key under which limits say that an expression is not 0: `abs(x) > limit`."""
-    return ("not zero", form(tree))
-
-
-def _excluded(tree: Tree, limits: Limits) -> bool:
-    return _not_zero(tree) in limits
+    def _excluded(self, tree: Tree, limits: Limits) -> bool:
+        return bool(limits) and self._not_zero(tree) in limits
 
 
 def _corners(left: Interval, right: Interval, join: Callable[[float, float], float]) -> Interval:

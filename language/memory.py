@@ -93,6 +93,11 @@ class Edge:
 def formulas(mode: Mode) -> Iterator[Formula]:
     """Yield the equations, updates, entries, exits, noises, guards and resets of a mode."""
     yield from mode.equations.values()
+    yield from actions(mode)
+
+
+def actions(mode: Mode) -> Iterator[Formula]:
+    """Yield the formulas of a mode that are no equations."""
     for stage in (mode.update, mode.entry, mode.exit):
         yield from stage.values()
     if mode.observer:

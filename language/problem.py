@@ -31,7 +31,7 @@ class Source:
     laid: Span | None = field(repr=False, default=None)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Span:
     """A place in a source: line and column count from 1, width in characters (at least 1).
 

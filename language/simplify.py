@@ -21,7 +21,7 @@ from language.syntax import (
     Power,
     Relation,
     Tree,
-    form,
+    alike,
 )
 from language.units import NO_UNIT
 
@@ -52,7 +52,7 @@ def minus(a: Tree, b: Tree) -> Tree:
         return negative(b)
     if isinstance(a, Number) and isinstance(b, Number):
         return number(a.value - b.value, a.span)
-    if form(a) == form(b):
+    if alike(a, b):
         return number(0, a.span)
     if isinstance(b, Negative):
         return plus(a, b.operand)

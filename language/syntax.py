@@ -10,7 +10,7 @@ from language.problem import Span
 from language.units import NO_UNIT, Unit
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Number:
     """A literal: its exact value in SI and its unit. A bare 0 goes with any dimension."""
 
@@ -24,7 +24,7 @@ class Number:
         return self.value == 0 and self.unit is NO_UNIT
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Truth:
     """`true` or `false`."""
 
@@ -32,7 +32,7 @@ class Truth:
     span: Span
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Name:
     """A name or a dotted path."""
 
@@ -40,7 +40,7 @@ class Name:
     span: Span
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Negative:
     """Unary minus."""
 
@@ -48,7 +48,7 @@ class Negative:
     span: Span
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Not:
     """Logical negation."""
 
@@ -56,7 +56,7 @@ class Not:
     span: Span
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Arithmetic:
     """`+ - * /` of two operands."""
 
@@ -66,7 +66,7 @@ class Arithmetic:
     span: Span
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Logic:
     """`and`, `or`; both sides are evaluated."""
 
@@ -76,7 +76,7 @@ class Logic:
     span: Span
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Relation:
     """One relation of two sums."""
 
@@ -86,7 +86,7 @@ class Relation:
     span: Span
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Power:
     """`x^n` with a literal integer n."""
 
@@ -95,7 +95,7 @@ class Power:
     span: Span
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Choice:
     """`if c then a else b`."""
 
@@ -105,7 +105,7 @@ class Choice:
     span: Span
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Application:
     """A function applied to arguments."""
 
@@ -114,7 +114,7 @@ class Application:
     span: Span
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Broken:
     """An expression that could not be read; its problem is reported already."""
 
@@ -201,6 +201,57 @@ def form(part: object) -> object:
         kept = [item.name for item in dataclasses.fields(part) if item.name != "span"]
         return (type(part).__name__, *(form(getattr(part, name)) for name in kept))
     return part
+
+
+def alike(first: Tree, second: Tree) -> bool:
+    """Tell whether two trees are written alike: equal but for their places."""
+    stack = [(first, second)]
+    while stack:
+        a, b = stack.pop()
+        if a is b:
+            continue
+        parts, others = children(a), children(b)
+        if type(a) is not type(b) or said(a) != said(b) or len(parts) != len(others):
+            return False
+        stack += zip(parts, others, strict=True)
+    return True
+
+
+def said(tree: Tree) -> object:
+    """Return what a tree says itself, besides its parts."""
+    match tree:
+        case Number(value, unit, _):
+            return (value.numerator, value.denominator, unit.text)
+        case Truth(value, _):
+            return value
+        case Name(path, _):
+            return path
+        case Arithmetic(operator, _, _, _) | Logic(operator, _, _, _) | Relation(operator, _, _, _):
+            return operator
+        case Power(_, exponent, _):
+            return exponent
+        case Application(function, _, _):
+            return function
+        case _:
+            return None
+
+
+class Likeness:
+    """Numbers trees: two have one number if they are written alike. Each part is read once."""
+
+    def __init__(self) -> None:
+        """Know no tree."""
+        self.numbers: dict[object, int] = {}
+        self.known: dict[int, tuple[Tree, int]] = {}
+
+    def number(self, tree: Tree) -> int:
+        """Return the number of a tree."""
+        found = self.known.get(id(tree))
+        if found is None:
+            key = (type(tree), said(tree), *map(self.number, children(tree)))
+            found = tree, self.numbers.setdefault(key, len(self.numbers))
+            self.known[id(tree)] = found
+        return found[1]
 
 
 def depth(tree: Tree) -> int:

@@ -11,7 +11,7 @@ from language.evaluate import evaluate
 from language.interval import ANYTHING, Interval, Ranging
 from language.lower import expression
 from language.operation import Ref
-from language.syntax import Tree
+from language.syntax import Likeness, Tree
 from tests.language.making import tree
 
 RANGES = {"a": Interval(-2.0, 3.0, True), "b": Interval(0.5, 4.0, True)}
@@ -31,8 +31,10 @@ def ranged(text: str) -> tuple[Interval, list[str]]:
         if interval.known:
             found.append(f"{what} {part.span.column}")
 
-    ranging = Ranging(lambda name: RANGES.get(name, ANYTHING), lambda name: ANYTHING, report)
-    return ranging.of(tree(text)), found
+    ranging = Ranging(
+        lambda name: RANGES.get(name, ANYTHING), lambda name: ANYTHING, Likeness(), report
+    )
+    return ranging.expression(tree(text)), found
 
 
 @pytest.mark.parametrize("text", TEXTS)
