@@ -71,6 +71,7 @@ from language.stepping import (
     ZENO,
     Waits,
     begun,
+    by_mode_of,
     ended,
     is_over,
     stepping_blocks,
@@ -201,6 +202,7 @@ def _variables(automaton: Automaton, field: Field) -> list[Variable]:
 
 def _selection(automaton: Automaton, infos: tuple[TransitionInfo, ...], waits: Waits) -> Selection:
     by_key = {info.key: info for info in infos}
+    own_waits = by_mode_of(waits)
 
     def info_of(transition: Transition) -> TransitionInfo:
         return by_key[f"{automaton.name} {transition.key}"]
@@ -215,9 +217,9 @@ def _selection(automaton: Automaton, infos: tuple[TransitionInfo, ...], waits: W
         number=lambda transition: info_of(transition).number,
         enabled=enabled,
         moved=lambda t: (
-            *ended(waits, automaton.source(t)),
+            *ended(own_waits, automaton.source(t)),
             *forgotten(automaton, automaton.source(t)),
-            *begun(waits, automaton.target(t)),
+            *begun(own_waits, automaton.target(t)),
         ),
     )
 
@@ -231,7 +233,7 @@ def _jump(
     enabled: dict[int, Expr] = {}
     fired: dict[int, Block] = {}
     for k, (transition, info) in enumerate(
-        zip(mode.transitions, infos_of(mode, infos), strict=True)
+        zip(mode.transitions, infos_of(field.automaton, mode, infos), strict=True)
     ):
         enabled[k] = selection.enabled(transition, info.slot)
         fired[k] = (
@@ -249,13 +251,14 @@ def _entries(
     ends = [Assign(f"state.{name}", Ref(f"work.end_{name}")) for name in field.states]
     at_start = at_time(field, real(0.0))
     evaluate: Block = (*at_start, by_mode(field, "equations"))
-    whole_known = {**known, **equation_names(automaton.all_modes, "equation.")}
+    whole_known = {**known, **equation_names(automaton, "equation.")}
     # A delayed quantity may read another one: each round fills one more from what is inside it.
     rounds = (*evaluate, *fill_block(histories, whole_known))
     fill: Block = (Loop(len(histories), "work.round", rounds),) if histories else ()
     keep: Block = (*evaluate, *record_block(histories, whole_known), Assign(AGE.name, real(0.0)))
     record = {"record": keep} if histories else {}
     watch = tuple((mode.number, _watch(automaton, mode)) for mode in automaton.modes.values())
+    own = by_mode_of(waits)
     return {
         "derive": derive_block(automaton),
         "init": (
@@ -268,7 +271,7 @@ def _entries(
             *enter_initial(automaton, "memory.mode"),
             *(wait.load for wait in waits),
             *forgotten(automaton),
-            *(op for r in automaton.all_regions for op in begun(waits, r.modes[r.initial])),
+            *(op for r in automaton.all_regions for op in begun(own, r.modes[r.initial])),
             *((Assign(AGE.name, real(0.0)),) if histories else ()),
             Assign("memory.time", real(0.0)),
             Assign("memory.started", Value(True)),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections import ChainMap
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -10,6 +11,7 @@ from language.action import action_variables, committing, place_of, reading, sta
 from language.declaration import Formula
 from language.lower import Names, choice, equation_names, equations, expression, rate, reads_of
 from language.model import Automaton, Balance, Mode, Transition
+from language.once import once
 from language.operation import (
     Assign,
     Binary,
@@ -97,7 +99,12 @@ def field_variables(field: Field) -> list[Variable]:
 
 
 def known_at(field: Field) -> dict[str, Expr]:
-    """Return what the names of the automaton are at the point."""
+    """Return what the names of the automaton are at the point, to be added to."""
+    return dict(_known_at(field))
+
+
+@once
+def _known_at(field: Field) -> dict[str, Expr]:
     known: dict[str, Expr] = dict(field.constants)
     known.update(field.inputs)
     known.update({name: Ref(f"work.at_{name}") for name in field.states})
@@ -105,10 +112,11 @@ def known_at(field: Field) -> dict[str, Expr]:
     return known
 
 
+@once
 def all_known_at(field: Field) -> dict[str, Expr]:
     """Return what the names of the automaton are at the point, all equations among them."""
     known = known_at(field)
-    known.update(equation_names(field.automaton.all_modes, "work.at_"))
+    known.update(equation_names(field.automaton, "work.at_"))
     return known
 
 
@@ -238,7 +246,7 @@ def _guards(field: Field, mode: Mode) -> Block:
 
 def _own_guards(field: Field, mode: Mode, count: int) -> list[Op]:
     """Return what sets the guards of a mode, and those up to `count` to false."""
-    known = {**all_known_at(field), **field.remembered.get(mode.key, {})}
+    known = ChainMap(dict(field.remembered.get(mode.key, {})), all_known_at(field))
     ops = levels(field.automaton, mode, known)
     for k, transition in enumerate(mode.transitions):
         guard = expression(transition.when.tree, known)

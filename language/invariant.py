@@ -37,7 +37,7 @@ def invariant_block(automaton: Automaton, known: Names) -> dict[str, Block]:
     """Return the block that looks at the active modes; nothing where there are no invariants."""
     if not invariant_infos(automaton):
         return {}
-    here = {**known, **equation_names(automaton.all_modes, "equation.")}
+    here = {**known, **equation_names(automaton, "equation.")}
     found: list[Choose] = []
     for region in automaton.all_regions:
         cases: list[tuple[int, Block]] = []

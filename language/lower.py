@@ -9,6 +9,7 @@ from language.balance import coefficient_of
 from language.declaration import Formula
 from language.limit import is_limited
 from language.model import Automaton, Balance, Mode, Region
+from language.once import once
 from language.operation import (
     Assign,
     Binary,
@@ -216,10 +217,16 @@ def choice(region: Region, known: Names, blocks: Mapping[str, Block]) -> Choose:
     return Choose(selector.name, cases)
 
 
-def equation_names(modes: Iterable[Mode], group: str) -> dict[str, Expr]:
-    """Return the equations of some modes as what a Program reads."""
-    formulas = [pair for mode in modes for pair in mode.equations.items()]
-    return {name: Ref(f"{group}{name}", formula.whole) for name, formula in formulas}
+def equation_names(automaton: Automaton, group: str) -> dict[str, Expr]:
+    """Return the equations of all modes as what a Program reads."""
+    return {name: Ref(f"{group}{name}", whole) for name, whole in _wholes(automaton).items()}
+
+
+@once
+def _wholes(automaton: Automaton) -> dict[str, bool]:
+    """Return, for each equation that any mode has, whether it is a whole number."""
+    modes = automaton.all_modes
+    return {name: formula.whole for mode in modes for name, formula in mode.equations.items()}
 
 
 def variable_names(automaton: Automaton, inputs: str) -> dict[str, Expr]:

@@ -18,6 +18,7 @@ from language.dimension import DimensionCheck, Scope
 from language.kind import Enumeration, Whole
 from language.lower import Names, expression
 from language.model import Automaton, Mode
+from language.once import once
 from language.operation import (
     Assign,
     Binary,
@@ -112,14 +113,24 @@ def actions(mode: Mode) -> Iterator[Formula]:
 def applications(automaton: Automaton, functions: tuple[str, ...]) -> dict[str, Application]:
     """Return each different use of some functions, by key; what is inside comes first."""
     found: dict[str, Application] = {}
+    for part in remembering(automaton):
+        if part.function in functions:
+            found.setdefault(memory_key(part), part)
+    return found
+
+
+@once
+def remembering(automaton: Automaton) -> tuple[Application, ...]:
+    """Return every use of a function with memory; what is inside of one comes before it."""
+    found: list[Application] = []
     for mode in automaton.all_modes:
         trees = [formula.tree for formula in formulas(mode)]
         trees += [balance.right for balance in mode.flow.values()]
         for tree in trees:
-            for part in reversed(walk(tree)):
-                if isinstance(part, Application) and part.function in functions:
-                    found.setdefault(memory_key(part), part)
-    return found
+            found += reversed(
+                [p for p in walk(tree) if isinstance(p, Application) and p.function in MEMORY]
+            )
+    return tuple(found)
 
 
 def ticks_of(automaton: Automaton, time: Tree) -> int:
@@ -192,6 +203,7 @@ def _elapse(automaton: Automaton) -> Iterator[Op]:
         yield Count(timer, active, longest, f"{automaton.name} {mode.key}")
 
 
+@once
 def _timers(automaton: Automaton) -> dict[str, tuple[str, Mode, int]]:
     """Return, by mode, the counter of its ticks and how far it counts."""
     found: dict[str, tuple[str, Mode, int]] = {}
@@ -207,6 +219,7 @@ def _afters(mode: Mode) -> list[Application]:
     return [part for part in parts if isinstance(part, Application) and part.function == "after"]
 
 
+@once
 def edges_of(automaton: Automaton) -> tuple[Edge, ...]:
     """Return the edges that the guards of each mode read."""
     found: dict[tuple[str, str], Edge] = {}
@@ -219,12 +232,20 @@ def edges_of(automaton: Automaton) -> tuple[Edge, ...]:
     return tuple(found.values())
 
 
+@once
+def edges_by_mode(automaton: Automaton) -> Mapping[str, list[Edge]]:
+    """Return the edges by the key of the mode whose guards read them."""
+    found: dict[str, list[Edge]] = {}
+    for edge in edges_of(automaton):
+        found.setdefault(edge.mode, []).append(edge)
+    return found
+
+
 def guard_names(automaton: Automaton, mode: Mode) -> dict[str, Expr]:
     """Return what the edges and times of a mode's guards are."""
     found: dict[str, Expr] = {}
-    for edge in edges_of(automaton):
-        if edge.mode == mode.key:
-            found[memory_key(edge.tree)] = Ref(f"work.edge_{edge.number}")
+    for edge in edges_by_mode(automaton).get(mode.key, ()):
+        found[memory_key(edge.tree)] = Ref(f"work.edge_{edge.number}")
     timers = _timers(automaton)
     for part in _afters(mode):
         ticks = ticks_of(automaton, part.arguments[0])
@@ -238,23 +259,20 @@ def guard_names(automaton: Automaton, mode: Mode) -> dict[str, Expr]:
 def watch_edges(automaton: Automaton, mode: Mode, known: Mapping[str, Expr]) -> list[Op]:
     """Return the edges of now, and what they leave for the next tick (rule 8)."""
     ops: list[Op] = []
-    for edge in edges_of(automaton):
-        if edge.mode == mode.key:
-            level = expression(edge.tree.arguments[0], known)
-            rising = edge.tree.function == "rising"
-            here, seen = Ref(f"work.level_{edge.number}"), Ref(edge.opposite)
-            ops.append(Assign(here.name, level if rising else Unary("not", level)))
-            ops.append(Assign(f"work.edge_{edge.number}", Binary("and", here, seen)))
-            ops.append(Assign(seen.name, Unary("not", here)))
+    for edge in edges_by_mode(automaton).get(mode.key, ()):
+        level = expression(edge.tree.arguments[0], known)
+        rising = edge.tree.function == "rising"
+        here, seen = Ref(f"work.level_{edge.number}"), Ref(edge.opposite)
+        ops.append(Assign(here.name, level if rising else Unary("not", level)))
+        ops.append(Assign(f"work.edge_{edge.number}", Binary("and", here, seen)))
+        ops.append(Assign(seen.name, Unary("not", here)))
     return ops
 
 
 def leave(automaton: Automaton, source: Mode, target: Mode) -> list[Op]:
     """Return what a transition forgets: the edges of its source; its target's time starts."""
     ops: list[Op] = [
-        Assign(edge.opposite, Value(False))
-        for edge in edges_of(automaton)
-        if edge.mode == source.key
+        Assign(edge.opposite, Value(False)) for edge in edges_by_mode(automaton).get(source.key, ())
     ]
     timers = _timers(automaton)
     if target.key in timers:

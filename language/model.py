@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import cached_property
 from typing import Literal
 
 from language.declaration import (
@@ -157,7 +158,7 @@ class Region:
     initial: str
     span: Span
 
-    @property
+    @cached_property
     def widest(self) -> int:
         """The largest number of transitions that leave one mode."""
         return max(len(mode.transitions) for mode in self.modes.values())
@@ -215,24 +216,28 @@ class Automaton:
         """Tell whether the automaton ticks."""
         return self.period is not None
 
-    @property
+    @cached_property
     def chart(self) -> Region:
         """The modes at the root, as a region."""
         return Region(CHART, self.modes, self.initial, self.span)
 
-    @property
+    @cached_property
     def all_regions(self) -> tuple[Region, ...]:
         """The chart, then the regions beside it."""
         return (self.chart, *self.regions)
 
-    @property
+    @cached_property
     def all_modes(self) -> tuple[Mode, ...]:
         """The modes of all regions, those of the chart first."""
         return tuple(mode for region in self.all_regions for mode in region.modes.values())
 
+    @cached_property
+    def _by_name(self) -> Mapping[str, Region]:
+        return {region.name: region for region in reversed(self.all_regions)}
+
     def region(self, name: str) -> Region:
         """Return the region of a name."""
-        return next(region for region in self.all_regions if region.name == name)
+        return self._by_name[name]
 
     def source(self, transition: Transition) -> Mode:
         """Return the mode that a transition leaves."""
@@ -242,12 +247,12 @@ class Automaton:
         """Return the mode that a transition enters."""
         return self.region(transition.region).modes[transition.target]
 
-    @property
+    @cached_property
     def carried(self) -> Mapping[str, State]:
         """The states and discrete variables: all that assignments may write."""
         return {**self.states, **self.discrete}
 
-    @property
+    @cached_property
     def literals(self) -> Mapping[str, int]:
         """The names of enumerations with their numbers, those of the model too."""
         lists = [thing.values for thing in self.parameters.values()]

@@ -6,11 +6,13 @@ from collections.abc import Mapping, Sequence
 
 from language.graph import chain, circle, reachable, topological, turned
 from language.model import Mode
+from language.once import once
 from language.problem import Problems, Span, SpecError
 from language.region import sources
 from language.syntax import Tree, names
 
 
+@once
 def equation_order(mode: Mode) -> list[str]:
     """Return the names of a mode's equations so that each comes after those that it reads.
 

@@ -10,6 +10,7 @@ from language.kind import Type
 from language.lower import WHOLE_TYPES, reads_of
 from language.model import Automaton
 from language.number import rounded
+from language.once import once
 from language.operation import (
     Expr,
     Ref,
@@ -19,6 +20,7 @@ from language.program import Constant, value_type
 from language.units import Unit
 
 
+@once
 def constant_names(automaton: Automaton) -> dict[str, Expr]:
     """Return the parameters, and the names of enumerations, as what a Program reads."""
     groups = {"fixed": "constant", "tunable": "calibration", "derived": "derived"}
@@ -33,6 +35,7 @@ def constant_names(automaton: Automaton) -> dict[str, Expr]:
     return found
 
 
+@once
 def parameter_kinds(automaton: Automaton) -> dict[str, str]:
     """Return each parameter's kind: what is derived from fixed values alone is fixed."""
     kinds: dict[str, str] = {}
@@ -45,6 +48,7 @@ def parameter_kinds(automaton: Automaton) -> dict[str, str]:
     return {name: kinds[name] for name in automaton.parameters}
 
 
+@once
 def parameter_order(automaton: Automaton) -> list[str]:
     """Return the parameters so that each comes after those that it is derived from."""
     parameters = automaton.parameters.items()

@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping
 
 from language.declaration import Formula
 from language.model import CHART, Automaton, Balance, Mode, Region, Transition
+from language.once import once
 from language.operation import Compare, Expr, Ref, whole
 from language.program import mode_variable
 
@@ -20,6 +21,7 @@ def equation_names(mode: Mode) -> list[str]:
     return list(sources(mode))
 
 
+@once
 def sources(mode: Mode) -> dict[str, tuple[Formula, ...]]:
     """Return each equation's formulas: one, or those of the modes of a region beside."""
     found: dict[str, tuple[Formula, ...]] = {}
@@ -31,6 +33,7 @@ def sources(mode: Mode) -> dict[str, tuple[Formula, ...]]:
     return found
 
 
+@once
 def region_equations(region: Region) -> list[str]:
     """Return the names that the modes of a region define."""
     return list(dict.fromkeys(name for mode in region.modes.values() for name in mode.equations))
@@ -67,6 +70,7 @@ def transitions(mode: Mode) -> Iterator[Transition]:
             yield from other.transitions
 
 
+@once
 def by_priority(mode: Mode) -> list[tuple[int, Transition]]:
     """Return the transitions of a mode with their index, the smallest priority first."""
     pairs = list(enumerate(mode.transitions))
@@ -78,12 +82,14 @@ def slot(region: str, index: int) -> str:
     return str(index) if region == CHART else f"{region}_{index}"
 
 
+@once
 def slots(mode: Mode) -> list[str]:
     """Return the endings of all guards that are watched while a mode of the chart is active."""
     own = [slot(CHART, index) for index in range(len(mode.transitions))]
     return own + [slot(r.name, index) for r in mode.beside for index in range(r.widest)]
 
 
+@once
 def all_slots(automaton: Automaton) -> list[str]:
     """Return the endings of the guard variables of an automaton."""
     return [slot(r.name, index) for r in automaton.all_regions for index in range(r.widest)]

@@ -97,7 +97,7 @@ class _Sampled:
         self.motion: MotionInfo | None = None
         self.before = self._names("before")
         self.delays = delays_of(automaton)
-        names = equation_names(automaton.all_modes, "equation.")
+        names = equation_names(automaton, "equation.")
         self.all = with_delays(self.delays, {**self._names("input"), **names})
         self.now = {name: value for name, value in self.all.items() if name not in names}
 
@@ -239,7 +239,7 @@ class _Sampled:
 
     def _update(self, mode: Mode) -> Block:
         """The assignments of an update read the values of before this tick's updates."""
-        known = {**self.now, **equation_names(self.automaton.all_modes, "equation.")}
+        known = {**self.now, **equation_names(self.automaton, "equation.")}
         ops = reading(self.automaton, mode.update, known, "next")
         return (*ops, *(() if self.automaton.regions else self._store(mode)))
 

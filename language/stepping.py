@@ -12,7 +12,7 @@ it sees each event, and has the same bits:
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -90,15 +90,28 @@ def waits_of(infos: tuple[TransitionInfo, ...], alarms: tuple[Alarm, ...]) -> Wa
     return tuple(found)
 
 
-def begun(waits: Waits, mode: Mode) -> Block:
+WaitsByMode = Mapping[tuple[str, int], Waits]
+"""Waits by the region and the number of the mode."""
+
+
+def by_mode_of(waits: Waits) -> WaitsByMode:
+    """Return the waits by the mode in which they run."""
+    found: dict[tuple[str, int], Waits] = {}
+    for wait in waits:
+        place = wait.region, wait.mode
+        found[place] = (*found.get(place, ()), wait)
+    return found
+
+
+def begun(waits: WaitsByMode, mode: Mode) -> Block:
     """Return what begins when a mode is entered; waits of transitions are at their start."""
-    own = [w for w in waits if (w.region, w.mode) == (mode.region, mode.number)]
+    own = waits.get((mode.region, mode.number), ())
     return tuple(op for wait in own for op in (*wait.begin, wait.load))
 
 
-def ended(waits: Waits, mode: Mode) -> Block:
+def ended(waits: WaitsByMode, mode: Mode) -> Block:
     """Return what puts the waits of a mode that is left back to their start (rule 4)."""
-    own = [w for w in waits if (w.region, w.mode) == (mode.region, mode.number)]
+    own = waits.get((mode.region, mode.number), ())
     return tuple(wait.load for wait in own if wait.is_restarted)
 
 

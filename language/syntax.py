@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 
 from language.problem import Span
 from language.units import NO_UNIT, Unit
@@ -160,25 +162,29 @@ def walk(tree: Tree) -> list[Tree]:
     while stack:
         part = stack.pop()
         found.append(part)
-        stack.extend(reversed(children(part)))
+        parts = PARTS.get(type(part))
+        if parts is not None:
+            stack += parts(part)[::-1]
     return found
 
 
 def children(tree: Tree) -> tuple[Tree, ...]:
     """Return the direct parts of a tree."""
-    match tree:
-        case Negative(operand, _) | Not(operand, _):
-            return (operand,)
-        case Arithmetic(_, left, right, _) | Logic(_, left, right, _) | Relation(_, left, right, _):
-            return (left, right)
-        case Power(base, _, _):
-            return (base,)
-        case Choice(condition, then, other, _):
-            return (condition, then, other)
-        case Application(_, arguments, _):
-            return arguments
-        case _:
-            return ()
+    parts = PARTS.get(type(tree))
+    return () if parts is None else parts(tree)
+
+
+PARTS: Mapping[type, Callable[[Any], tuple[Tree, ...]]] = {
+    Negative: lambda tree: (tree.operand,),
+    Not: lambda tree: (tree.operand,),
+    Arithmetic: lambda tree: (tree.left, tree.right),
+    Logic: lambda tree: (tree.left, tree.right),
+    Relation: lambda tree: (tree.left, tree.right),
+    Power: lambda tree: (tree.base,),
+    Choice: lambda tree: (tree.condition, tree.then, tree.other),
+    Application: lambda tree: tree.arguments,
+}
+"""The direct parts of each kind of tree that has some."""
 
 
 def whole_literal(tree: Tree) -> int | None:

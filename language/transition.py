@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections import ChainMap
 from collections.abc import Callable, Mapping
 from fractions import Fraction
+from itertools import accumulate
 
 from language.action import entry, stage, stage_of_regions
 from language.constants import exact_value
@@ -12,6 +14,7 @@ from language.declaration import Formula
 from language.lower import equation_names, expression, reads_of
 from language.memory import guard_names, leave, watch_edges
 from language.model import Automaton, Mode, Transition
+from language.once import once
 from language.operation import (
     Assign,
     Block,
@@ -38,7 +41,7 @@ MAX_TICKS = 65534
 def transition_infos(automaton: Automaton, problems: Problems) -> tuple[TransitionInfo, ...]:
     """Return the transitions, numbered from 1 in the order of the file, waits exact."""
     found: list[TransitionInfo] = []
-    back = rewinds_of(automaton)
+    back = {id(rewinding.transition): rewinding.ticks for rewinding in rewinds_of(automaton)}
     for mode in automaton.all_modes:
         for k, transition in enumerate(mode.transitions):
             wait = Fraction(0)
@@ -64,15 +67,26 @@ def transition_infos(automaton: Automaton, problems: Problems) -> tuple[Transiti
                     key=f"{automaton.name} {transition.key}",
                     region=mode.region,
                     slot=slot(mode.region, k),
-                    rewind=next((r.ticks for r in back if r.transition is transition), 0),
+                    rewind=back.get(id(transition), 0),
                 )
             )
     return tuple(found)
 
 
-def infos_of(mode: Mode, infos: tuple[TransitionInfo, ...]) -> list[TransitionInfo]:
+def infos_of(
+    automaton: Automaton, mode: Mode, infos: tuple[TransitionInfo, ...]
+) -> tuple[TransitionInfo, ...]:
     """Return the transitions that leave a mode, in the order of the file."""
-    return [i for i in infos if (i.region, i.source) == (mode.region, mode.number)]
+    first = _first_of(automaton)[mode.key]
+    return infos[first : first + len(mode.transitions)]
+
+
+@once
+def _first_of(automaton: Automaton) -> Mapping[str, int]:
+    """Return, by the key of a mode, how many transitions leave the modes before it."""
+    modes = automaton.all_modes
+    counts = accumulate((len(mode.transitions) for mode in modes), initial=0)
+    return dict(zip((mode.key for mode in modes), counts, strict=False))
 
 
 def sampled_jump(
@@ -86,10 +100,10 @@ def sampled_jump(
     The guard's first true tick counts 1 here, so a wait of N ticks is over above N. Where regions
     run in parallel, it only chooses: what that does is left to `sampled_commit` (rule 14).
     """
-    known = {**now, **equation_names(automaton.all_modes, "equation.")}
-    edges = watch_edges(automaton, mode, known)
-    known.update(guard_names(automaton, mode))
-    own = infos_of(mode, infos)
+    everywhere = {**now, **equation_names(automaton, "equation.")}
+    edges = watch_edges(automaton, mode, everywhere)
+    known = ChainMap(guard_names(automaton, mode), everywhere)
+    own = infos_of(automaton, mode, infos)
     counters: list[Op] = []
     chain: Block = ()
     for k, transition in reversed(by_priority(mode)):
@@ -152,7 +166,7 @@ def sampled_commit(
     def stage_of(written: Callable[[Transition], Mapping[str, Formula]]) -> Block:
         return stage_of_regions(automaton, fired_variable, number, written, known)
 
-    known = {**now, **equation_names(automaton.all_modes, "equation.")}
+    known = {**now, **equation_names(automaton, "equation.")}
     before = stage_of(lambda way: automaton.source(way).exit)
     before = (*before, *stage_of(lambda way: way.reset))
     moved = []
@@ -169,7 +183,7 @@ def _moved(automaton: Automaton, way: Transition, infos: tuple[TransitionInfo, .
 
 
 def _entry_reads_equations(automaton: Automaton) -> bool:
-    named = equation_names(automaton.all_modes, "equation.")
+    named = equation_names(automaton, "equation.")
     entries = [formula for mode in automaton.all_modes for formula in mode.entry.values()]
     return any(name in named for name in reads_of(formula.tree for formula in entries))
 
@@ -203,9 +217,9 @@ def _taken(
     another one enters it (rule 4).
     """
     source, target = automaton.source(transition), automaton.target(transition)
-    ending = [] if _is_continued(automaton, source) else infos_of(source, infos)
+    ending = [] if _is_continued(automaton, source) else [*infos_of(automaton, source, infos)]
     if transition.memory == "reset" and _is_continued(automaton, target):
-        ending += infos_of(target, infos)
+        ending += infos_of(automaton, target, infos)
     ops: list[Op] = [Assign(info.timer, whole(0)) for info in ending if info.timer]
     ops += leave(automaton, source, target)
     mode = mode_variable("memory.mode", transition.region)
@@ -215,6 +229,10 @@ def _taken(
 
 def _is_continued(automaton: Automaton, mode: Mode) -> bool:
     """Tell whether some transition enters a mode with its counters as they were."""
-    others = automaton.region(mode.region).modes.values()
-    ways = [way for other in others for way in other.transitions]
-    return any(way.memory == "continue" and way.target == mode.name for way in ways)
+    return (mode.region, mode.name) in _continued(automaton)
+
+
+@once
+def _continued(automaton: Automaton) -> frozenset[tuple[str, str]]:
+    ways = [way for mode in automaton.all_modes for way in mode.transitions]
+    return frozenset((way.region, way.target) for way in ways if way.memory == "continue")

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from language.lower import Names, expression
-from language.memory import Edge, edges_of
+from language.memory import Edge, edges_by_mode, edges_of
 from language.model import Automaton, Mode
 from language.operation import Assign, Binary, Block, Compare, Expr, Op, Ref, Unary, Value
 from language.program import Variable
@@ -53,7 +53,7 @@ def settled(automaton: Automaton) -> Block:
 
 def forgotten(automaton: Automaton, mode: Mode | None = None) -> Block:
     """Return what ends with an activation of a mode; of all modes at the start."""
-    edges = [edge for edge in edges_of(automaton) if mode is None or edge.mode == mode.key]
+    edges = edges_by_mode(automaton).get(mode.key, ()) if mode else edges_of(automaton)
     return tuple(Assign(_last(edge).name, Value(True)) for edge in edges)
 
 

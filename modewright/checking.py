@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from language.calibration import read_calibration
 from language.document import Document, Scalar
 from language.effect import read_effect
-from language.load import automaton_of, program_of
+from language.load import automaton_of, lowered
 from language.map import read_map
 from language.numbers_text import motion_lines
 from language.problem import Problem, Problems, SpecError
@@ -19,20 +20,38 @@ from language.system import read_system
 from sweep.study_reader import read_study
 
 
+@dataclass(frozen=True)
+class Checked:
+    """All problems of a spec, warnings too; of an automaton the limits of its step, as lines."""
+
+    problems: tuple[Problem, ...]
+    limits: tuple[str, ...] = ()
+
+
 def check(reference: str, root: Path | None = None) -> list[Problem]:
     """Return all problems of a spec, warnings too; an empty list means that it is fine."""
+    return list(checked(reference, root).problems)
+
+
+def checked(reference: str, root: Path | None = None) -> Checked:
+    """Return all problems of a spec, and the largest stable step of each mode of an automaton."""
     project = Project(root or Path())
     problems = Problems()
+    limits: tuple[str, ...] = ()
     try:
         document = read_document(project.path_of(reference))
-        if document.kind == "calibration":
+        is_calibration = document.kind == "calibration"
+        if is_calibration:
             document = _calibrated(document, reference, project, problems)
         base = expanded(document, project, problems)
         if base.kind == "automaton":
-            program_of(automaton_of(document, project, problems=problems))
+            motion = lowered(automaton_of(document, project, problems=problems)).motion
+            if motion and motion.limits and not is_calibration:
+                first, *others = motion_lines(motion)
+                limits = (f"{document.name}: {first}", *others)
         elif base.kind == "system":
             for instance in read_system(document, project).instances.values():
-                program_of(instance.automaton)
+                lowered(instance.automaton)
         elif base.kind == "map":
             read_map(document, project)
         elif base.kind == "effect":
@@ -43,19 +62,8 @@ def check(reference: str, root: Path | None = None) -> list[Problem]:
         else:
             _check_scenario(reference, project)
     except SpecError as error:
-        return list(dict.fromkeys(error.problems))
-    return list(dict.fromkeys(problems.found))
-
-
-def limits(reference: str, root: Path | None = None) -> list[str]:
-    """Return the largest stable step of each mode of an automaton, also where it holds."""
-    project = Project(root or Path())
-    document = read_document(project.path_of(reference))
-    if document.kind == "calibration" or expanded(document, project).kind != "automaton":
-        return []
-    motion = program_of(automaton_of(document, project)).motion
-    lines = list(motion_lines(motion)) if motion and motion.limits else []
-    return [f"{document.name}: {lines[0]}", *lines[1:]] if lines else []
+        return Checked(tuple(dict.fromkeys(error.problems)))
+    return Checked(tuple(dict.fromkeys(problems.found)), limits)
 
 
 def _calibrated(

@@ -33,11 +33,12 @@ def check(
     )
     if not names:
         raise typer.BadParameter("name a spec, or use --all", param_hint="SPECS")
-    problems = ordered(problem for name in names for problem in checking.check(name))
+    found = [checking.checked(name) for name in names]
+    problems = ordered(problem for each in found for problem in each.problems)
     errors = [problem for problem in problems if problem.severity == "error"]
     if as_json:
-        found = [checking.problem_json(problem) for problem in problems]
-        print(json.dumps({"problems": found}, indent=2, allow_nan=False))
+        told = [checking.problem_json(problem) for problem in problems]
+        print(json.dumps({"problems": told}, indent=2, allow_nan=False))
     elif problems:
         print(render_all(problems[:MOST_SHOWN]), file=sys.stderr)
         if len(problems) > MOST_SHOWN:
@@ -46,6 +47,6 @@ def check(
         console().print(f"{counted(len(names), 'spec')} checked, {counted(len(errors), 'problem')}")
     if errors:
         raise typer.Exit(PROBLEMS)
-    for name in specs or [] if not as_json else ():
-        for line in checking.limits(name):
+    for each in found[: len(specs or [])] if not as_json else ():
+        for line in each.limits:
             console().print(line, soft_wrap=True, highlight=False, markup=False)
