@@ -242,18 +242,20 @@ class ContinuousRun:
     def _look_inside(
         self, start: Fraction, stop: Fraction, states: Sequence[float], age: float
     ) -> None:
-        """Look at times inside the flow that was just done: from its start by the method alone.
+        """Look at times inside the flow that was just done, on the polynomial of its method.
 
         So what is recorded has no influence: states and inputs are put back as they were.
         """
         ends, end_age = self._read_states(), self._records.age()
+        self._put(states)
+        self._around.aim(start, stop)
+        self.stepper.run("latch")
+        self._records.put_age(age)
+        self.stepper.run("dense")
         while self._looks and self._looks[0] < self.time:
             time = self._looks.popleft()
             self._put(states)
-            self._around.aim(start, stop)
-            self.stepper.run("latch")
-            self._records.put_age(age)
-            self.stepper.set("work.h", float(time - start))
+            self.stepper.set("work.s", float(time - start))
             self.stepper.run("peek")
             self._records.put_age(age + float(time - start))
             self._look(time)

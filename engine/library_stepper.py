@@ -29,7 +29,18 @@ Path = Callable[[float], Point]
 """The states in SI at a time [s] since the start of a flow."""
 Reals = NDArray[np.float64]
 
-OWN_MOTION = ("flow", "peek", "point", "move_", "step", "series_", "locate_", "segment", "settle")
+OWN_MOTION = (
+    "flow",
+    "dense",
+    "peek",
+    "point",
+    "move_",
+    "step",
+    "series_",
+    "locate_",
+    "segment",
+    "settle",
+)
 """What the blocks that integrate or locate are named, or how their names begin."""
 RTOL = 1e-11
 """Local error per step over the largest value so far: 2^-53 with five digits for sums of steps."""
@@ -103,7 +114,9 @@ class LibraryStepper:
         if block == "flow":
             self._flow(self.get("work.h"))
         elif block == "peek":
-            self._peek(self.get("work.h"))
+            self._peek(self.get("work.s"))
+        elif block == "dense":
+            return
         else:
             self._inner.run(block)
 

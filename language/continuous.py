@@ -3,8 +3,9 @@
 Entries: `step` is one major step (language/stepping.py) and what the C has, after `init`. An engine
 runs its parts: `start` (start values from the inputs), `equations` (the values of now), `watch`
 (what each guard is now), `jump` (one micro-step: `memory.fired` is the transition, 0 if none),
-`flow` (states over `work.h`, up to the first change of a guard, after `work.elapsed`); and `peek`
-(states over `work.h`, whatever the guards do: to look at a point inside a step without ending it).
+`flow` (states over `work.h`, up to the first change of a guard, after `work.elapsed`); and `dense`,
+`peek`: with the states as they were at its start, what they were `work.s` after it, on the method's
+own polynomial (Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.6).
 
 The inputs that hold are `before.u`: `latch` takes those of now, at the end of a step.
 An input that varies inside a step is `before.u + s (work.rise_u + s work.bend_u)` at the time s of
@@ -49,11 +50,13 @@ from language.operation import (
     Assign,
     Binary,
     Block,
+    Branch,
     Choose,
     Expr,
     Loop,
     Ref,
     Run,
+    Unary,
     Value,
     add,
     multiply,
@@ -101,6 +104,7 @@ PARTS = (
     "limit",
     "flow",
     "elapse",
+    "dense",
     "peek",
     "record",
     INVARIANTS,
@@ -248,7 +252,8 @@ def _entries(
 ) -> dict[str, Block]:
     automaton = field.automaton
     now = (*at_state(field), *at_time(field, real(0.0)))
-    ends = [Assign(f"state.{name}", Ref(f"work.end_{name}")) for name in field.states]
+    ends = [Assign(f"state.{name}", Ref(f"work.at_{name}")) for name in field.states]
+    modes = automaton.modes.values()
     at_start = at_time(field, real(0.0))
     evaluate: Block = (*at_start, by_mode(field, "equations"))
     whole_known = {**known, **equation_names(automaton, "equation.")}
@@ -283,8 +288,16 @@ def _entries(
         "watch": (*now, Choose("memory.mode", watch), Run("load")),
         "jump": (*none_fired(automaton), *now, by_mode(field, "jump")),
         "flow": (by_mode(field, "move"),),
-        "peek": (by_mode(field, "step"), *ends),
+        "dense": (Choose(field.mode, tuple((m.number, _dense(m)) for m in modes)),),
+        "peek": (Run("point"), *ends),
     }
+
+
+def _dense(mode: Mode) -> Block:
+    """The polynomial of the flow that was just done, where no crossing was looked for on it."""
+    run: Block = (Run(f"series_{mode.name}"),)
+    is_known = Binary("or", Ref("work.crossed"), Ref("work.is_wait"))
+    return (Branch(Unary("not", is_known), run),) if slots(mode) else run
 
 
 def _watch(automaton: Automaton, mode: Mode) -> Block:

@@ -45,6 +45,8 @@ RUN_HALVINGS = 24
 FLOW_HALVINGS: Mapping[NumberType, int] = {"float64": 44, "float32": 24}
 """Halvings of a continuous automaton's step: 1 ms / 2^44 is below one ULP of a time of 1 s. In
 float32 the times within a step have 24 bits: from then on the middle is one of the two ends."""
+MOST_WRITTEN_OUT = 4
+"""Terms of a polynomial that is written out; a longer one is a loop."""
 
 Armed = Mapping[str, str]
 
@@ -115,6 +117,8 @@ def motion_variables(field: Field, method: Method) -> list[Variable]:
 def _point(field: Field, terms: int) -> Block:
     """The polynomial x(s) = x0 + s (d0 + s (d1 + ...)) at `work.s`, by Horner's rule."""
     s = Ref("work.s")
+    if terms <= MOST_WRITTEN_OUT:
+        return tuple(_written_out(name, terms) for name in field.states)
     first: list[Op] = [Assign(f"work.sum_{name}", real(0.0)) for name in field.states]
     index = subtract(whole(terms - 1), Ref("work.term"))
     body: list[Op] = []
@@ -125,6 +129,14 @@ def _point(field: Field, terms: int) -> Block:
         body.append(Assign(f"work.sum_{name}", value))
         last.append(Assign(f"work.at_{name}", add(Ref(f"state.{name}"), multiply(s, total))))
     return (*first, Loop(terms, "work.term", tuple(body)), *last)
+
+
+def _written_out(name: str, terms: int) -> Assign:
+    s, series = Ref("work.s"), f"work.series_{name}"
+    total: Expr = Item(series, whole(terms - 1))
+    for term in reversed(range(terms - 1)):
+        total = add(multiply(total, s), Item(series, whole(term)))
+    return Assign(f"work.at_{name}", add(Ref(f"state.{name}"), multiply(s, total)))
 
 
 def _locate(field: Field, mode: Mode, crossed: Expr, halvings: int, merge: Expr) -> Block:

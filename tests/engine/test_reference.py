@@ -245,6 +245,7 @@ def test_no_block_of_ours_that_integrates_or_locates_is_kept(
     verbs = {name.partition("_")[0] for name in program.blocks if name not in kept}
     assert verbs == {
         "flow",
+        "dense",
         "peek",
         "point",
         "move",
