@@ -23,7 +23,7 @@ for python in $(PYTHON) python3 python3.14 python3.13 python3.12 python3.11 ""; 
 done
 endef
 
-.PHONY: help setup demo test verify verify-part check format generate lock clean
+.PHONY: help setup demo test verify verify-part bench check format generate lock clean
 .PHONY: check-lock check-format check-lint check-types check-floors check-specs check-generated
 
 help: ## list the targets
@@ -63,6 +63,9 @@ verify-part: setup ## measure a fixed part of the figures, as CI does
 	$(BIN)/python tests/verify/lockstep_bits.py --ticks 50000
 	$(BIN)/python tests/verify/random_specs.py --specs 20
 	$(BIN)/python tests/verify/command_line.py
+
+bench: setup ## measure speed against rivals; with ARGS="--peers diffrax,pathsim" those too
+	$(BIN)/python tests/bench/run.py $(ARGS)
 
 check: check-lock check-format check-lint check-types ## run all checks
 check: check-floors check-specs check-generated

@@ -170,6 +170,7 @@ class ContinuousRun:
             return False
         (now, _), (last, is_beyond) = cruise.place(self.time), cruise.place(horizon)
         is_begun = False
+        self.stepper.run("latch")
         while now < last and not is_begun:
             look, is_inside = cruise.place(self._looks[0]) if self._looks else (last, True)
             if look == now:

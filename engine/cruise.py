@@ -32,11 +32,11 @@ class Cruise:
     def go(self, step: int, last: int) -> tuple[int, bool]:
         """Go from one major step to another; return the one reached, and whether more was done.
 
-        That is the first segment of a step in which something happens: it flowed and elapsed.
+        That is the first segment of a step in which something happens: it flowed and elapsed. The
+        inputs are latched.
         """
         run, put, h = self._stepper.run, self._stepper.set, self._h
         is_inside, happened = self._ranges.is_inside, self._happened
-        run("latch")
         while step < last:
             put("work.left", h)
             run("limit")

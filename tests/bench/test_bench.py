@@ -1,0 +1,51 @@
+"""The benchmark runs, and its rivals in C are the ones that were given."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+
+import pytest
+
+from tests.bench import figures, run, timing
+from tests.bench.in_c import HERE, PEERS
+from tests.bench.manoeuvre import Manoeuvre
+
+
+def test_the_rivals_in_c_are_those_that_were_given() -> None:
+    listed = {}
+    for line in (HERE / "peers.sha256").read_text().splitlines():
+        digest, _, name = line.partition("  ")
+        listed[name] = digest
+    found = {p.name: hashlib.sha256(p.read_bytes()).hexdigest() for p in PEERS.iterdir()}
+    assert found == listed
+
+
+def test_a_small_run_has_every_figure_with_its_errors(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    short = Manoeuvre("short", step_ms=20, horizon_ms=80)
+    monkeypatch.setattr(figures, "TIP_OUT", short)
+    monkeypatch.setattr(figures, "CHATTER", short)
+    monkeypatch.setattr(figures, "STEPS", ("2 ms",))
+    monkeypatch.setattr(timing, "SHORTEST", 0.0)
+    path = tmp_path / "bench.json"
+    assert run.main(["--pairs", "1", "--out", str(path)]) == 0
+    found = json.loads(path.read_text())
+    for group in ("single_run", "sweep"):
+        for ratio in found.get(group, {}).values():
+            assert 0.0 < ratio["low"] <= ratio["median"] <= ratio["high"]
+    assert found["single_run"]["interpreter_over_scipy"]["errors"]["scipy"]["is_complete"]
+    for side in ("modewright", "c"):
+        errors = found["accuracy"]["2 ms"]["short"][side]
+        assert errors["is_complete"]
+        assert errors["events"] == 2
+        assert 0.0 < errors["late"] < 1e-6
+        assert 0.0 < errors["rms"] <= errors["largest"] < 1e-6
+    assert "interpreter_over_scipy" in capsys.readouterr().out
+
+
+def test_a_ratio_is_the_median_of_pairs_with_its_quartiles() -> None:
+    assert timing.quartiles([3.0, 1.0, 2.0, 5.0, 4.0]) == (2.0, 3.0, 4.0)
+    assert timing.quartiles([7.0]) == (7.0, 7.0, 7.0)
