@@ -8,6 +8,8 @@ import numpy as np
 
 SMALLEST_ERROR, LARGEST_ERROR = 0.05, 0.20
 """Relative error of the uncertain values: what a data sheet is usually wrong by."""
+SHARPNESS = (0.15, 0.35)
+"""Range of w_0 [rad/s]."""
 UNCERTAIN = ("J_em", "k", "c", "alpha", "b_em", "J_v", "b_w", "f0", "cd2")
 
 
@@ -37,13 +39,18 @@ class Driveline:
     """Drag over the square of the wheel speed [N*m*s^2/rad^2]."""
     tau_f: float = 0.010
     """Time constant of the wheel-speed sensor [s]."""
+    w_0: float = 0.2
+    """Wheel speed over which a force that opposes the motion changes its sign [rad/s]."""
 
 
 NOMINAL = Driveline()
 
 
 def perturbed(driveline: Driveline, generator: np.random.Generator) -> Driveline:
-    """Return the driveline with each uncertain value 5 to 20 % too large or too small."""
+    """Return the driveline with each uncertain value 5 to 20 % too large or too small.
+
+    How sharply forces change their sign at standstill is drawn as well: no data sheet tells it.
+    """
     errors = generator.uniform(SMALLEST_ERROR, LARGEST_ERROR, len(UNCERTAIN))
     signs = generator.choice((-1.0, 1.0), len(UNCERTAIN))
     factors = (1.0 + errors * signs).tolist()
@@ -51,7 +58,7 @@ def perturbed(driveline: Driveline, generator: np.random.Generator) -> Driveline
         name: getattr(driveline, name) * factor
         for name, factor in zip(UNCERTAIN, factors, strict=True)
     }
-    return replace(driveline, **values)
+    return replace(driveline, **values, w_0=float(generator.uniform(*SHARPNESS)))
 
 
 def columns_of(drivelines: list[Driveline]) -> dict[str, np.ndarray]:

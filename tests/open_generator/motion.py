@@ -22,8 +22,6 @@ STEP = 0.00025
 W_EM, W_W, TWIST, GAP, ANGLE_EM, ANGLE_W = range(6)
 """Rows of the state: motor and wheel speed [rad/s]; twist of shaft and gap together, gap angle,
 motor and wheel angle [rad]."""
-STANDING = 0.3
-"""Wheel speed over which a force that opposes the motion is smoothed [rad/s]."""
 STAGES = ("actuator", "upstream", "shaft", "reaction", "friction", "memory", "vehicle")
 
 
@@ -166,7 +164,7 @@ def _evaluate(middle: Middle, functions: dict[str, list[Part]]) -> None:
     _run(functions["reaction"], middle)
     middle.friction[:] = base["b_em"] * w_em
     _run(functions["friction"], middle)
-    sense = np.tanh(w_w / STANDING)
+    sense = np.tanh(w_w / base["w_0"])
     middle.brake[:] *= sense
     rate[W_EM] = (middle.torque - middle.friction - middle.reaction / base["R"]) / base["J_em"]
     resistance = base["f0"] * sense + w_w * (base["b_w"] + base["cd2"] * np.abs(w_w))

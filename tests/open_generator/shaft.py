@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from tests.open_generator.driveline import Driveline
-from tests.open_generator.effect import Effect, Floats, Parameters
-from tests.open_generator.motion import ANGLE_W, GAP, TWIST, W_EM, Middle, Part, Parts
+from tests.open_generator.effect import Effect, Floats, Parameters, either_sign
+from tests.open_generator.motion import ANGLE_W, GAP, TWIST, W_EM, W_W, Middle, Part, Parts
 
 PLACE = "elements.half_shaft"
 SLIDERS = (0.4, 1.0, 2.2)
@@ -64,6 +66,43 @@ def _hysteresis(p: Parameters, driveline: Driveline) -> Parts:
         return {"shaft": shaft, "memory": memory}
 
     return Parts((False,) * len(SLIDERS), bind)
+
+
+def _left_shaft(driveline: Driveline, p: Parameters) -> Driveline:
+    """Make the driveline's own shaft the left one."""
+    left = 0.5 * (1.0 + p["inequality"])
+    return replace(
+        driveline,
+        k=left * driveline.k,
+        c=left * driveline.c,
+        alpha=driveline.alpha * (1.0 - p["gap_inequality"]),
+    )
+
+
+def _right_shaft(p: Parameters, driveline: Driveline) -> Parts:
+    """Two half-shafts of unequal stiffness and play, side by side; the right one added here.
+
+    Its gap moves as that of the base, by the model of Nordin, Galic, Gutman 1997.
+    """
+    left = 0.5 * (1.0 + p["inequality"])
+    k, c = (value * (1.0 - left) / left for value in (driveline.k, driveline.c))
+    alpha = driveline.alpha * (1.0 + p["gap_inequality"]) / (1.0 - p["gap_inequality"])
+
+    def bind(columns: slice, row: int) -> dict[str, Part]:
+        def reaction(middle: Middle) -> None:
+            step, gap = middle.step, middle.start[row, columns]
+            speed = middle.upstream[columns] - middle.state[W_W, columns]
+            spring = k * (middle.state[TWIST, columns] - gap)
+            free = (c * speed + spring) / (c + 0.5 * k * step)
+            closing = np.clip(free, (-alpha - gap) / step, (alpha - gap) / step)
+            torque = spring + c * speed - (c + 0.5 * k * step) * closing
+            middle.rate[row, columns] = closing
+            middle.shaft[columns] += torque
+            middle.reaction[columns] += torque
+
+        return {"reaction": reaction}
+
+    return Parts((False,), bind)
 
 
 def _second_gap(p: Parameters, driveline: Driveline) -> Parts:
@@ -126,6 +165,16 @@ def _draw_mount(generator: np.random.Generator, strength: float) -> Parameters:
 
 
 SHAFT = (
+    Effect(
+        "unequal_half_shafts",
+        PLACE,
+        lambda g, s: {
+            "inequality": s * either_sign(g) * g.uniform(0.15, 0.40),
+            "gap_inequality": s * g.uniform(0.4, 0.8),
+        },
+        driveline=_left_shaft,
+        parts=_right_shaft,
+    ),
     Effect(
         "second_gap",
         PLACE,

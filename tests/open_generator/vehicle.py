@@ -6,7 +6,7 @@ import numpy as np
 
 from tests.open_generator.driveline import Driveline
 from tests.open_generator.effect import Effect, Floats, Parameters
-from tests.open_generator.motion import STANDING, W_W, Middle, Part, Parts
+from tests.open_generator.motion import W_W, Middle, Part, Parts
 
 PLACE = "elements.vehicle"
 
@@ -18,7 +18,9 @@ def _split(middle: Middle, columns: slice, body: Floats, tyre: Floats, inertia: 
     loss = middle.brake[columns] + base["b_w"][columns] * wheel
     middle.rate[W_W, columns] = (middle.shaft[columns] - loss - tyre) / inertia
     drag = base["cd2"][columns] * body * np.abs(body)
-    resistance = base["f0"][columns] * np.tanh(body / STANDING) + drag + middle.road[columns]
+    resistance = (
+        base["f0"][columns] * np.tanh(body / base["w_0"][columns]) + drag + middle.road[columns]
+    )
     return np.asarray((tyre - resistance) / (base["J_v"][columns] - inertia))
 
 
