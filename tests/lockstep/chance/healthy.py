@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from engine.closures import Compiler
 from language.number import NUMBERS
 from language.program import Program
 from lockstep.compare import Tape, Verdict, judged
@@ -67,6 +68,7 @@ def killed_by(
 def _differs(mutant: Mutant, one: Healthy, ticks: int, patch: pytest.MonkeyPatch) -> bool:
     with patch.context() as patched:
         mutant.patch(patched)
+        patched.setattr("engine.interpreter._closures_of", lambda same: Compiler(same.program))
         tape = taped(one.spec, one.program, ticks, mutant.rewrite(one.program))
     # A run that is stopped earlier differs as well.
     return len(tape.values) != len(one.tape.values) or not judged(tape, one.output).is_equal

@@ -17,7 +17,8 @@ from language.operation import Assign, Binary, Block, Branch, Compare, Expr, Op,
 from language.program import Program, Variable
 from tests.lockstep.chance.mutant import Mutant, Patch, attribute, changed, item, lines_without
 
-CLOSURES = "engine.closures"
+ACTIONS = "engine.actions"
+SHAPES = "engine.shapes"
 
 
 def _elementary(name: str, function: Callable[..., Any]) -> Patch:
@@ -35,6 +36,26 @@ def _elementary(name: str, function: Callable[..., Any]) -> Patch:
     return apply
 
 
+def _relation(name: str, wrong: Callable[[Any, Any], bool]) -> Patch:
+    """A relation that is wrong, whatever its operands are read from."""
+    slot, read = (lambda v, a: v[a]), (lambda v, a: a(v))
+    shapes = {
+        "SLOTS": (slot, slot),
+        "SLOT_READ": (slot, read),
+        "READ_SLOT": (read, slot),
+        "READS": (read, read),
+    }
+
+    def made(first: Any, second: Any) -> Any:
+        return lambda a, b: lambda v: wrong(first(v, a), second(v, b))
+
+    def apply(patch: pytest.MonkeyPatch) -> None:
+        for shape, operands in shapes.items():
+            item(f"{SHAPES}.{shape}", name, made(*operands))(patch)
+
+    return apply
+
+
 def _count(late: int, is_kept: bool) -> Callable[..., Any]:
     def count(slot: int, condition: Any, limit: int) -> Any:
         def act(v: list[Any]) -> None:
@@ -48,19 +69,18 @@ def _count(late: int, is_kept: bool) -> Callable[..., Any]:
     return count
 
 
-def _overwritten(slot: int, bit: int, signal: str, left: dict[str, None]) -> Any:
+def _overwritten(slot: int, bit: int, signal: str, left: int) -> Any:
     def act(v: list[Any]) -> None:
         v[slot] = bit
 
     return act
 
 
-def _short_loop(count: int, slot: int, body: list[Any]) -> Any:
+def _short_loop(count: int, slot: int, body: Callable[[list[Any]], None]) -> Any:
     def act(v: list[Any]) -> None:
         for index in range(count - 1):
             v[slot] = index
-            for action in body:
-                action(v)
+            body(v)
 
     return act
 
@@ -141,32 +161,32 @@ INTERPRETER = (
     Mutant(
         "the relation > holds on equality too",
         "interpreter",
-        item(f"{CLOSURES}._BINARY", ">", lambda a, b: lambda v: a(v) >= b(v)),
+        _relation(">", lambda a, b: a >= b),
     ),
     Mutant(
         "the relation <= fails on equality",
         "interpreter",
-        item(f"{CLOSURES}._BINARY", "<=", lambda a, b: lambda v: a(v) < b(v)),
+        _relation("<=", lambda a, b: a < b),
     ),
     Mutant(
         "a counter stops one short",
         "interpreter",
-        attribute(f"{CLOSURES}._count", _count(1, False)),
+        attribute(f"{ACTIONS}.count", _count(1, False)),
     ),
     Mutant(
-        "a counter is not cleared", "interpreter", attribute(f"{CLOSURES}._count", _count(0, True))
+        "a counter is not cleared", "interpreter", attribute(f"{ACTIONS}.count", _count(0, True))
     ),
     Mutant(
         "a fault bit wipes out the others",
         "interpreter",
-        attribute(f"{CLOSURES}._fault", _overwritten),
+        attribute(f"{ACTIONS}.fault", _overwritten),
     ),
     Mutant(
         "a fault bit that is not latched stays",
         "interpreter",
-        attribute(f"{CLOSURES}._clear", lambda slot, bit: lambda v: None),
+        attribute(f"{ACTIONS}.clear", lambda slot, bit: lambda v: None),
     ),
-    Mutant("a loop ends one short", "interpreter", attribute(f"{CLOSURES}._loop", _short_loop)),
+    Mutant("a loop ends one short", "interpreter", attribute(f"{ACTIONS}.loop", _short_loop)),
     Mutant(
         "min takes the second of equals",
         "interpreter",
