@@ -1,1 +1,1 @@
-"""Diagnosis: recordings against simulation."""
+"""Diagnosis: recordings against simulation - locate the mismatch, name the physics, model it."""

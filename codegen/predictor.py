@@ -1,0 +1,172 @@
+"""Predictor: a continuous automaton in C that follows recorded signals, corrected by a gain."""
+
+from __future__ import annotations
+
+import ctypes
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen.build import FLAGS, WARNINGS, compile_program, compiler, compiler_version, tunable
+from codegen.cache import key_of, stored
+from codegen.names import c_member, c_type
+from codegen.rendering import render
+from codegen.source import c_files
+from language.program import Program, short
+
+Reals = NDArray[np.float64]
+LIBRARY_FLAGS = (*FLAGS, "-shared", "-fPIC")
+
+
+@dataclass(frozen=True)
+class Columns:
+    """What the arrays of a predictor hold, in their order: names, and `page` with its defaults."""
+
+    name: str
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    input_types: tuple[str, ...]
+    seen: tuple[str, ...]
+    modes: tuple[int, ...]
+    page: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """What a run gave: `innovations` (samples, seen); `states` (samples, states), `modes`
+    (samples,); `done` samples before a value left all bounds.
+    """
+
+    innovations: Reals
+    states: Reals
+    modes: NDArray[np.int16]
+    done: int
+
+
+def columns_of(program: Program, seen: Sequence[str]) -> Columns:
+    """Return the columns of a Program whose outputs `seen` are compared with recordings."""
+    return Columns(
+        program.name,
+        tuple(short(v.name) for v in program.variables if v.name.startswith("state.")),
+        tuple(short(v.name) for v in program.inputs),
+        tuple(c_type(v, program.number) for v in program.inputs),
+        tuple(seen),
+        tuple(mode.number for mode in program.modes),
+        {short(c.name): c.value for c in tunable(program)},
+    )
+
+
+class Predictor:
+    """A loaded library with the names of its arrays' columns."""
+
+    def __init__(self, columns: Columns, library: Path) -> None:
+        """Load a library that `built` made."""
+        self.columns = columns
+        self.states = columns.states
+        self.seen = columns.seen
+        self.inputs = columns.inputs
+        self.modes = columns.modes
+        self.page = columns.page
+        self._library = _loaded(library)
+
+    def advance(
+        self, page: Reals, inputs: Reals, mode: int, substeps: int, states: Reals
+    ) -> tuple[Reals, Reals]:
+        """Return the states `substeps` major steps later, and what is then seen."""
+        to, seen = np.empty(len(self.states)), np.empty(len(self.seen))
+        self._library.modewright_advance(
+            _at(page), _at(inputs), mode, substeps, _at(states), _at(to), _at(seen)
+        )
+        return to, seen
+
+    def predict(
+        self,
+        page: Reals,
+        inputs: Reals,
+        measured: Reals,
+        first_gains: Reals,
+        gains: Reals,
+        substeps: int,
+        linear: bool,
+    ) -> Prediction:
+        """Follow a recording; arrays are C-contiguous; inputs are held, or `linear` in between.
+
+        `page` (tunables,), `inputs` (samples, inputs), `measured` (samples, seen) with NaN where
+        nothing is known, `first_gains` (first, states, seen), `gains` (modes, states, seen).
+        """
+        samples = len(inputs)
+        innovations = np.full((samples, len(self.seen)), np.nan)
+        states = np.empty((samples, len(self.states)))
+        modes = np.zeros(samples, dtype=np.int16)
+        done = self._library.modewright_predict(
+            _at(page),
+            _at(inputs),
+            _at(measured),
+            _at(first_gains),
+            len(first_gains),
+            _at(gains),
+            samples,
+            substeps,
+            int(linear),
+            _at(innovations),
+            _at(states),
+            modes.ctypes.data,
+        )
+        return Prediction(innovations, states, modes, int(done))
+
+
+def _at(values: Reals) -> int:
+    return int(values.ctypes.data)
+
+
+@contextmanager
+def built(program: Program, columns: Columns) -> Iterator[Path]:
+    """Give the library of a Program, kept from an earlier run if there was one.
+
+    Raises ToolMissing, BuildError.
+    """
+    with tempfile.TemporaryDirectory(prefix="modewright-") as name:
+        folder = Path(name)
+        files = {**c_files(program), "predictor.c": render("predictor.c.jinja", _context(columns))}
+        for file, text in files.items():
+            (folder / file).write_text(text)
+        sources = [folder / file for file in files if file.endswith(".c")]
+        command = [*compiler(), *LIBRARY_FLAGS, *WARNINGS]
+        key = key_of(sources, command, compiler_version())
+        yield stored(key, lambda made: compile_program(sources, made, LIBRARY_FLAGS), folder)
+
+
+def _loaded(path: Path) -> Any:
+    library = ctypes.CDLL(str(path))
+    pointer, whole = ctypes.c_void_p, ctypes.c_long
+    library.modewright_advance.argtypes = [
+        *(pointer, pointer, ctypes.c_int, whole),
+        *(pointer, pointer, pointer),
+    ]
+    library.modewright_advance.restype = None
+    library.modewright_predict.argtypes = [
+        *(pointer, pointer, pointer, pointer, whole, pointer),
+        *(whole, whole, ctypes.c_int, pointer, pointer, pointer),
+    ]
+    library.modewright_predict.restype = whole
+    return library
+
+
+def _context(columns: Columns) -> dict[str, object]:
+    return {
+        "name": columns.name,
+        "states": columns.states,
+        "seen": columns.seen,
+        "modes": columns.modes,
+        "page": [c_member(f"calibration.{name}") for name in columns.page],
+        "inputs": [
+            {"member": name, "type": kind}
+            for name, kind in zip(columns.inputs, columns.input_types, strict=True)
+        ],
+    }

@@ -1,0 +1,133 @@
+"""Candidate: a model with layers, compiled, with the parameters that a fit may move."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen.predictor import Predictor, built, columns_of
+from diagnosis.layers import DRIFT, Layer, automaton, stepped
+from diagnosis.recipe import Recipe, kept, node_text, recipe_key
+from diagnosis.series import Series
+from diagnosis.uncertain import Uncertain, uncertain_of
+from language.declaration import Formula, Parameter
+from language.document import Document
+from language.effect import own_names
+from language.model import Automaton
+from language.project import Project
+from language.syntax import Name
+
+Reals = NDArray[np.float64]
+START = "start_of_{}"
+"""The tunable that the start value of a compared state becomes."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A compiled model: `layers` over the base, its recipe, and its library."""
+
+    layers: tuple[Layer, ...]
+    recipe: Recipe
+    predictor: Predictor
+
+    @property
+    def uncertain(self) -> tuple[Uncertain, ...]:
+        """The parameters that a fit may move."""
+        return self.recipe.uncertain
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of the uncertain parameters."""
+        return tuple(one.name for one in self.uncertain)
+
+    @property
+    def drifts(self) -> tuple[str, ...]:
+        """The states that drift."""
+        return self.recipe.drifts
+
+    @property
+    def spans(self) -> Reals:
+        """The width of the range of each state (states,), 1 where it has none."""
+        return np.array(self.recipe.spans)
+
+    def page(self, values: Mapping[str, float], series: Series) -> Reals:
+        """Return the calibration for one recording: values, and where its states start."""
+        known = {**self.predictor.page, **values}
+        for column, name in enumerate(self.predictor.seen):
+            fresh = START.format(name)
+            if fresh in known:
+                first = series.measured[:, column]
+                first = first[np.isfinite(first)]
+                known[fresh] = float(first[0]) if len(first) else known[fresh]
+        return np.array([known[name] for name in self.predictor.page])
+
+
+def candidate(
+    document: Document,
+    project: Project,
+    layers: Sequence[Layer],
+    drifts: Sequence[Layer],
+    seen: Sequence[str],
+    period: Fraction,
+) -> Candidate:
+    """Return the base with layers and drifts, compiled for a period [s] between samples.
+
+    Raises SpecError, ToolMissing.
+    """
+    all_layers = [*layers, *drifts]
+    parts = [f"{layer.id} {layer.ending} {node_text(layer.effect.body)}" for layer in all_layers]
+    key = recipe_key(node_text(document.root), *parts, *seen, str(period))
+
+    def make() -> tuple[Recipe, bytes]:
+        made = automaton(document, project, all_layers)
+        return _compiled(made, layers, drifts, seen, period)
+
+    recipe, library = kept(key, make)
+    return Candidate(tuple(layers), recipe, Predictor(recipe.columns, library))
+
+
+def _compiled(
+    made: Automaton,
+    layers: Sequence[Layer],
+    drifts: Sequence[Layer],
+    seen: Sequence[str],
+    period: Fraction,
+) -> tuple[Recipe, bytes]:
+    brought = [layer.named(name) for layer in layers for name in own_names(layer.effect.body)]
+    uncertain = uncertain_of(made, brought)
+    started = _with_starts(made, seen)
+    starts = [name for name in started.parameters if name not in made.parameters]
+    program, substeps = stepped(started, [*(one.name for one in uncertain), *starts], period)
+    columns = columns_of(program, seen)
+    ranges = [made.states[name].range for name in columns.states]
+    recipe = Recipe(
+        columns,
+        substeps,
+        tuple(float(r[1] - r[0]) if r else 1.0 for r in ranges),
+        uncertain,
+        tuple(layer.named(DRIFT) for layer in drifts),
+        tuple(float(made.parameters[layer.named("memory")].value or 1) for layer in drifts),
+    )
+    with built(program, columns) as library:
+        return recipe, library.read_bytes()
+
+
+def _with_starts(given: Automaton, seen: Sequence[str]) -> Automaton:
+    """Return an automaton in which each compared state starts at a tunable of its own."""
+    parameters, states = dict(given.parameters), dict(given.states)
+    for output in seen:
+        state = states.get(given.source_of(output))
+        if state is not None and state.name == output:
+            fresh = START.format(output)
+            key, span = f"parameters.{fresh}", state.span
+            parameters[fresh] = Parameter(
+                fresh, "fixed", state.unit, Fraction(0), None, None, key, span
+            )
+            formula = Formula(Name(fresh, span), state.initial.key)
+            states[output] = dataclasses.replace(state, initial=formula)
+    return dataclasses.replace(given, parameters=parameters, states=states)

@@ -1,0 +1,129 @@
+"""Estimation: the parameters of a candidate by prediction errors, with priors, within their ranges.
+
+Levenberg-Marquardt on the concentrated likelihood: N/2 log(mean square innovation) per channel
+plus half the squares of the coordinates. The gains are held while a step is sought, and made anew
+from the model at its end.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from diagnosis.candidate import Candidate
+from diagnosis.normal import Normal, foreseen, normal_of, stepped
+from diagnosis.point import Point, point_of, values_at
+from diagnosis.prediction import Gains, Noises, Outcome, gains_of, predicted
+from diagnosis.series import Series
+
+MOST_ROUNDS = 15
+ENOUGH = 0.3
+"""A round that gains less than this [nats] is the last."""
+FIRST_DAMPING = 1e-3
+LARGEST_DAMPING = 1e5
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A candidate at a point: cost [nats] with priors, and how it foresees the recordings.
+
+    `normal` are the normal equations of the last round, None before the first.
+    """
+
+    candidate: Candidate
+    point: Point
+    cost: float
+    outcome: Outcome = field(repr=False)
+    gains: Gains = field(repr=False)
+    noises: Noises = field(repr=False)
+    normal: Normal | None = field(default=None, repr=False)
+
+    def values(self, recording: int) -> dict[str, float]:
+        """Return the parameters [SI] of a recording."""
+        return values_at(self.candidate, self.point, recording)
+
+
+def looked_at(
+    candidate: Candidate, series: Sequence[Series], noises: Noises, point: Point
+) -> Estimate:
+    """Return a candidate at a point, with gains made where its modes were seen."""
+    values = values_at(candidate, point, 0)
+    gains = gains_of(candidate, series, values, noises)
+    outcome = _run(candidate, series, point, gains)
+    if outcome.is_whole:
+        gains = gains_of(candidate, series, values, noises, outcome)
+        outcome = _run(candidate, series, point, gains)
+    cost = outcome.cost() + point.prior(candidate)
+    return Estimate(candidate, point, cost, outcome, gains, noises)
+
+
+def with_normal(estimate: Estimate, series: Sequence[Series]) -> Estimate:
+    """Return an estimate with the normal equations at its point."""
+
+    def run(point: Point) -> Outcome:
+        return _run(estimate.candidate, series, point, estimate.gains)
+
+    normal = normal_of(estimate.candidate, estimate.point, estimate.outcome, run)
+    return dataclasses.replace(estimate, normal=normal)
+
+
+def estimated(
+    candidate: Candidate,
+    series: Sequence[Series],
+    noises: Noises,
+    start: Mapping[str, float] | Point,
+    rounds: int = MOST_ROUNDS,
+) -> Estimate:
+    """Return the point that foresees the recordings best, from `start` [SI]."""
+    point = start if isinstance(start, Point) else point_of(candidate, len(series), start)
+    now = looked_at(candidate, series, noises, point)
+    damping = FIRST_DAMPING
+    for _ in range(rounds if np.isfinite(now.cost) else 0):
+        now = with_normal(now, series)
+        better, damping = _improved(now, series, damping)
+        if better is None:
+            break
+        renewed = looked_at(candidate, series, noises, better.point)
+        gained = now.cost - better.cost
+        now = renewed if renewed.cost < better.cost + ENOUGH else better
+        if gained < ENOUGH:
+            break
+    return now if now.normal else with_normal(now, series) if np.isfinite(now.cost) else now
+
+
+def would_reach(estimate: Estimate, series: Sequence[Series]) -> float:
+    """Return the cost [nats] that one full step from an estimate promises."""
+    if not np.isfinite(estimate.cost):
+        return float(np.inf)
+    known = with_normal(estimate, series)
+    assert known.normal is not None
+    return estimate.cost - foreseen(known.point, known.normal)
+
+
+def _improved(
+    now: Estimate, series: Sequence[Series], damping: float
+) -> tuple[Estimate | None, float]:
+    """Return a better point and the damping that led there; None where there is none."""
+    assert now.normal is not None
+    while damping < LARGEST_DAMPING:
+        point = stepped(now.candidate, now.point, now.normal, damping)
+        outcome = _run(now.candidate, series, point, now.gains)
+        cost = outcome.cost() + point.prior(now.candidate)
+        if cost < now.cost:
+            better = dataclasses.replace(now, point=point, cost=cost, outcome=outcome)
+            return better, max(damping / 10.0, 1e-9)
+        damping *= 10.0
+    return None, damping
+
+
+def _run(candidate: Candidate, series: Sequence[Series], point: Point, gains: Gains) -> Outcome:
+    values = [values_at(candidate, point, k) for k in range(len(series))]
+    return predicted(candidate, series, values, gains)
+
+
+def outcome_at(estimate: Estimate, series: Sequence[Series], point: Point) -> Outcome:
+    """Return how a model foresees some recordings at a point, with the gains of the estimate."""
+    return _run(estimate.candidate, series, point, estimate.gains)

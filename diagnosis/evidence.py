@@ -1,0 +1,91 @@
+"""Evidence: what a model gains over another on the training recordings, and on each one left out.
+
+Left out is done by influence: the point without a recording is one step of the normal equations
+of the others away (the infinitesimal jackknife, Efron 1982); from there the recording is foreseen.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.estimation import Estimate, outcome_at
+from diagnosis.normal import stepped
+from diagnosis.series import Series
+
+Reals = NDArray[np.float64]
+LAGS = 0.25
+"""Seconds over which innovations may hang together."""
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Gains [nats]: `train` after the price of the parameters, `left_out` over all recordings."""
+
+    train: float
+    left_out: float
+    each: tuple[float, ...]
+
+    @property
+    def least(self) -> float:
+        """The smaller of the two."""
+        return min(self.train, self.left_out)
+
+    @property
+    def total(self) -> float:
+        """Their sum: what candidates are ranked by."""
+        return self.train + self.left_out
+
+
+def evidence(model: Estimate, base: Estimate, series: Sequence[Series]) -> Evidence:
+    """Return what a model gains over a base that it extends."""
+    shrink = 1.0 / inflation(model, series)
+    count = float(np.sum(model.outcome.counts()))
+    more = _free(model, len(series)) - _free(base, len(series))
+    price = 0.5 * more * np.log(max(count * shrink, 2.0))
+    train = shrink * (base.cost - model.cost) - price
+    scale = model.outcome.variances()
+    each = shrink * (_left_out(base, series, scale) - _left_out(model, series, scale))
+    return Evidence(float(train), float(np.sum(each)), tuple(float(one) for one in each))
+
+
+def inflation(model: Estimate, series: Sequence[Series]) -> float:
+    """Return how many innovations count as one: 1 + 2 sum of squared autocorrelations, at least 1.
+
+    (Bartlett 1946, for a quadratic function of them.)
+    """
+    lags = max(1, round(LAGS / float(series[0].period)))
+    found = []
+    for channel in range(len(model.candidate.predictor.seen)):
+        whole = [e[np.isfinite(e[:, channel]), channel] for e in model.outcome.innovations]
+        power = sum(float(e @ e) for e in whole)
+        total = 1.0
+        for lag in range(1, lags + 1):
+            together = sum(float(e[lag:] @ e[:-lag]) for e in whole if len(e) > lag)
+            total += 2.0 * (together / power) ** 2
+        found.append(total)
+    return float(np.mean(found))
+
+
+def _free(model: Estimate, recordings: int) -> int:
+    return sum(recordings if one.per_recording else 1 for one in model.candidate.uncertain)
+
+
+def _left_out(model: Estimate, series: Sequence[Series], scale: Reals) -> Reals:
+    """Return the cost [nats] of each recording at the point that the others ask for.
+
+    Squares are counted in the mean squares `scale` of both models' last word.
+    """
+    assert model.normal is not None
+    found = []
+    for k, one in enumerate(series):
+        point = stepped(model.candidate, model.point, model.normal.without(k), 0.0)
+        alone = dataclasses.replace(point, own=point.own[k : k + 1])
+        outcome = outcome_at(model, [one], alone)
+        squares = np.nansum(outcome.innovations[0] ** 2, axis=0)
+        found.append(0.5 * float(np.sum(squares / scale)) if outcome.is_whole else np.inf)
+    return np.array(found)

@@ -1,0 +1,124 @@
+"""Layers: effects and drifts laid over the automaton under diagnosis, and its Program.
+
+A drift is a slow unknown disturbance at one place (an Ornstein-Uhlenbeck process): with it an
+observer follows what the model leaves out, and the place at which it is needed is where something
+is missing (Kristensen, Madsen, Jorgensen 2004).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from importlib import resources
+from pathlib import Path
+
+from language.document import Document
+from language.effect import Effect, Laying, read_effect
+from language.laying import lay_effect
+from language.load import automaton_of, program_of
+from language.model import Automaton
+from language.place import Misfit, place_of
+from language.problem import Problems, Source, Span
+from language.program import Program
+from language.project import Project, read_document
+
+DRIFT = "drift"
+KINDS = ("balance", "element", "output")
+LONGEST_STEP = Fraction(5, 1000)
+"""Longest major step [s] of a prediction; events inside it are located."""
+STABLE_PART = Fraction(1, 2)
+"""A step is at most this part of the largest stable one: parameters move while they are fitted."""
+
+
+@dataclass(frozen=True)
+class Layer:
+    """An effect at a place; `ending` is what its names end with."""
+
+    effect: Effect
+    place: str
+    ending: str
+
+    @property
+    def id(self) -> str:
+        """`effect@place`, as it stands in a variant."""
+        return f"{self.effect.name}@{self.place}"
+
+    def named(self, name: str) -> str:
+        """Return the name that one of the effect's own names has in the automaton."""
+        return f"{name}_{self.ending}"
+
+
+def effects_in(folder: Path) -> tuple[Effect, ...]:
+    """Return the effects of a folder, by name. Raises SpecError."""
+    problems = Problems()
+    found = [read_effect(read_document(path), problems) for path in sorted(folder.glob("*.yaml"))]
+    problems.stop_if_any()
+    return tuple(found)
+
+
+def shipped_effects() -> tuple[Effect, ...]:
+    """Return the effects that come with the product."""
+    return effects_in(Path(str(resources.files("spec"))) / "effects")
+
+
+def drift(kind: str, place: str) -> Layer:
+    """Return the drift of a balance, an element or an output."""
+    path = Path(str(resources.files("diagnosis"))) / "drifts" / f"drift_of_{kind}.yaml"
+    return Layer(read_effect(read_document(path), Problems()), place, f"at_{place}")
+
+
+def fitting(document: Document, effect: Effect) -> tuple[Layer, ...]:
+    """Return an effect at every place of an automaton where it can be laid."""
+    places = _places(document)
+    fits = [
+        name for name in places if not isinstance(place_of(document.root, effect, name), Misfit)
+    ]
+    return tuple(Layer(effect, name, name) for name in fits)
+
+
+def laid(document: Document, layers: Sequence[Layer]) -> Document:
+    """Return an expanded document with layers laid over it, in their order. Raises SpecError."""
+    problems = Problems()
+    root = document.root
+    span = Span(Source("diagnosis"), 1, 1)
+    for layer in layers:
+        laying = Laying(layer.effect, layer.place, layer.ending, {}, {}, span)
+        root = lay_effect(root, laying, problems)
+        problems.stop_if_any()
+    return dataclasses.replace(document, root=root)
+
+
+def automaton(document: Document, project: Project, layers: Sequence[Layer]) -> Automaton:
+    """Return the checked automaton with layers laid over it. Raises SpecError."""
+    return automaton_of(laid(document, layers), project)
+
+
+def stepped(given: Automaton, names: Sequence[str], period: Fraction) -> tuple[Program, int]:
+    """Return the Program in which some parameters are tunable, and its steps in a period [s].
+
+    The step is a whole part of the period, at least two: inputs may run straight between samples.
+    """
+    parameters = {
+        name: dataclasses.replace(parameter, kind="tunable") if name in names else parameter
+        for name, parameter in given.parameters.items()
+    }
+    tuned = dataclasses.replace(given, parameters=parameters)
+    motion = program_of(given).motion
+    longest = LONGEST_STEP
+    for limit in motion.limits if motion else ():
+        stable = Fraction(limit.step).limit_denominator(10**9) if limit.step < 1.0 else Fraction(1)
+        longest = min(longest, STABLE_PART * stable)
+    substeps = max(2, -(-period // longest))
+    return program_of(dataclasses.replace(tuned, step=period / substeps)), int(substeps)
+
+
+def _places(document: Document) -> list[str]:
+    """Return what effects may be laid on: balances, inputs, outputs and elements, each once."""
+    found: list[str] = []
+    for section in ("flow", "inputs", "elements", "outputs"):
+        node = document.root.get(section)
+        found += [entry.key for entry in getattr(node, "entries", {}).values()]
+        found += [item.text for item in getattr(node, "nodes", ()) if hasattr(item, "text")]
+    return list(dict.fromkeys(found))

@@ -1,0 +1,106 @@
+"""Level: how much an unknown disturbance may drift at each place, chosen by likelihood.
+
+A drift of one unit moves a compared signal by its own noise within `REACH` seconds. While effects
+are named it is held small: a free one would swallow the physics that is sought.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from diagnosis.candidate import Candidate
+from diagnosis.estimation import Estimate, estimated, looked_at
+from diagnosis.gain import linearised
+from diagnosis.point import Point, values_at
+from diagnosis.prediction import SMALL, Noises, points_of
+from diagnosis.series import Series
+
+REACH = 0.2
+LEVELS = (0.0, 0.3, 1.0, 3.0)
+"""Standard deviations that a drift may have, in its unit; the last is the most while naming."""
+FREE_LEVELS = (*LEVELS, 10.0, 30.0, 100.0)
+"""Those for locating."""
+ENOUGH = 2.0
+"""Another level is taken where it gains this much [nats]."""
+
+
+def units_of(
+    candidate: Candidate, series: Sequence[Series], noises: Noises, start: Mapping[str, float]
+) -> dict[str, float]:
+    """Return the unit [SI] of each drift of a candidate."""
+    states, inputs = next(iter(points_of(candidate, series, None).items()))[1]
+    page = candidate.page(start, series[0])
+    mode = next(iter(points_of(candidate, series, None)))
+    linear = linearised(
+        candidate.predictor,
+        page,
+        inputs,
+        mode,
+        candidate.recipe.substeps,
+        states,
+        SMALL * candidate.spans,
+    )
+    if linear is None:
+        raise ValueError("the base is unstable where the first recording starts")
+    count = max(1, round(REACH / float(series[0].period)))
+    ahead = linear.c @ np.linalg.matrix_power(linear.phi, count)
+    found = {}
+    for name in candidate.drifts:
+        seen = np.abs(ahead[:, candidate.predictor.states.index(name)]) / noises.seen
+        found[name] = 1.0 / max(float(np.max(seen)), 1e-12)
+    return found
+
+
+def levelled(
+    now: Estimate,
+    series: Sequence[Series],
+    units: Mapping[str, float],
+    levels: Sequence[float] = LEVELS,
+) -> Estimate:
+    """Return an estimate with the drifts that the recordings ask for, its parameters held."""
+    for name in now.candidate.drifts:
+        here = _place(now.noises.drifts.get(name, 0.0), units[name], levels)
+        for direction in (1, -1):
+            while 0 <= here + direction < len(levels):
+                drifts = {**now.noises.drifts, name: levels[here + direction] * units[name]}
+                noises = dataclasses.replace(now.noises, drifts=drifts)
+                tried = looked_at(now.candidate, series, noises, now.point)
+                if not tried.cost < now.cost - ENOUGH:
+                    break
+                now, here = tried, here + direction
+    return now
+
+
+def settled(
+    candidate: Candidate,
+    series: Sequence[Series],
+    noises: Noises,
+    start: Mapping[str, float] | Point,
+    units: Mapping[str, float],
+    turns: int = 3,
+) -> Estimate:
+    """Return parameters and drifts found in turns, until neither gains."""
+    now = estimated(candidate, series, noises, start)
+    for _ in range(turns):
+        moved = levelled(now, series, units)
+        if moved.cost >= now.cost:
+            return now
+        now = estimated(candidate, series, moved.noises, moved.point)
+    return now
+
+
+def renamed(values: Mapping[str, float], candidate: Candidate) -> dict[str, float]:
+    """Return those of some values that are parameters of a candidate."""
+    return {name: values[name] for name in candidate.names if name in values}
+
+
+def values_of(estimate: Estimate) -> dict[str, float]:
+    """Return the parameters of an estimate; those per recording as in the first one."""
+    return values_at(estimate.candidate, estimate.point, 0)
+
+
+def _place(value: float, unit: float, levels: Sequence[float]) -> int:
+    return int(np.argmin([abs(level - value / unit) for level in levels]))

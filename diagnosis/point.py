@@ -1,0 +1,69 @@
+"""Point: where the parameters of a candidate are, in coordinates, for some recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.candidate import Candidate
+
+Reals = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Point:
+    """Coordinates: `shared` (parameters,), and `own` (recordings, parameters) of those per one.
+
+    A parameter has its place in both; only one of them counts.
+    """
+
+    shared: Reals
+    own: Reals
+
+    def moved(self, candidate: Candidate, k: int, size: float) -> Point:
+        """Return a point with one coordinate moved, down where up is out of its range."""
+        _, high = candidate.uncertain[k].bounds
+        size = size if self.shared[k] + size <= high else -size
+        shared, own = self.shared.copy(), self.own.copy()
+        shared[k] += size
+        own[:, k] += size
+        return Point(shared, own)
+
+    def prior(self, candidate: Candidate) -> float:
+        """Return half the squares of the coordinates that count [nats]."""
+        own = is_own(candidate)
+        return 0.5 * float(np.sum(self.shared[~own] ** 2) + np.sum(self.own[:, own] ** 2))
+
+
+def point_of(candidate: Candidate, recordings: int, start: Mapping[str, float]) -> Point:
+    """Return the point of some values [SI]; the others start where they are declared."""
+    shared = []
+    for one in candidate.uncertain:
+        value = start.get(one.name, one.starts[0] if one.starts else one.start)
+        shared.append(one.coordinate(value))
+    bounds = bounds_of(candidate)
+    z = np.clip(np.array(shared, dtype=float), bounds[:, 0], bounds[:, 1])
+    return Point(z, np.tile(z, (recordings, 1)))
+
+
+def values_at(candidate: Candidate, point: Point, recording: int) -> dict[str, float]:
+    """Return the parameters [SI] of a recording."""
+    return {
+        one.name: one.value(
+            float(point.own[recording, k] if one.per_recording else point.shared[k])
+        )
+        for k, one in enumerate(candidate.uncertain)
+    }
+
+
+def is_own(candidate: Candidate) -> NDArray[np.bool_]:
+    """Return which parameters each recording has of its own (parameters,)."""
+    return np.array([one.per_recording for one in candidate.uncertain], dtype=bool)
+
+
+def bounds_of(candidate: Candidate) -> Reals:
+    """Return the ranges as coordinates (parameters, 2)."""
+    return np.array([one.bounds for one in candidate.uncertain], dtype=float).reshape(-1, 2)

@@ -1,0 +1,196 @@
+"""Prediction: how well a candidate foresees recordings, one sample ahead, by its observer.
+
+Innovations form (Ljung 1999, section 7.4): the observer's gain is recomputed from the candidate
+itself, so a wrong model cannot hide behind the gain of another one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen.predictor import Prediction
+from diagnosis.candidate import Candidate
+from diagnosis.gain import Linear, first_gains, linearised, steady_gain
+from diagnosis.noise import noise_of
+from diagnosis.series import Series
+
+Reals = NDArray[np.float64]
+BURN_IN = 0.5
+"""Seconds at the start of a recording that do not count: the states are being found."""
+SHORT_STAY = 5
+"""Samples: a mode that is left sooner has the gain of the mode that lasts longest."""
+START_PART = 0.01
+"""Standard deviation of a state at the start, as a part of its range."""
+SMALL = 1e-5
+"""Change of a state for a difference, as a part of its range."""
+MODEL_NOISE = 1e-7
+"""Process noise of every state per sample, as a part of its range: no gain is ever quite 0."""
+
+
+@dataclass(frozen=True)
+class Noises:
+    """What is known of noise: of the `seen` signals, of the inputs, and of each drift [SI]."""
+
+    seen: Reals
+    inputs: Reals
+    drifts: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Gains:
+    """The gains of one candidate at one point: `first` (count, states, seen), `steady` by mode."""
+
+    first: Reals
+    steady: Reals
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Innovations of all recordings behind their burn-in, (samples, seen) each."""
+
+    innovations: tuple[Reals, ...]
+    predictions: tuple[Prediction, ...] = field(repr=False)
+    is_whole: bool = True
+
+    def cost(self) -> float:
+        """Return sum over channels of N/2 log(mean square), the negative log likelihood [nats]."""
+        if not self.is_whole:
+            return np.inf
+        return float(np.sum(0.5 * self.counts() * np.log(self.variances())))
+
+    def counts(self) -> Reals:
+        """Return how many innovations each channel has (seen,)."""
+        found: Reals = np.sum([np.sum(np.isfinite(e), axis=0) for e in self.innovations], axis=0)
+        return found
+
+    def variances(self) -> Reals:
+        """Return the mean square innovation of each channel (seen,)."""
+        squares = np.sum([np.nansum(e * e, axis=0) for e in self.innovations], axis=0)
+        found: Reals = np.maximum(squares / np.maximum(self.counts(), 1.0), 1e-300)
+        return found
+
+
+def noises_of(series: Sequence[Series], drifts: Mapping[str, float]) -> Noises:
+    """Return the noise of the signals and inputs of some recordings: the median over them."""
+    seen = [[noise_of(column) for column in one.measured.T] for one in series]
+    inputs = [[noise_of(column) for column in one.inputs.T] for one in series]
+    floor = [float(np.nanmax(np.abs(one.measured))) * 1e-6 + 1e-12 for one in series]
+    return Noises(
+        np.maximum(np.median(seen, axis=0), np.median(floor)), np.median(inputs, axis=0), drifts
+    )
+
+
+def predicted(
+    candidate: Candidate,
+    series: Sequence[Series],
+    values: Sequence[Mapping[str, float]],
+    gains: Gains,
+) -> Outcome:
+    """Return the innovations of recordings, each with values of its own (per recording)."""
+    found = []
+    for one, own in zip(series, values, strict=True):
+        page = candidate.page(own, one)
+        found.append(
+            candidate.predictor.predict(
+                page,
+                one.inputs,
+                one.measured,
+                gains.first,
+                gains.steady,
+                candidate.recipe.substeps,
+                one.is_linear,
+            )
+        )
+    burnt = [max(1, round(BURN_IN / float(one.period))) for one in series]
+    innovations = tuple(p.innovations[skip:] for p, skip in zip(found, burnt, strict=True))
+    whole = all(p.done == one.count for p, one in zip(found, series, strict=True))
+    return Outcome(innovations, tuple(found), whole)
+
+
+def gains_of(
+    candidate: Candidate,
+    series: Sequence[Series],
+    values: Mapping[str, float],
+    noises: Noises,
+    outcome: Outcome | None = None,
+) -> Gains:
+    """Return the gains of a candidate at `values`, near where `outcome` saw each mode."""
+    page = candidate.page(values, series[0])
+    period = float(series[0].period)
+    count = max(1, round(BURN_IN / period))
+    modes = candidate.predictor.modes
+    points = points_of(candidate, series, outcome)
+    start = np.diag((START_PART * candidate.spans) ** 2)
+    r = np.diag(noises.seen**2)
+    found: dict[int, Reals] = {}
+    first = np.zeros((0, len(start), len(r)))
+    for mode, (states, inputs) in points.items():
+        linear = linearised(
+            candidate.predictor,
+            page,
+            inputs,
+            mode,
+            candidate.recipe.substeps,
+            states,
+            SMALL * candidate.spans,
+        )
+        if linear is None:
+            continue
+        q = _process_noise(candidate, linear, noises, period)
+        gain = steady_gain(linear, q, r)
+        if gain is not None:
+            found[mode] = gain
+            if not len(first):
+                first = first_gains(linear, q, r, start, count)
+    nothing = np.zeros((len(start), len(r)))
+    usual = next(iter(found.values()), nothing)
+    steady = np.array([found.get(mode, usual) for mode in modes])
+    return Gains(first, np.ascontiguousarray(steady))
+
+
+def _process_noise(candidate: Candidate, linear: Linear, noises: Noises, period: float) -> Reals:
+    """Return Q: the noise of the inputs, of the drifts, and next to none of all states."""
+    q = linear.b @ np.diag(noises.inputs**2) @ linear.b.T
+    q = q + np.diag((MODEL_NOISE * candidate.spans) ** 2)
+    for name, memory in zip(candidate.drifts, candidate.recipe.memories, strict=True):
+        place = candidate.predictor.states.index(name)
+        kept = np.exp(-period / memory)
+        q[place, place] = noises.drifts.get(name, 0.0) ** 2 * (1.0 - kept**2)
+    return q
+
+
+def points_of(
+    candidate: Candidate, series: Sequence[Series], outcome: Outcome | None
+) -> dict[int, tuple[Reals, Reals]]:
+    """Return states and inputs in the middle of the longest stay in each mode, longest first."""
+    predictor = candidate.predictor
+    if outcome is None:
+        page = candidate.page({}, series[0])
+        nothing = np.zeros((len(predictor.states), len(predictor.seen)))
+        none = np.zeros((len(predictor.modes), *nothing.shape))
+        short = series[0].inputs[:2].copy()
+        run = predictor.predict(
+            page,
+            short,
+            series[0].measured[:2].copy(),
+            none[:0],
+            none,
+            candidate.recipe.substeps,
+            False,
+        )
+        return {int(run.modes[0]): (run.states[0].copy(), short[0])}
+    longest: dict[int, tuple[int, Reals, Reals]] = {}
+    for one, prediction in zip(series, outcome.predictions, strict=True):
+        modes = prediction.modes[: prediction.done]
+        edges = np.flatnonzero(np.diff(modes)) + 1
+        for low, high in zip([0, *edges], [*edges, len(modes)], strict=True):
+            stay, mode = int(high - low), int(modes[low]) if low < len(modes) else 0
+            if stay >= SHORT_STAY and stay > longest.get(mode, (0,))[0]:
+                middle = int(low + high) // 2
+                longest[mode] = (stay, prediction.states[middle].copy(), one.inputs[middle].copy())
+    ordered = sorted(longest.items(), key=lambda item: -item[1][0])
+    return {mode: (states, inputs) for mode, (_, states, inputs) in ordered}

@@ -1,0 +1,89 @@
+"""Search: which effects at which places foresee the training recordings better than the base."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from diagnosis.bench import Bench
+from diagnosis.candidate import Candidate
+from diagnosis.estimation import Estimate, looked_at, would_reach
+from diagnosis.evidence import Evidence, evidence
+from diagnosis.layers import Layer
+from diagnosis.level import settled
+from diagnosis.point import Point, point_of
+
+FULL_FITS = 10
+"""Candidates that are fitted to the end, best foreseen first."""
+WORTH = 10.0
+"""A candidate that promises less [nats] is not fitted."""
+Tell = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Tried:
+    """A candidate with what it promised; `estimate` and `evidence` where it was fitted."""
+
+    layer: Layer
+    promised: float
+    estimate: Estimate | None = field(default=None, repr=False)
+    evidence: Evidence | None = None
+
+    @property
+    def score(self) -> float:
+        """What candidates are ranked by."""
+        return self.evidence.total if self.evidence else self.promised - 1e6
+
+
+def searched(
+    bench: Bench, base: Estimate, units: Mapping[str, float], tell: Tell = lambda text: None
+) -> list[Tried]:
+    """Return every candidate that could be laid on the base's layers, best first."""
+    promised: list[tuple[float, Layer, Candidate, Point]] = []
+    for layer in bench.layers():
+        candidate = _possible(bench, base, layer)
+        if candidate is not None:
+            reach, point = screened(bench, candidate, base)
+            promised.append((base.cost - reach, layer, candidate, point))
+    promised.sort(key=lambda one: -one[0])
+    found = []
+    for place, (gain, layer, candidate, point) in enumerate(promised):
+        if place >= FULL_FITS or gain < WORTH:
+            found.append(Tried(layer, gain))
+            continue
+        estimate = settled(candidate, bench.series, base.noises, point, units, turns=1)
+        known = evidence(estimate, base, bench.series)
+        tell(f"{layer.id}: train {known.train:.0f}, left out {known.left_out:.0f} nats")
+        found.append(Tried(layer, gain, estimate, known))
+    return sorted(found, key=lambda one: -one.score)
+
+
+def screened(bench: Bench, candidate: Candidate, base: Estimate) -> tuple[float, Point]:
+    """Return the cost [nats] that a fit of a candidate promises, and the start that promises it."""
+    best, where = np.inf, point_of(candidate, len(bench.series), base.values(0))
+    for start in starts_of(candidate, base.values(0)):
+        point = point_of(candidate, len(bench.series), start)
+        here = looked_at(candidate, bench.series, base.noises, point)
+        reach = would_reach(here, bench.series)
+        if reach < best:
+            best, where = reach, point
+    return best, where
+
+
+def starts_of(candidate: Candidate, base: Mapping[str, float]) -> list[dict[str, float]]:
+    """Return where a fit may start: the base's values with each start of the effect's own."""
+    own = [one for one in candidate.uncertain if one.name not in base]
+    most = max((len(one.starts) for one in own), default=1)
+    return [
+        {**base, **{one.name: one.starts[min(k, len(one.starts) - 1)] for one in own}}
+        for k in range(most)
+    ]
+
+
+def _possible(bench: Bench, base: Estimate, layer: Layer) -> Candidate | None:
+    layers: Sequence[Layer] = base.candidate.layers
+    if any(layer.id == known.id for known in layers):
+        return None
+    return bench.possible([*layers, layer])

@@ -1,0 +1,106 @@
+"""Uncertain: the parameters that recordings may move, in coordinates with a prior of one.
+
+A parameter with a `range` is uncertain. z = 0 is its value, z = 1 one standard deviation of its
+prior away: a part of the value where that is positive, else a part of the range.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from language.declaration import Parameter
+from language.model import Automaton
+
+Reals = NDArray[np.float64]
+PRIOR = 0.15
+"""Standard deviation of a base parameter, as a part of its value (in its logarithm)."""
+NEAR = 0.02
+"""A start near the neutral value: this part of the way to the next one."""
+WIDE = 0.5
+"""Standard deviation of an effect's parameter, as a part of its range."""
+
+
+@dataclass(frozen=True)
+class Uncertain:
+    """A parameter [SI] in its coordinate: value = start exp(sd z), or start + sd z."""
+
+    name: str
+    start: float
+    low: float
+    high: float
+    sd: float
+    is_log: bool
+    per_recording: bool = False
+    starts: tuple[float, ...] = ()
+    unit: str = "1"
+
+    def value(self, z: float) -> float:
+        """Return the value of a coordinate."""
+        if self.is_log:
+            return self.start * math.exp(self.sd * z)
+        return self.start + self.sd * z
+
+    def coordinate(self, value: float) -> float:
+        """Return the coordinate of a value."""
+        if self.is_log:
+            return math.log(value / self.start) / self.sd
+        return (value - self.start) / self.sd
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """The coordinates of the ends of the range."""
+        return self.coordinate(self.low), self.coordinate(self.high)
+
+
+def uncertain_of(automaton: Automaton, effects: Sequence[str] = ()) -> tuple[Uncertain, ...]:
+    """Return the uncertain parameters; `effects` are the names that effects have brought."""
+    found = []
+    for name, parameter in automaton.parameters.items():
+        is_number = parameter.type == "real" and parameter.table is None
+        if is_number and parameter.range and parameter.value is not None:
+            found.append(_of_effect(parameter) if name in effects else _of_base(parameter))
+    return tuple(found)
+
+
+def _of_base(parameter: Parameter) -> Uncertain:
+    assert parameter.range and parameter.value is not None
+    low, high = (float(end) for end in parameter.range)
+    value, unit = float(parameter.value), parameter.unit.text
+    if low >= 0.0 and value > 0.0:
+        low = low if low > 0.0 else 1e-3 * value
+        return Uncertain(parameter.name, value, low, high, PRIOR, True, unit=unit)
+    return Uncertain(parameter.name, value, low, high, PRIOR * (high - low), False, unit=unit)
+
+
+def _of_effect(parameter: Parameter) -> Uncertain:
+    assert parameter.range and parameter.value is not None
+    low, high = (float(end) for end in parameter.range)
+    fitting = parameter.fitting
+    value = float(parameter.value)
+    starts = _starts(parameter, value)
+    each = fitting.per == "recording"
+    place = (parameter.name, value, low, high)
+    unit = parameter.unit.text
+    if low > 0.0 and value > 0.0:
+        sd = WIDE * math.log(high / low)
+        return Uncertain(*place, sd, True, each, starts, unit)
+    return Uncertain(*place, WIDE * (high - low), False, each, starts, unit)
+
+
+def _starts(parameter: Parameter, value: float) -> tuple[float, ...]:
+    """Return where fits start: near the neutral value, at the declared starts, at the value."""
+    fitting = parameter.fitting
+    declared = tuple(float(start) for start in fitting.starts) or (value,)
+    neutral = fitting.neutral
+    if neutral is None or neutral == "absent":
+        return declared
+    far = next((start for start in declared if start != float(neutral)), None)
+    if far is None and parameter.range:
+        far = float(neutral) + 0.1 * float(parameter.range[1] - neutral)
+    assert far is not None
+    return (float(neutral) + NEAR * (far - float(neutral)), far)
