@@ -8,6 +8,7 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -34,12 +35,18 @@ def pictures(store: Store) -> dict[str, Picture]:
     }  # fmt: skip
     found = {}
     for name, plot in store.manifest.presentation.plots.items():
-        figure = draw[plot["kind"]](table, plot)
         count = int(np.sum(table.is_done))
+        figure = draw[plot["kind"]](table, plot) if count else _empty()
         title = f"{store.manifest.study}: {name} ({count} variants)"
         figure.suptitle(visible(title), x=0.01, ha="left", fontsize=11, parse_math=False)
         found[name] = Picture(figure)
     return found
+
+
+def _empty() -> Figure:
+    figure = Figure(figsize=(5.0, 2.0))
+    figure.text(0.5, 0.4, "no variant is done yet", ha="center")
+    return figure
 
 
 def _unit(table: Table, name: str) -> str:
@@ -123,8 +130,10 @@ def _parallel(table: Table, plot: Mapping[str, Any]) -> Figure:
     low, high = _ends(columns)
     share = (columns - low[:, None]) / (high - low)[:, None]
     colours = matplotlib.colormaps["viridis"](share[-1] if share.size else np.zeros(0))
-    for k in range(columns.shape[1]):
-        axis.plot(range(len(names)), share[:, k], color=colours[k], lw=0.8, alpha=0.6)
+    places = np.arange(float(len(names)))
+    lines = [np.column_stack((places, share[:, k])) for k in range(columns.shape[1])]
+    axis.add_collection(LineCollection(lines, colors=colours, linewidths=0.8, alpha=0.6))
+    axis.set_xlim(-0.2, len(names) - 0.8)
     axis.set_xticks(range(len(names)), [_broken(_label(table, name)) for name in names], fontsize=8)
     axis.set_yticks([])
     axis.set_ylim(-0.08, 1.08)

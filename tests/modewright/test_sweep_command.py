@@ -1,0 +1,113 @@
+"""`modewright sweep` as a user meets it: results, interruptions, refusals."""
+
+from __future__ import annotations
+
+import errno
+import json
+from pathlib import Path
+
+import pytest
+
+from engine.batch import Batch, BatchResult
+from modewright import studies
+from modewright.cli import app
+from modewright.exits import exit_code
+from sweep import store as store_module
+from sweep.store import read_store
+from tests.sweep.laying import STUDIES, quick
+
+
+@pytest.fixture(autouse=True)
+def _quick_in_the_project(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(STUDIES)
+    monkeypatch.setattr(studies, "run_variants", quick)
+
+
+def run(*arguments: str) -> int:
+    return exit_code(lambda: app(["sweep", *arguments, "-j", "1"], standalone_mode=False))
+
+
+def test_a_study_is_run_summed_up_and_drawn(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, table = str(tmp_path / "out"), str(tmp_path / "summary.csv")
+    assert run("alone", "--out", out, "--csv", table) == 0
+    told = capsys.readouterr().out
+    assert "5 variants computed" in told
+    assert "alone: 5 of 5 variants: 5 done" in told
+    assert [path.name for path in (tmp_path / "out" / "plots").iterdir()] == ["matters.svg"]
+    assert Path(table).read_text().startswith("measure,unit,count,mean,")
+    assert run("alone", "--out", out) == 0
+    assert "0 variants computed, 5 were there" in capsys.readouterr().out
+    assert run("--summary", out, "--json", "--format", "png") == 0
+    assert json.loads(capsys.readouterr().out)["counts"] == {"done": 5}
+    assert (tmp_path / "out" / "plots" / "matters.png").exists()
+
+
+def test_what_was_interrupted_is_kept_and_gone_on_with(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = str(tmp_path / "out")
+    batches = []
+
+    def interrupted(batch: Batch) -> BatchResult:
+        batches.append(batch)
+        if len(batches) == 6:
+            raise KeyboardInterrupt
+        return quick(batch)
+
+    monkeypatch.setattr(studies, "run_variants", interrupted)
+    assert run("grid", "--out", out, "--block", "4") == 130
+    assert "20 of 60 variants are kept" in capsys.readouterr().err
+    monkeypatch.setattr(studies, "study_pictures", lambda folder: {})
+    assert run("grid", "--out", out) == 0
+    assert "40 variants computed, 20 were there" in capsys.readouterr().out
+
+
+def test_a_full_disk_says_what_is_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The write itself fails in tests/sweep/test_study_run.py; here what the user is told."""
+    write = store_module.write_whole
+
+    def filling(path: Path, data: bytes) -> None:
+        if path.name.startswith("0000000012"):
+            raise OSError(errno.ENOSPC, "No space left on device", str(path))
+        write(path, data)
+
+    out = str(tmp_path / "out")
+    monkeypatch.setattr(store_module, "write_whole", filling)
+    assert run("grid", "--out", out, "--block", "4") == 1
+    told = capsys.readouterr().err
+    assert "No space left on device; 12 of 60 variants are kept" in told
+    assert len(read_store(tmp_path / "out").paths()) == 3
+
+
+def test_values_of_the_command_line_belong_to_the_results(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = str(tmp_path / "out")
+    assert run("alone", "--out", out, "--set", "x_0=2 m") == 0
+    assert run("alone", "--out", out) == 1
+    assert "system of variant `base`" in capsys.readouterr().err
+    assert run("alone", "--out", out, "--set", "x_0=2 m") == 0
+    assert read_store(tmp_path / "out").manifest.count == 5
+    assert run("alone", "--out", str(tmp_path / "other"), "--set", "x_9=2 m") == 1
+    assert "`x_0`" in capsys.readouterr().err
+    assert not (tmp_path / "other").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code"),
+    [
+        ((), 2),
+        (("grid",), 2),
+        (("grid", "--summary", "x"), 2),
+        (("grid", "--out", "x", "--format", "bmp"), 2),
+        (("--summary", "nothing_there"), 1),
+        (("swing", "--out", "x"), 1),
+    ],
+)
+def test_wrong_usage_is_told(arguments: tuple[str, ...], code: int, tmp_path: Path) -> None:
+    assert run(*arguments) == code
+    assert not Path("x").exists()

@@ -1,0 +1,96 @@
+"""A row of a study is what `simulate` gives for the same values, bit for bit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import modewright as mw
+from engine.variants import run_variants
+from sweep.block import Block, Row, block_rows
+from sweep.structure import decimal
+from tests.sweep.laying import STUDIES, study
+
+
+def rows_of(name: str, *numbers: int) -> list[Row]:
+    made = study(name)
+    return [block_rows(made, Block(k, k + 1), run_variants)[0] for k in numbers]
+
+
+def events(run: mw.Trajectory, instance: str, target: str) -> list[float]:
+    return [event.time for event in run.events_of(instance) if event.target == target]
+
+
+def scenario(folder: Path, name: str, *changes: tuple[str, str]) -> str:
+    """Write a scenario of the tests with texts replaced; return its path."""
+    text = (STUDIES / "spec" / f"{name}.yaml").read_text()
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    (folder / f"{name}.yaml").write_text(text)
+    return str(folder / f"{name}.yaml")
+
+
+@pytest.mark.parametrize("number", [3, 58])
+def test_parameters_and_steps_are_those_of_simulate(number: int, tmp_path: Path) -> None:
+    (row,) = rows_of("grid", number)
+    step = f"1 s: {decimal(row.values['inputs.push.steps.1'])} m/s^2"
+    run = mw.simulate(
+        "oscillator",
+        scenario(tmp_path, "swing", ("1 s: 0.5 m/s^2", step)),
+        {
+            "w": f"{decimal(row.values['w'])} rad/s",
+            "d": f"{decimal(row.values['d'])} 1/s",
+            "x_0": f"{decimal(row.values['x_1'])} m",
+        },
+        STUDIES,
+    )
+    x = run.signals["oscillator.x"]
+    falls = events(run, "oscillator", "below")
+    assert row.status == "done"
+    assert row.measures == {
+        "t_1": falls[0], "falls": len(falls), "peak": float(np.max(np.abs(x))),
+        "final": float(x[-1]), "twice": 2.0 * falls[0],
+    }  # fmt: skip
+
+
+def test_times_noise_periods_and_starts_are_those_of_simulate(tmp_path: Path) -> None:
+    """The last variant: sd 0.1 m, period 100 ms, step at 0.7003 s, turns 0.3, other noise."""
+    (row,) = rows_of("seen", 31)
+    system = (STUDIES / "spec" / "measured.yaml").read_text().replace("sd: 0.05 m", "sd: 0.1 m")
+    (tmp_path / "measured.yaml").write_text(system.replace("of: tracker", "of: tracker.yaml"))
+    tracker = (STUDIES / "spec" / "tracker.yaml").read_text()
+    (tmp_path / "tracker.yaml").write_text(tracker.replace("50 ms", "100 ms"))
+    start = ("horizon:", "initial: {plant.v: -0.3 m/s}\nhorizon:")
+    changes = (("1 s: 0.5", "0.7003 s: 0.5"), ("seed: 5", "seed: 6"), start)
+    run = mw.simulate(
+        str(tmp_path / "measured.yaml"),
+        scenario(tmp_path, "pushed", *changes),
+        {"w": f"{decimal(0.3 * 6.25)} rad/s"},
+        STUDIES,
+    )
+    low, seen = events(run, "plant", "below"), events(run, "eye", "low")
+    error = run.signals["s"] - run.signals["plant.x"]
+    assert (row.seed, row.replicate, row.values["turns"]) == (6, 1, 0.3)
+    assert row.measures["t_low"] == low[0]
+    assert row.measures["final"] == run.signals["plant.x"][-1]
+    assert row.measures["error"] == pytest.approx(float(np.sqrt(np.mean(error**2))), rel=1e-14)
+    late = row.measures["late"]
+    assert late == next((t - low[0] for t in seen if t >= low[0] - 0.2), None)
+    assert late is not None
+
+
+def test_a_block_has_the_rows_of_its_variants_alone() -> None:
+    made = study("seen")
+    together = block_rows(made, Block(4, 10), run_variants)
+    assert together == [block_rows(made, Block(k, k + 1), run_variants)[0] for k in range(4, 10)]
+    assert together[0].measures["error"] != together[1].measures["error"]  # other noise
+
+
+def test_a_variant_with_many_events_keeps_all_of_them() -> None:
+    fast = ("[1 rad/s, 3 rad/s, 5]", "[49 rad/s, 50 rad/s, 2]")
+    undamped = ("[0.1 1/s, 0.2 1/s, 0.4 1/s]", "[0 1/s]")
+    row = block_rows(study("grid", fast, undamped), Block(0, 1), run_variants)[0]
+    assert row.measures["falls"] == pytest.approx(4.0 * 49.0 / (2.0 * np.pi), abs=1.0)

@@ -1,0 +1,109 @@
+"""Summaries and pictures of a small store, counted by hand."""
+
+from __future__ import annotations
+
+import csv
+import io
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.patches import Rectangle
+
+from engine.batch import Batch, BatchResult
+from modewright import show_study
+from sweep.executor import InProcess
+from sweep.picture import pictures, rank_correlation
+from sweep.store import Store
+from sweep.study_run import run_study
+from sweep.summary import Summary, summary_of
+from tests.sweep.laying import QUICK, quick, study
+
+
+def faulty(batch: Batch) -> BatchResult:
+    """Results in which the variants with the largest `w` have a fault bit."""
+    found = quick(batch)
+    found.faults[:] = batch.parameters["oscillator.w"] > 2.6
+    return found
+
+
+def store_of(folder: Path, *changes: tuple[str, str]) -> Store:
+    return run_study(study("grid", *changes), folder, InProcess(faulty), block=13).store
+
+
+def line(summary: Summary, measure: str, **group: str) -> object:
+    return next(x for x in summary.lines if (x.measure, x.group) == (measure, group))
+
+
+def test_faulty_variants_are_counted_apart_and_in_no_number(tmp_path: Path) -> None:
+    found = summary_of(store_of(tmp_path))
+    assert found.counts == {"done": 48, "fault": 12}
+    assert found.expected == 60
+    (t_1,) = [x for x in found.lines if x.measure == "t_1"]
+    assert t_1.count == 48
+    assert 0.4 <= t_1.low <= t_1.p5 <= t_1.median <= t_1.p95 <= t_1.high <= 0.6
+    assert t_1.mean_interval is not None and t_1.mean_interval[0] < t_1.mean < t_1.mean_interval[1]
+
+
+def test_groups_have_the_numbers_of_their_variants(tmp_path: Path) -> None:
+    store = store_of(tmp_path, ("plots:", "summary: {by: [d]}\nplots:"))
+    found = summary_of(store)
+    finals = [x for x in found.lines if x.measure == "final"]
+    assert [x.group["d"] for x in finals] == ["0.1 1/s", "0.2 1/s", "0.4 1/s"]
+    assert [x.count for x in finals] == [16, 16, 16]
+    rows = list(csv.DictReader(io.StringIO(found.csv())))
+    assert len(rows) == 15
+    assert float(rows[0]["mean"]) == found.lines[0].mean
+    plain = show_study.summary_json(found)
+    assert plain["counts"] == {"done": 48, "fault": 12}
+    assert plain["measures"][0]["group"] == {"d": "0.1 1/s"}
+
+
+def test_rates_of_a_match_have_their_intervals(tmp_path: Path) -> None:
+    match = "{match: above, truth: below, before: 1 ms}"
+    store = run_study(study("grid", ("{value: 2 * t_1}", match)), tmp_path, QUICK).store
+    rates = {rate.measure: rate for rate in summary_of(store).rates}
+    assert (rates["twice.missed"].hits, rates["twice.missed"].count) == (60, 60)
+    interval = rates["twice.first_missed"].interval
+    assert interval == pytest.approx((0.9398, 1.0), abs=1e-4)
+
+
+def test_nothing_finished_is_an_empty_summary(tmp_path: Path) -> None:
+    store = run_study(study(), tmp_path, lambda study, blocks: iter(())).store
+    found = summary_of(store)
+    assert found.counts == {}
+    assert all(x.count == 0 and np.isnan(x.median) for x in found.lines)
+    assert set(pictures(store)) == {"heat", "lines", "matters", "spread"}
+
+
+def test_pictures_show_what_the_store_holds(tmp_path: Path) -> None:
+    store = store_of(tmp_path)
+    drawn = pictures(store)
+    heat = drawn["heat"].figure.axes[0]
+    assert [t.get_text() for t in heat.get_xticklabels()] == ["1", "1.5", "2", "2.5"]
+    assert len(heat.texts) == 12
+    assert heat.get_ylabel() == "d [1/s]"
+    assert len(drawn["lines"].figure.axes[0].collections[0].get_paths()) == 48
+    bars = drawn["matters"].figure.axes[0].patches
+    assert len(bars) == 4
+    spread = drawn["spread"].figure.axes
+    bars_of = [bar for axis in spread for bar in axis.patches if isinstance(bar, Rectangle)]
+    heights = [bar.get_height() for bar in bars_of]
+    assert sum(heights) == 48
+    assert drawn["heat"].data("svg") == pictures(store)["heat"].data("svg")
+
+
+def test_a_tornado_of_one_at_a_time_goes_from_lowest_to_highest(tmp_path: Path) -> None:
+    store = run_study(study("alone"), tmp_path, QUICK).store
+    axis = pictures(store)["matters"].figure.axes[0]
+    widths = [bar.get_extents().width for bar in axis.patches]
+    assert len(widths) == 2
+    assert widths == sorted(widths)
+    assert all(width > 0 for width in widths)
+
+
+def test_a_rank_correlation_sees_what_rises_together() -> None:
+    a = np.array([1.0, 2.0, 3.0, 4.0])
+    assert rank_correlation(a, np.exp(a)) == pytest.approx(1.0)
+    assert rank_correlation(a, -(a**3)) == pytest.approx(-1.0)
+    assert rank_correlation(a, np.ones(4)) == 0.0
