@@ -71,8 +71,12 @@ class SpecError(Exception):
 
     def __init__(self, problems: Sequence[Problem]) -> None:
         """Keep the problems; they are rendered in one place, by the caller."""
-        super().__init__("; ".join(f"{p.span}: {p.label}" for p in problems))
+        super().__init__(problems)
         self.problems = tuple(problems)
+
+    def __str__(self) -> str:
+        """Return all problems in one line."""
+        return "; ".join(f"{p.span}: {p.label}" for p in self.problems)
 
 
 class Problems:
@@ -102,11 +106,16 @@ class Problems:
 
     @contextmanager
     def collecting(self) -> Iterator[None]:
-        """Take the problems of a SpecError raised inside and go on."""
+        """Take the problems of a SpecError raised inside and go on.
+
+        What it carries may begin with those that are here already: they are taken once.
+        """
         try:
             yield
         except SpecError as error:
-            self.found.extend(error.problems)
+            known = len(self.found)
+            is_ours = error.problems[:known] == tuple(self.found)
+            self.found.extend(error.problems[known:] if is_ours else error.problems)
 
 
 def nearest(name: str, known: Iterable[str]) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from fractions import Fraction
+from pathlib import Path
 
 from language.connection import ConnectionReader
 from language.document import Document, Entry, Scalar
@@ -87,6 +88,8 @@ class _SystemReader(Reader):
         self.project = project
         self.overrides = overrides
         self.used: set[str] = set()
+        self.documents: dict[Path, Document] = {}
+        self.read_before: dict[tuple[object, ...], Automaton] = {}
 
     def read(self, document: Document) -> System:
         tree = self.table(document.root, f"system {document.name}", SYSTEM_KEYS)
@@ -146,13 +149,22 @@ class _SystemReader(Reader):
                 self.problems.error("range", node.span, "`offset` is a time of at least 0 s")
         self.problems.stop_if_any()
         assert of is not None
-        document = read_document(self.project.path_of(of.text, of.span))
-        plain = automaton_of(document, self.project, values)
-        mine = self._overrides_of(entry.key, plain)
-        automaton = plain
+        automaton = self._automaton(of, values)
+        mine = self._overrides_of(entry.key, automaton)
         if mine:
-            automaton = automaton_of(document, self.project, {**values, **mine})
+            automaton = self._automaton(of, {**values, **mine})
         return Instance(entry.key, automaton, offset, key, entry.span)
+
+    def _automaton(self, of: Scalar, values: Mapping[str, Scalar]) -> Automaton:
+        """Return a checked automaton; instances of one with equal values share it."""
+        wanted = (of.text, *((name, value.text) for name, value in values.items()))
+        if wanted not in self.read_before:
+            path = self.project.path_of(of.text, of.span)
+            if path not in self.documents:
+                self.documents[path] = read_document(path)
+            made = automaton_of(self.documents[path], self.project, values)
+            self.read_before[wanted] = made
+        return self.read_before[wanted]
 
     def _overrides_of(self, instance: str, automaton: Automaton) -> dict[str, Scalar]:
         found = {}

@@ -50,8 +50,9 @@ def checked(reference: str, root: Path | None = None) -> Checked:
                 first, *others = motion_lines(motion)
                 limits = (f"{document.name}: {first}", *others)
         elif base.kind == "system":
-            for instance in read_system(document, project).instances.values():
-                lowered(instance.automaton)
+            instances = read_system(document, project).instances.values()
+            for automaton in {id(each.automaton): each.automaton for each in instances}.values():
+                lowered(automaton)
         elif base.kind == "map":
             read_map(document, project)
         elif base.kind == "effect":

@@ -144,7 +144,7 @@ def system(instances: int) -> dict[str, str]:
     small += "equations: {T_out: k * a + c * w}\noutputs: [w, a, T_out]\n"
     lines = ["language: 1\nsystem: large\ninputs: {T: {unit: N*m}}\ninstances:\n"]
     lines += [
-        f"  i_{n}: {{of: part, values: {{J: {n % 8 + 1}.5 kg*m^2}}}}\n" for n in range(instances)
+        f"  i_{n}: {{of: part, values: {{J: {n % 8 + 1}.{n} kg*m^2}}}}\n" for n in range(instances)
     ]
     lines.append("connections:\n")
     lines += [f"  i_{n}.T_in: {f'0.5 * i_{n - 1}.T_out' if n else 'T'}\n" for n in range(instances)]
