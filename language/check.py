@@ -53,8 +53,7 @@ def check_automaton(automaton: Automaton, problems: Problems) -> Automaton:
         for name in _never_entered(checked, region):
             label = f"mode `{name}` is never entered"
             problems.warning("unreached", region.modes[name].span, label)
-    for mode in checked.all_modes:
-        report_overlaps(checked, mode, problems)
+    report_overlaps(checked, problems)
     if not checked.is_sampled:
         report_refiring(checked, problems)
     if checked.model:

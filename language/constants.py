@@ -40,10 +40,10 @@ def parameter_constants(automaton: Automaton, problems: Problems) -> dict[str, C
                 "look for a division by zero or a huge power",
             )
             value = 0.0
-        found[name] = constant_of(automaton, name, kinds[name], value)
-        for axis in axis_constants(automaton, name):
-            found[axis.name] = axis
-        values.update(values_of(found))
+        new = {name: constant_of(automaton, name, kinds[name], value)}
+        new.update({axis.name: axis for axis in axis_constants(automaton, name)})
+        found.update(new)
+        values.update(values_of(new))
     return found
 
 

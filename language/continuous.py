@@ -74,9 +74,9 @@ from language.stepping import (
     ZENO,
     Waits,
     begun,
-    by_mode_of,
     ended,
     is_over,
+    of_mode,
     stepping_blocks,
     stepping_variables,
     waits_of,
@@ -206,7 +206,7 @@ def _variables(automaton: Automaton, field: Field) -> list[Variable]:
 
 def _selection(automaton: Automaton, infos: tuple[TransitionInfo, ...], waits: Waits) -> Selection:
     by_key = {info.key: info for info in infos}
-    own_waits = by_mode_of(waits)
+    begins, ends = begun(waits), ended(waits)
 
     def info_of(transition: Transition) -> TransitionInfo:
         return by_key[f"{automaton.name} {transition.key}"]
@@ -221,9 +221,9 @@ def _selection(automaton: Automaton, infos: tuple[TransitionInfo, ...], waits: W
         number=lambda transition: info_of(transition).number,
         enabled=enabled,
         moved=lambda t: (
-            *ended(own_waits, automaton.source(t)),
+            *of_mode(ends, automaton.source(t)),
             *forgotten(automaton, automaton.source(t)),
-            *begun(own_waits, automaton.target(t)),
+            *of_mode(begins, automaton.target(t)),
         ),
     )
 
@@ -263,7 +263,7 @@ def _entries(
     keep: Block = (*evaluate, *record_block(histories, whole_known), Assign(AGE.name, real(0.0)))
     record = {"record": keep} if histories else {}
     watch = tuple((mode.number, _watch(automaton, mode)) for mode in automaton.modes.values())
-    own = by_mode_of(waits)
+    begins = begun(waits)
     return {
         "derive": derive_block(automaton),
         "init": (
@@ -276,7 +276,7 @@ def _entries(
             *enter_initial(automaton, "memory.mode"),
             *(wait.load for wait in waits),
             *forgotten(automaton),
-            *(op for r in automaton.all_regions for op in begun(own, r.modes[r.initial])),
+            *(op for r in automaton.all_regions for op in of_mode(begins, r.modes[r.initial])),
             *((Assign(AGE.name, real(0.0)),) if histories else ()),
             Assign("memory.time", real(0.0)),
             Assign("memory.started", Value(True)),

@@ -30,6 +30,7 @@ from language.operation import (
     Expr,
     FaultBit,
     Loop,
+    Op,
     Ref,
     Run,
     Unary,
@@ -90,29 +91,30 @@ def waits_of(infos: tuple[TransitionInfo, ...], alarms: tuple[Alarm, ...]) -> Wa
     return tuple(found)
 
 
-WaitsByMode = Mapping[tuple[str, int], Waits]
-"""Waits by the region and the number of the mode."""
+BlocksByMode = Mapping[tuple[str, int], Block]
+"""Blocks by the region and the number of the mode."""
 
 
-def by_mode_of(waits: Waits) -> WaitsByMode:
-    """Return the waits by the mode in which they run."""
-    found: dict[tuple[str, int], Waits] = {}
-    for wait in waits:
-        place = wait.region, wait.mode
-        found[place] = (*found.get(place, ()), wait)
-    return found
-
-
-def begun(waits: WaitsByMode, mode: Mode) -> Block:
+def begun(waits: Waits) -> BlocksByMode:
     """Return what begins when a mode is entered; waits of transitions are at their start."""
-    own = waits.get((mode.region, mode.number), ())
-    return tuple(op for wait in own for op in (*wait.begin, wait.load))
+    found: dict[tuple[str, int], list[Op]] = {}
+    for wait in waits:
+        found.setdefault((wait.region, wait.mode), []).extend((*wait.begin, wait.load))
+    return {place: tuple(ops) for place, ops in found.items()}
 
 
-def ended(waits: WaitsByMode, mode: Mode) -> Block:
+def ended(waits: Waits) -> BlocksByMode:
     """Return what puts the waits of a mode that is left back to their start (rule 4)."""
-    own = waits.get((mode.region, mode.number), ())
-    return tuple(wait.load for wait in own if wait.is_restarted)
+    found: dict[tuple[str, int], list[Op]] = {}
+    for wait in waits:
+        if wait.is_restarted:
+            found.setdefault((wait.region, wait.mode), []).append(wait.load)
+    return {place: tuple(ops) for place, ops in found.items()}
+
+
+def of_mode(blocks: BlocksByMode, mode: Mode) -> Block:
+    """Return the block of a mode, empty where it has none."""
+    return blocks.get((mode.region, mode.number), ())
 
 
 def stepping_blocks(field: Field, waits: Waits, ages: tuple[str, ...]) -> dict[str, Block]:

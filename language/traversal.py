@@ -28,17 +28,19 @@ from language.operation import (
 
 def walk(block: Block) -> Iterator[Op]:
     """Yield every operation of a block, those inside others too."""
-    for op in block:
+    stack = list(reversed(block))
+    while stack:
+        op = stack.pop()
         yield op
         match op:
             case Branch(_, then, other):
-                yield from walk(then)
-                yield from walk(other)
+                stack += reversed(other)
+                stack += reversed(then)
             case Choose(_, cases):
-                for _, case_block in cases:
-                    yield from walk(case_block)
+                for _, case_block in reversed(cases):
+                    stack += reversed(case_block)
             case Loop(_, _, body):
-                yield from walk(body)
+                stack += reversed(body)
 
 
 def block_names(block: Block) -> Iterator[str]:

@@ -26,6 +26,8 @@ from language.traversal import expr_names
 
 SAMPLES = 64
 """Points of the search; a guard of one or two linear relations is met within a few."""
+MOST_EVALUATIONS = 400_000
+"""Expressions evaluated in a search, shared by all pairs of guards: a few seconds."""
 DEFAULT_RANGE = (-10.0, 10.0)
 """Searched where a state or input gives no range, in SI."""
 PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37)
@@ -47,8 +49,8 @@ class Lowered:
 class WitnessSearch:
     """The sample points of one automaton, and what its guards are there."""
 
-    def __init__(self, automaton: Automaton) -> None:
-        """Take the parameters' present values."""
+    def __init__(self, automaton: Automaton, pairs: int = 1) -> None:
+        """Take the parameters' present values; the effort is shared by some pairs of guards."""
         self.automaton = automaton
         self.known: dict[str, Expr] = {
             **constant_names(automaton),
@@ -57,30 +59,40 @@ class WitnessSearch:
         self.constants = values_of(parameter_constants(automaton, Problems()))
         self.lowered: dict[tuple[str, int], Lowered | None] = {}
         self.samples: dict[int, Point] = {}
+        self.configurations: dict[tuple[str, str], Mode] = {}
+        self.share = MOST_EVALUATIONS // max(pairs, 1)
+        self.evaluations = 0
+
+    def _mode(self, transition: Transition) -> Mode:
+        """Return the source of a transition with the equations of all regions."""
+        place = transition.region, transition.source
+        if place not in self.configurations:
+            self.configurations[place] = one_configuration(self.automaton, transition)
+        return self.configurations[place]
 
     def both(self, first: Transition, second: Transition) -> Point | None:
         """Return values at which two guards of one mode hold together, if some are found."""
-        mode = one_configuration(self.automaton, first)
+        mode = self._mode(first)
         for point in self._points([first.when.tree, second.when.tree], mode):
             if self._hold(first, second, point):
                 return _shortened(point, lambda shorter: self._hold(first, second, shorter))
         return None
 
     def _hold(self, first: Transition, second: Transition, point: Point) -> bool:
-        mode = one_configuration(self.automaton, first)
+        mode = self._mode(first)
         return self._holds(first, mode, point) and self._holds(second, mode, point)
 
     def refires(self, out: Transition, back: Transition) -> Point | None:
         """Return values at which `out` and `back` fire in turn for ever, if some are found."""
-        there = one_configuration(self.automaton, back)
+        there = self._mode(back)
         for start in self._points([out.when.tree, back.when.tree], there):
             if self._refires_at(out, back, start):
                 return _shortened(start, lambda shorter: self._refires_at(out, back, shorter))
         return None
 
     def _refires_at(self, out: Transition, back: Transition, start: Point) -> bool:
-        here = one_configuration(self.automaton, out)
-        there = one_configuration(self.automaton, back)
+        here = self._mode(out)
+        there = self._mode(back)
         if not self._holds(out, here, start):
             return False
         arrived = self._reset(out, here, start)
@@ -115,11 +127,17 @@ class WitnessSearch:
         return found
 
     def _points(self, guards: list[Tree], mode: Mode) -> Iterator[Point]:
-        """Yield the sample points, each also moved onto every boundary that a guard names."""
+        """Yield the sample points, each also moved onto every boundary that a guard names.
+
+        It ends where the pair has used its share of evaluations: the same ones on every machine.
+        """
+        self.evaluations = 0
         boundaries = [
             part for guard in guards for part in walk(guard) if isinstance(part, Relation)
         ]
         for index in range(1, SAMPLES + 1):
+            if self.evaluations > self.share:
+                return
             if index not in self.samples:
                 self.samples[index] = self._sample(index)
             point = self.samples[index]
@@ -185,6 +203,7 @@ class WitnessSearch:
         if lowered is None:
             return None
         values: dict[str, Scalar] = {}
+        self.evaluations += len(lowered.steps) + 1
         try:
             for name in lowered.reads:
                 values[name] = point[name] if name in point else self.constants[name]
@@ -213,20 +232,33 @@ class WitnessSearch:
 
 def report_refiring(automaton: Automaton, problems: Problems) -> None:
     """Report transitions that fire for ever at one instant, with a witness (rules 9 and 12)."""
-    search = WitnessSearch(automaton)
+    pairs = list(_there_and_back(automaton))
+    search = WitnessSearch(automaton, len(pairs)) if pairs else None
     seen: set[frozenset[str]] = set()
+    for out, back in pairs if search else ():
+        pair = frozenset({out.key, back.key})
+        point = search.refires(out, back) if search and pair not in seen else None
+        if search and point is not None:
+            seen.add(pair)
+            _report(search, out, back, point, problems)
+
+
+def _there_and_back(automaton: Automaton) -> Iterator[tuple[Transition, Transition]]:
+    """Yield the pairs of transitions that lead to a mode and back without a wait.
+
+    Assignments on entry and exit are not searched.
+    """
+    ways: dict[tuple[str, str, str], list[Transition]] = {}
+    for mode in automaton.all_modes:
+        for way in mode.transitions:
+            ways.setdefault((way.region, way.source, way.target), []).append(way)
     for mode in automaton.all_modes:
         for out in mode.transitions:
-            for back in automaton.target(out).transitions:
-                pair = frozenset({out.key, back.key})
-                if back.target != mode.name or out.wait or back.wait or pair in seen:
-                    continue
-                if any(each.entry or each.exit for each in (mode, automaton.target(out))):
-                    continue  # their assignments are not searched
-                point = search.refires(out, back)
-                if point is not None:
-                    seen.add(pair)
-                    _report(search, out, back, point, problems)
+            target = automaton.target(out)
+            acting = any(each.entry or each.exit for each in (mode, target))
+            for back in () if acting else ways.get((out.region, out.target, out.source), ()):
+                if not out.wait and not back.wait:
+                    yield out, back
 
 
 def _report(
