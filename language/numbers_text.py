@@ -17,6 +17,7 @@ def numbers_text(program: Program) -> str:
     if program.motion:
         lines += motion_lines(program.motion)
         lines += _work_lines(program, program.motion)
+        lines += _rewind_lines(program)
     for observer in program.observers:
         lines += _observer_lines(program, observer)
     return "\n".join(lines) + "\n"
@@ -46,6 +47,18 @@ def _work_lines(program: Program, motion: MotionInfo) -> Iterator[str]:
         f"  work: at most {motion.events} events per substep, {motion.events * once} products and "
         f"{motion.events * RUN_HALVINGS} looks at the guards"
     )
+
+
+def _rewind_lines(program: Program) -> Iterator[str]:
+    """What a transition that goes back does at most in its tick."""
+    for info in program.transitions:
+        if info.rewind:
+            way = f"{program.mode_name(info.source)} -> {program.mode_name(info.target)}"
+            looks = info.rewind + RUN_HALVINGS + 2
+            yield (
+                f"  rewind {way}: at most {looks} looks at `until` and {info.rewind} runs, "
+                f"one of them over a part of a period"
+            )
 
 
 def _observer_lines(program: Program, observer: ObserverInfo) -> Iterator[str]:

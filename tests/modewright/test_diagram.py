@@ -58,6 +58,7 @@ def test_the_svg_holds_every_mode_guard_wait_priority_and_reset() -> None:
     for part in ("drive", "gap", "coast", "T_hs <= 0 N*m", "for t_wait", "(1) in(", "(2) in("):
         assert part in text
     assert "/ theta_b = alpha" in shown(mw.graph("driveline", ROOT).svg())
+    assert "/ rewind: until T_hs <= 0 N*m" in shown(mw.graph("hko", ROOT).svg())
 
 
 def shown(svg: str) -> str:

@@ -129,6 +129,13 @@ def test_the_numbers_of_a_run_and_its_observers_are_printed() -> None:
             assert f"{constant.value:.16g}" in text.partition("observer of mode coast")[0]
 
 
+def test_what_a_rewind_does_at_most_is_printed() -> None:
+    """8 ticks back: one look at each and now, one at the end of a step, 24 halvings."""
+    text = explained("hko", "numbers", {}, ROOT)
+    assert "rewind drive -> gap: at most 34 looks at `until` and 8 runs" in text
+    assert "transition 1 gap: 1 -> 0 rewind 8 ticks" in explained("hko", "program", {}, ROOT)
+
+
 def test_the_largest_stable_step_is_printed_where_it_holds(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
