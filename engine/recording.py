@@ -13,7 +13,11 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
 
 from language.experiment import Column, RecordingMap, Window
 from language.problem import Problems, Source, Span, nearest
@@ -37,6 +41,16 @@ class Channel:
     times: tuple[Fraction, ...]
     values: tuple[float, ...]
 
+    @cached_property
+    def seconds(self) -> NDArray[np.float64]:
+        """Time stamps [s] (n_samples,), rounded."""
+        return np.array([float(time) for time in self.times])
+
+    @cached_property
+    def array(self) -> NDArray[np.float64]:
+        """Values in SI (n_samples,)."""
+        return np.array(self.values)
+
 
 @dataclass(frozen=True)
 class Recording:
@@ -58,10 +72,11 @@ class Recording:
 
 def pieces(recording: Recording) -> list[Recording]:
     """Return a recording as one for each of its windows."""
-    return [_cut(recording, window) for window in recording.windows] or [recording]
+    return [cut(recording, window) for window in recording.windows] or [recording]
 
 
-def _cut(recording: Recording, window: Window) -> Recording:
+def cut(recording: Recording, window: Window) -> Recording:
+    """Return what a recording has in a window; a channel without a value there is left out."""
     channels = {}
     for name, channel in recording.channels.items():
         first = bisect_left(channel.times, window[0])
@@ -111,7 +126,7 @@ def within(recording: Recording, mapping: RecordingMap) -> Recording:
             hint += f"{float(recording.end):g} s"
             problems.error("range", mapping.span, label + ", a window of this map", hint)
     problems.stop_if_any()
-    whole = _cut(recording, (recording.windows[0][0], recording.windows[-1][1]))
+    whole = cut(recording, (recording.windows[0][0], recording.windows[-1][1]))
     return dataclasses.replace(whole, windows=recording.windows)
 
 

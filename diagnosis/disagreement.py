@@ -1,0 +1,200 @@
+"""Disagreement: what odd relations to the simulation say about signs, units and clocks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from statistics import median
+
+from diagnosis.consistency import Relation
+from diagnosis.finding import Finding, Severity
+from engine.recording import Recording
+from language.experiment import RecordingMap
+from language.map import column_dimension
+from language.model import Automaton
+from language.units import Dimension, fits, parse_unit
+
+OFFSET_ERROR, OFFSET_WARNING = 0.1, 0.08
+"""Offsets of clocks [s] that are an error and a warning; actuators and sensors lag up to 0.05."""
+SAME_CLOCK = 0.04
+"""Lags nearer than this are one offset [s]."""
+MOST = 0.6
+"""Share of the recordings from which a mistake is that of all of them."""
+ODD_SCALE = 2.5
+"""Ratio of measured to simulated above which, or below whose inverse, the scale is told."""
+NEAR_FACTOR = 0.3
+"""Relative distance from a factor of units; parameters of a naive model are 20 per cent wrong."""
+FACTORS: Sequence[tuple[float, str, str]] = (
+    (30.0 / math.pi, "rad/s", "rpm taken for rad/s"),
+    (math.pi / 30.0, "rad/s", "rad/s taken for rpm"),
+    (3.6, "m/s", "km/h taken for m/s"),
+    (1.0 / 3.6, "m/s", "m/s taken for km/h"),
+    (180.0 / math.pi, "rad", "deg taken for rad"),
+    (math.pi / 180.0, "rad", "rad taken for deg"),
+    (180.0 / math.pi, "rad/s", "deg/s taken for rad/s"),
+    (1000.0, "", "a unit a thousand times smaller than the map says"),
+    (1.0e-3, "", "a unit a thousand times larger than the map says"),
+)
+"""A factor between measured and simulated, where it can occur, and what it comes from."""
+
+
+def disagreements(
+    found: Sequence[Relation],
+    automaton: Automaton,
+    mapping: RecordingMap,
+    recordings: Sequence[Recording],
+) -> list[Finding]:
+    """Return what is to be told of the signs, units and clocks of each recording."""
+    own = {
+        recording.name: _found(
+            recording.name,
+            [relation for relation in found if relation.recording == recording.name],
+            automaton,
+            mapping,
+            [recording],
+        )
+        for recording in recordings
+    }
+    clear = {relation.recording for relation in found if relation.is_clear}
+    if len(clear) < 2:
+        return [finding for findings in own.values() for finding in findings]
+    shared = [
+        finding
+        for finding in _found("", found, automaton, mapping, recordings)
+        if sum(_has(findings, finding) for findings in own.values()) > MOST * len(clear)
+    ]
+    rest = [f for findings in own.values() for f in findings if not _has(shared, f)]
+    return [*shared, *rest]
+
+
+def _has(findings: Sequence[Finding], like: Finding) -> bool:
+    return any(f.channel == like.channel and f.kind in _alike(like.kind) for f in findings)
+
+
+def _alike(kind: str) -> tuple[str, ...]:
+    return ("unit", "scale") if kind in ("unit", "scale") else (kind,)
+
+
+def _found(
+    name: str,
+    relations: Sequence[Relation],
+    automaton: Automaton,
+    mapping: RecordingMap,
+    recordings: Sequence[Recording],
+) -> list[Finding]:
+    """Return what the relations of one recording or of all say; clocks if all else is right."""
+    clear = [relation for relation in relations if relation.is_clear]
+    by_channel = {
+        channel: [r for r in clear if r.channel == channel]
+        for channel in dict.fromkeys(r.channel for r in clear)
+    }
+    if not by_channel:
+        return []
+    one = _Recorded(name, recordings, automaton, mapping, by_channel)
+    return [*one.signs(), *one.units()] or one.clocks()
+
+
+class _Recorded:
+    """The clear relations of one recording or of all of them, by channel."""
+
+    def __init__(
+        self,
+        name: str,
+        recordings: Sequence[Recording],
+        automaton: Automaton,
+        mapping: RecordingMap,
+        relations: Mapping[str, Sequence[Relation]],
+    ) -> None:
+        self.name = name
+        self.mapping = mapping
+        self.gains = {name: median(r.gain for r in rs) for name, rs in relations.items()}
+        self.lags = {name: median(r.believed_lag for r in rs) for name, rs in relations.items()}
+        self.inputs = [
+            channel.column.name
+            for channel in recordings[0].channels.values()
+            if channel.column.to in automaton.inputs
+            if any(_varies(recording, channel.column.name) for recording in recordings)
+        ]
+
+    def _blamed(self, odd: Sequence[str]) -> tuple[str, str]:
+        """Return the channel to blame and how it is called: an input if all outputs are odd."""
+        if len(odd) == len(self.gains) and self.inputs:
+            if len(odd) > 1:
+                return self.inputs[0], f"input `{self.inputs[0]}`"
+            return odd[0], f"`{odd[0]}` or input `{self.inputs[0]}`"
+        return odd[0], f"`{odd[0]}`"
+
+    def _tell(self, kind: str, channel: str, text: str, severity: Severity) -> Finding:
+        return Finding(kind, self.name, channel, text, severity)
+
+    def signs(self) -> list[Finding]:
+        """Outputs that move against the simulated ones."""
+        odd = [name for name, gain in self.gains.items() if gain < 0.0]
+        if not odd:
+            return []
+        groups = [odd] if len(odd) == len(self.gains) else [[name] for name in odd]
+        found = []
+        for group in groups:
+            channel, called = self._blamed(group)
+            text = f"{called} has the wrong sign: it moves against what the model gives"
+            found.append(self._tell("sign", channel, text, "error"))
+        return found
+
+    def units(self) -> list[Finding]:
+        """Outputs far larger or smaller than the simulated ones."""
+        sizes = {name: abs(gain) for name, gain in self.gains.items()}
+        odd = [n for n, size in sizes.items() if not 1.0 / ODD_SCALE < size < ODD_SCALE]
+        if not odd:
+            return []
+        together = len(odd) == len(sizes) and max(sizes.values()) < 1.6 * min(sizes.values())
+        found = []
+        for group in [odd] if together else [[name] for name in odd]:
+            channel, called = self._blamed(group) if together else (group[0], f"`{group[0]}`")
+            size = median(sizes[name] for name in group)
+            if channel not in sizes:
+                size = 1.0 / size  # an input too large makes all outputs look too small
+            found.append(self._scale(channel, called, size, channel in sizes))
+        return found
+
+    def _scale(self, channel: str, called: str, size: float, is_output: bool) -> Finding:
+        dimension = column_dimension(self.mapping.columns[channel])
+        share = f"{size:.3g} times" if size > 1.0 else f"1/{1.0 / size:.3g} of"
+        source = _reason(size, dimension)
+        what = f"{share} what the model {'gives' if is_output else 'needs'}"
+        text = f"{called} is {what}" + (f": {source}?" if source else "")
+        if source:
+            return self._tell("unit", channel, text, "error")
+        return self._tell("scale", channel, text, "warning")
+
+    def clocks(self) -> list[Finding]:
+        """Outputs that lag or lead the simulated ones by more than an actuator or sensor does."""
+        odd = [name for name, lag in self.lags.items() if abs(lag) >= OFFSET_WARNING]
+        if not odd:
+            return []
+        lags = [self.lags[name] for name in odd]
+        together = len(odd) == len(self.lags) and max(lags) - min(lags) < SAME_CLOCK
+        found = []
+        for group in [odd] if together else [[name] for name in odd]:
+            channel, called = self._blamed(group) if together else (group[0], f"`{group[0]}`")
+            lag = median(self.lags[name] for name in group)
+            later = (lag > 0.0) == (channel in self.lags)
+            text = f"the clock of {called} is {abs(lag):.2f} s {'late' if later else 'early'}"
+            severity: Severity = "error" if abs(lag) >= OFFSET_ERROR else "warning"
+            found.append(self._tell("clock_offset", channel, text, severity))
+        return found
+
+
+def _varies(recording: Recording, name: str) -> bool:
+    channel = recording.channels.get(name)
+    return channel is not None and len(set(channel.values)) > 1
+
+
+def _reason(size: float, dimension: Dimension) -> str:
+    """Return what makes a channel `size` times as large as it should be; empty if not known."""
+    near = [
+        (abs(math.log(size / factor)), reason)
+        for factor, unit, reason in FACTORS
+        if not unit or fits(parse_unit(unit).dimension, dimension)
+    ]
+    distance, reason = min(near)
+    return reason if distance < math.log(1.0 + NEAR_FACTOR) else ""

@@ -1,0 +1,157 @@
+"""Recording check: what is told of spoiled recordings, and that good ones are left in peace."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from diagnosis.excitation import EFFECTS, NEEDS
+from diagnosis.recording_check import RecordingCheck, check_recordings
+from engine.recording import Recording
+from language.project import Project
+from tests.diagnosis.driving import (
+    Spoil,
+    Values,
+    bench,
+    driveline,
+    later,
+    recording_of,
+    scaled,
+    shortened,
+    spoiled,
+    tip_in,
+)
+
+RPM = 30.0 / math.pi
+
+
+def check(*recordings: Recording) -> RecordingCheck:
+    return check_recordings(recordings, bench(), driveline())
+
+
+def told(found: RecordingCheck) -> set[tuple[str, str, str]]:
+    return {(one.severity, one.kind, one.channel) for one in found.findings}
+
+
+def test_nothing_is_told_of_a_good_recording() -> None:
+    found = check(spoiled())
+    assert found.findings == ()
+    assert found.is_usable
+
+
+def test_the_facts_of_a_channel_are_those_it_was_made_with() -> None:
+    torque, brake, motor, wheel = check(spoiled()).channels
+    assert [round(c.rate, 6) for c in (torque, motor, wheel)] == [100.0, 100.0, 100.0]
+    assert (torque.quantum, motor.quantum, wheel.quantum) == pytest.approx((0.25, 0.05, 0.01))
+    noise = [math.hypot(sd, q / math.sqrt(12)) for sd, q in ((0.3, 0.25), (0.1, 0.05))]
+    assert (torque.noise, motor.noise) == pytest.approx(noise, rel=0.15)
+    assert (brake.noise, brake.low, brake.high) == (0.0, 0.0, 300.0)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "expected"),
+    [
+        (scaled("motor", RPM), ("error", "unit", "motor")),
+        (scaled("wheel", RPM), ("error", "unit", "wheel")),
+        (scaled("torque", 1000.0), ("error", "unit", "torque")),
+        (scaled("torque", -1.0), ("error", "sign", "torque")),
+        (scaled("wheel", -1.0), ("error", "sign", "wheel")),
+        (later("wheel", 0.2), ("error", "clock_offset", "wheel")),
+        (later("torque", 0.2), ("error", "clock_offset", "torque")),
+        (scaled("wheel", 0.0), ("error", "no_signal", "wheel")),
+        (scaled("torque", 0.0), ("error", "no_signal", "torque")),
+    ],
+)
+def test_a_spoiled_channel_is_named_and_nothing_else(
+    spoil: Spoil, expected: tuple[str, str, str]
+) -> None:
+    found = check(spoiled(spoil))
+    assert told(found) == {expected}
+    assert not found.is_usable
+
+
+def test_a_mistake_that_is_in_all_recordings_is_told_once() -> None:
+    spoil = scaled("motor", RPM)
+    found = check(spoiled(spoil, "a"), spoiled(spoil, "b"))
+    (one,) = found.findings
+    assert (one.recording, one.channel) == ("", "motor")
+    assert one.text.endswith("times what the model gives: rpm taken for rad/s?")
+
+
+def test_a_mistake_in_one_of_two_recordings_is_told_of_that_one() -> None:
+    found = check(spoiled(scaled("wheel", -1.0), "bad"), spoiled(None, "good"))
+    assert [(one.kind, one.recording) for one in found.findings] == [("sign", "bad")]
+
+
+def test_parameters_that_are_a_fifth_off_and_a_small_delay_are_no_mistake_of_the_data() -> None:
+    found = check_recordings([spoiled(later("wheel", 0.03))], bench(), driveline())
+    assert found.is_usable and not found.findings
+
+
+def lost(times: Values, values: dict[str, Values]) -> None:
+    gone = np.random.default_rng(2).random(len(times)) < 0.2
+    for key in values:
+        values[key][gone] = np.nan
+
+
+def held(times: Values, values: dict[str, Values]) -> None:
+    gone = np.random.default_rng(2).random(len(times)) < 0.2
+    for k in range(1, len(times)):
+        for key in values if gone[k] else ():
+            values[key][k] = values[key][k - 1]
+
+
+def test_lost_samples_are_counted() -> None:
+    found = check(spoiled(lost))
+    assert all(c.dropped == pytest.approx(0.2, abs=0.03) for c in found.channels)
+    assert ("error", "dropped", "motor") in told(found)
+
+
+def test_samples_that_were_held_instead_of_lost_are_seen() -> None:
+    found = check(spoiled(held))
+    assert ("error", "repeated", "motor") in told(found)
+
+
+def test_a_long_gap_is_told_with_its_place() -> None:
+    def gap(times: Values, values: dict[str, Values]) -> None:
+        values["wheel"][(times > 3.0) & (times < 3.305)] = np.nan
+
+    (one,) = [f for f in check(spoiled(gap)).findings if f.kind == "gap"]
+    assert one.window == pytest.approx((3.0, 3.31))
+    assert one.text == "has no value for 0.31 s"
+
+
+def test_a_clipped_and_a_stuck_signal_are_seen() -> None:
+    def limit(_: Values, values: dict[str, Values]) -> None:
+        values["torque"] = np.minimum(values["torque"], 60.0)
+        values["wheel"][300:360] = values["wheel"][300]
+
+    found = told(check(spoiled(limit)))
+    assert {("warning", "clipped", "torque"), ("warning", "stuck", "wheel")} <= found
+
+
+def test_a_short_recording_and_a_still_one_tell_nothing_apart() -> None:
+    assert ("error", "too_short", "") in told(check(shortened(spoiled(), 1)))
+    times, values = tip_in(constant=True)
+    assert ("error", "no_excitation", "") in told(check(recording_of("still", times, values)))
+
+
+def test_what_is_excited_says_which_effects_can_be_tested() -> None:
+    def only_forward(times: Values, values: dict[str, Values]) -> None:
+        values["motor"] += 200.0
+        values["wheel"] += 200.0 / 9.0
+
+    whole = {e.effect: e for e in check(spoiled()).excitation.effects}
+    assert whole["coulomb_friction"].is_testable and whole["backlash"].is_testable
+    forward = {e.effect: e for e in check(spoiled(only_forward)).excitation.effects}
+    assert forward["backlash"].is_testable
+    assert forward["coulomb_friction"].lacking == ("a speed that passes through zero",)
+    assert forward["actuator_lag"].is_testable
+
+
+def test_every_effect_that_is_shipped_says_what_it_needs() -> None:
+    assert set(Project(Path()).effects) <= set(EFFECTS)
+    assert {need for needs in EFFECTS.values() for need in needs} <= set(NEEDS)
