@@ -15,6 +15,7 @@ from typing import Literal
 from language.constants import exact_value
 from language.lower import closure, variable_names
 from language.model import Automaton, Mode, Rewind, Transition
+from language.once import once
 from language.operation import (
     Assign,
     Block,
@@ -77,14 +78,26 @@ class Rewinding:
         return [name for formula in written for name in formula.reads]
 
 
-def rewinds_of(automaton: Automaton) -> list[Rewinding]:
+@once
+def rewinds_of(automaton: Automaton) -> tuple[Rewinding, ...]:
     """Return the transitions of an automaton that go back."""
+    modes = automaton.modes.values()
+    return tuple(rewinding for mode in modes for rewinding in rewinds_from(automaton, mode))
+
+
+def rewinds_from(automaton: Automaton, mode: Mode) -> list[Rewinding]:
+    """Return the transitions that leave a mode of the chart and go back."""
     return [
         Rewinding(automaton, mode, transition, transition.rewind)
-        for mode in automaton.modes.values()
         for transition in mode.transitions
         if transition.rewind
     ]
+
+
+@once
+def entered_late(automaton: Automaton) -> frozenset[str]:
+    """Return the modes that a transition enters which goes back."""
+    return frozenset(rewinding.transition.target for rewinding in rewinds_of(automaton))
 
 
 def taken_back(automaton: Automaton) -> tuple[str, ...]:
@@ -112,6 +125,7 @@ def keep_past(automaton: Automaton) -> Block:
     )
 
 
+@once
 def kept_inputs(automaton: Automaton) -> dict[str, Ref]:
     """Return the inputs that are kept: what runs, `until`, exit, reset and entry read."""
     read: set[str] = set()

@@ -35,13 +35,14 @@ from language.operation import (
 from language.past import (
     KEPT,
     Rewinding,
+    entered_late,
     find_place,
     input_at,
     inputs_as_now,
     inputs_at_place,
     kept_inputs,
     past_variables,
-    rewinds_of,
+    rewinds_from,
     run_inputs,
     run_inputs_at_place,
     states_as_now,
@@ -64,10 +65,9 @@ REST = Ref("work.rest")
 def rewind_blocks(automaton: Automaton, mode: Mode, now: Names) -> dict[str, Block]:
     """Return the blocks of the transitions of a mode that go back; `now` has no equations."""
     found: dict[str, Block] = {}
-    for rewinding in rewinds_of(automaton):
-        if rewinding.source.name == mode.name:
-            found[f"until_{rewinding.label}"] = _until(rewinding, now)
-            found[f"back_{rewinding.label}"] = _back(rewinding, now)
+    for rewinding in rewinds_from(automaton, mode):
+        found[f"until_{rewinding.label}"] = _until(rewinding, now)
+        found[f"back_{rewinding.label}"] = _back(rewinding, now)
     return found
 
 
@@ -75,8 +75,7 @@ def advance_blocks(automaton: Automaton, mode: Mode) -> dict[str, Block]:
     """Return `run_<mode>`: its period; of what a rewind enters also `rest_<mode>`, a part of it."""
     if mode.run is None:
         return {}
-    targets = [r.transition.target for r in rewinds_of(automaton)]
-    if mode.name not in targets:
+    if mode.name not in entered_late(automaton):
         return {f"run_{mode.name}": run_block(automaton, mode.run)}
     assert automaton.period is not None
     period = Assign(REST.name, real(automaton.period), f"{automaton.name} {mode.run.key}")
