@@ -6,6 +6,7 @@ from fractions import Fraction
 
 from language.constants import exact_value
 from language.declaration import Formula
+from language.history import tunable_time
 from language.memory import MAX_DELAY, applications, formulas, type_of
 from language.model import Automaton, Transition
 from language.parameter import parameter_kinds
@@ -49,6 +50,12 @@ def _time(
     automaton: Automaton, tree: Application, time: Tree, longest: int, problems: Problems
 ) -> None:
     kinds = parameter_kinds(automaton)
+    tuned = tunable_time(automaton, time) if tree.function == "delay" else None
+    if tuned and not automaton.is_sampled:
+        if tuned[1] / automaton.step > MAX_DELAY:
+            label = f"`delay` of more than {MAX_DELAY} major steps at the end of its range"
+            problems.error("wait", time.span, label, "a longer `step`")
+        return
     for read in names(time):
         if kinds.get(read.path, "fixed") != "fixed":
             label = f"`{read.path}` is {kinds[read.path]}: a time is made of fixed values"

@@ -21,6 +21,7 @@ from language.model import Automaton, Mode
 from language.operation import (
     Assign,
     Block,
+    Call,
     Compare,
     Expr,
     Item,
@@ -29,6 +30,7 @@ from language.operation import (
     Ref,
     Select,
     Store,
+    Unary,
     add,
     divide,
     multiply,
@@ -36,8 +38,9 @@ from language.operation import (
     subtract,
     whole,
 )
+from language.parameter import constant_names
 from language.program import Alarm, Variable
-from language.syntax import Application, memory_key, walk
+from language.syntax import Application, Name, Tree, memory_key, walk
 
 AGE = Ref("memory.age")
 """Time since the last record [s]; an engine sets it."""
@@ -45,11 +48,16 @@ AGE = Ref("memory.age")
 
 @dataclass(frozen=True)
 class History:
-    """One delayed quantity: `steps` is its delay in major steps."""
+    """One delayed quantity: `steps` is its delay in major steps, the longest if it is `tunable`.
+
+    `tunable` is the parameter [s] that the delay is, at least one major step.
+    """
 
     number: int
     tree: Application
     steps: Fraction
+    step: Fraction
+    tunable: Expr | None = None
 
     @property
     def whole_steps(self) -> int:
@@ -65,9 +73,25 @@ def histories_of(automaton: Automaton) -> tuple[History, ...]:
     """Return what a continuous automaton delays, what is inside another delay first."""
     found: list[History] = []
     for tree in applications(automaton, ("delay",)).values():
-        time = exact_value(Formula(tree.arguments[1], ""), automaton)
-        found.append(History(len(found) + 1, tree, time / automaton.step))
+        time, step = tree.arguments[1], automaton.step
+        tuned = tunable_time(automaton, time)
+        if tuned is None:
+            steps = exact_value(Formula(time, ""), automaton) / step
+            found.append(History(len(found) + 1, tree, steps, step))
+        else:
+            steps = Fraction(max(1, math.ceil(tuned[1] / step)))
+            parameter = constant_names(automaton)[tuned[0]]
+            found.append(History(len(found) + 1, tree, steps, step, parameter))
     return tuple(found)
+
+
+def tunable_time(automaton: Automaton, time: Tree) -> tuple[str, Fraction] | None:
+    """Return the parameter that a time is if it is tunable, and the end of its range [s]."""
+    if isinstance(time, Name):
+        parameter = automaton.parameters.get(time.path)
+        if parameter and parameter.kind == "tunable" and parameter.range:
+            return parameter.name, parameter.range[1]
+    return None
 
 
 def delayed(automaton: Automaton, histories: tuple[History, ...]) -> dict[str, Expr]:
@@ -82,6 +106,9 @@ def delayed(automaton: Automaton, histories: tuple[History, ...]) -> dict[str, E
         back = subtract(real(history.steps), passed)
         count = history.whole_steps
         far, middle, near = (Ref(history.name(part)) for part in ("far", "middle", "near"))
+        if history.tunable is not None:
+            found[memory_key(history.tree)] = _tuned(history, passed)
+            continue
         older = _between(middle, far, subtract(back, real(Fraction(count - 1))))
         if history.steps == count:
             found[memory_key(history.tree)] = older
@@ -92,12 +119,22 @@ def delayed(automaton: Automaton, histories: tuple[History, ...]) -> dict[str, E
     return found
 
 
+def _tuned(history: History, passed: Expr) -> Expr:
+    """What a delay of a tunable length is, `passed` major steps after the last record."""
+    far, middle, near = (Ref(history.name(part)) for part in ("far", "middle", "near"))
+    last = subtract(Call("real", (Ref(history.name("count"), whole=True),)), real(1.0))
+    over = subtract(subtract(Ref(history.name("delay")), passed), last)
+    newer = _between(near, middle, add(over, real(1.0)))
+    return Select(Compare(">=", over, real(0.0)), _between(middle, far, over), newer)
+
+
 def record_block(histories: tuple[History, ...], known: Names) -> Block:
     """Return what a major step keeps: all read the values of before it."""
     ops: list[Op] = []
     commit: list[Op] = []
     for history in histories:
-        kept, newest = Ref(f"work.keep_{history.number}"), Ref(history.name("newest"))
+        kept = Ref(f"work.keep_{history.number}")
+        newest = Ref(history.name("newest"), whole=True)
         ops.append(Assign(kept.name, expression(history.tree.arguments[0], known)))
         commit.append(Assign(newest.name, _place(history, newest, 1)))
         commit.append(Store(history.name("values"), newest, kept))
@@ -130,12 +167,34 @@ def _place(history: History, newest: Ref, ahead: int) -> Expr:
 
 
 def _oldest(history: History) -> list[Op]:
-    newest = Ref(history.name("newest"))
+    newest = Ref(history.name("newest"), whole=True)
+    if history.tunable is not None:
+        return _oldest_tuned(history, newest)
     parts = ("far", "middle") if history.steps == history.whole_steps else ("far", "middle", "near")
     return [
         Assign(history.name(part), Item(history.name("values"), _place(history, newest, ahead)))
         for ahead, part in enumerate(parts, start=1)
     ]
+
+
+def _oldest_tuned(history: History, newest: Ref) -> list[Op]:
+    """The delay as it is now, and the values around its end."""
+    delay, count = history.name("delay"), history.name("count")
+    assert history.tunable is not None
+    steps = divide(history.tunable, real(history.step))
+    size = history.whole_steps + 1
+    rounded_up = Unary("-", Call("floor", (Unary("-", Ref(delay)),)))
+    ops: list[Op] = [
+        Assign(delay, Call("clip", (steps, real(1.0), real(history.steps)))),
+        Assign(count, Call("whole", (rounded_up,))),
+    ]
+    for less, part in enumerate(("far", "middle", "near")):
+        place = add(subtract(newest, Ref(count, whole=True)), whole(less))
+        inside = Select(Compare("<", place, whole(0)), add(place, whole(size)), place)
+        if part == "near":
+            inside = Select(Compare(">", Ref(count, whole=True), whole(1)), inside, newest)
+        ops.append(Assign(history.name(part), Item(history.name("values"), inside)))
+    return ops
 
 
 def history_variables(histories: tuple[History, ...]) -> list[Variable]:
@@ -151,6 +210,8 @@ def history_variables(histories: tuple[History, ...]) -> list[Variable]:
         found.append(Variable(history.name("newest"), "whole", about="which is the newest"))
         found += [Variable(history.name(part), "real") for part in ("far", "middle", "near")]
         found.append(Variable(f"work.keep_{history.number}", "real"))
+        found.append(Variable(history.name("delay"), "real", about="delay in major steps"))
+        found.append(Variable(history.name("count"), "whole", about="delay, rounded up"))
     return found
 
 
