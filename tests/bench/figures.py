@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from typing import Any
 
 from tests.bench import in_c, ours, with_scipy
-from tests.bench.manoeuvre import CHATTER, TIP_OUT, Manoeuvre
-from tests.bench.timing import Ratio, interleaved
-from tests.bench.truth import Solution, accuracy, truth
+from tests.bench.manoeuvre import CHATTER as CHATTER, TIP_OUT as TIP_OUT, Manoeuvre
+from tests.bench.showing import errors_of, shown
+from tests.bench.timing import interleaved
 
 Figure = dict[str, Any]
 STEPS = ("5 ms", "2 ms", "1 ms")
@@ -29,28 +28,8 @@ def interpreter_over_scipy(pairs: int) -> Figure:
     return {**shown(ratio, "interpreter", "scipy"), "step": INTERPRETER_STEP, "errors": errors}
 
 
-def errors_at(step: str) -> Figure:
-    """The errors at a step: of a tip-out, and of many crossings in a row."""
-    found = {}
-    for case in (TIP_OUT, CHATTER):
-        own = ours.solution(ours.ready(case, step).interpreted())
-        rival = in_c.InC(case, float(step.partition(" ")[0]) / 1000).solution()
-        found[case.name] = {"modewright": errors_of(case, own), "c": errors_of(case, rival)}
-    return found
-
-
-def errors_of(case: Manoeuvre, found: Solution) -> Figure:
-    """Return the errors of a solution, by name."""
-    return asdict(accuracy(found, truth(case)))
-
-
-def shown(ratio: Ratio, name: str, other: str) -> Figure:
-    """Return a ratio as it stands in build/bench.json: quartiles, and both times [ms]."""
-    return {
-        "median": ratio.median,
-        "low": ratio.low,
-        "high": ratio.high,
-        "pairs": ratio.pairs,
-        f"{name}_ms": 1000 * ratio.seconds,
-        f"{other}_ms": 1000 * ratio.seconds_other,
-    }
+def errors_at(step: str, case: Manoeuvre) -> Figure:
+    """The errors of a manoeuvre at a step: ours, and those of the rival in C."""
+    own = ours.solution(ours.ready(case, step).interpreted())
+    rival = in_c.InC(case, float(step.partition(" ")[0]) / 1000).solution()
+    return {"modewright": errors_of(case, own), "c": errors_of(case, rival)}

@@ -15,6 +15,8 @@ import numpy as np
 
 from codegen.build import FLAGS, compiler_version
 from tests.bench import figures
+from tests.bench.rivals import RIVALS, RivalMissing, measured
+from tests.bench.showing import table
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 RESULT = ROOT / "build" / "bench.json"
@@ -26,17 +28,35 @@ def main(arguments: list[str] | None = None) -> int:
     """Measure, show and keep the figures."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--pairs", type=int, default=PAIRS, help="of each ratio")
+    parser.add_argument("--peers", default="", help=f"some of {', '.join(RIVALS)}")
     parser.add_argument("--out", type=Path, default=RESULT)
     given = parser.parse_args(arguments)
-    found = {
+    peers = [name for name in given.peers.split(",") if name]
+    for name in peers:
+        if name not in RIVALS:
+            parser.error(f"`{name}` is none of {', '.join(RIVALS)}")
+    cases = (figures.TIP_OUT, figures.CHATTER)
+    found: dict[str, Any] = {
         "machine": machine(),
         "single_run": {"interpreter_over_scipy": figures.interpreter_over_scipy(given.pairs)},
-        "accuracy": {step: figures.errors_at(step) for step in figures.STEPS},
+        "accuracy": {
+            step: {case.name: figures.errors_at(step, case) for case in cases}
+            for step in figures.STEPS
+        },
     }
+    found["rivals"] = {name: rival(name, given.pairs) for name in peers}
     given.out.parent.mkdir(parents=True, exist_ok=True)
     given.out.write_text(json.dumps(found, indent=1) + "\n")
     print("\n".join(table(found)))
     return 0
+
+
+def rival(name: str, pairs: int) -> dict[str, Any]:
+    """Return the figure of a tool in an environment of its own, or why there is none."""
+    try:
+        return measured(name, pairs)
+    except RivalMissing as missing:
+        return {"missing": str(missing)}
 
 
 def machine() -> dict[str, Any]:
@@ -52,38 +72,6 @@ def machine() -> dict[str, Any]:
         "numpy": np.__version__,
         "scipy": version("scipy"),
     }
-
-
-def table(found: dict[str, Any]) -> list[str]:
-    """Return the figures as lines."""
-    where = found["machine"]
-    lines = [
-        f"{where['processor']}, {where['cores']} cores, load {where['load'][0]}",
-        f"{where['compiler']}; {where['flags']}",
-        f"Python {where['python']}, numpy {where['numpy']}, scipy {where['scipy']}",
-        "",
-        "processor time over the rival's: median of pairs (quartiles)",
-    ]
-    for group in ("single_run", "sweep"):
-        for name, figure in found.get(group, {}).items():
-            spread = f"{figure['median']:.3g} ({figure['low']:.3g} .. {figure['high']:.3g})"
-            times = ", ".join(f"{k} {v:.4g}" for k, v in figure.items() if k.endswith("_ms"))
-            lines.append(f"  {group}.{name:24} {spread:26} {times}, {figure['pairs']} pairs")
-    lines += ["", "errors: events late [us], w_em over its peak (root mean square, largest)"]
-    for name, figure in found["single_run"].items():
-        for who, errors in figure.get("errors", {}).items():
-            lines.append(f"  {name:24} {who:12} {_errors(errors)}")
-    for step, cases in found["accuracy"].items():
-        for case, sides in cases.items():
-            for who, errors in sides.items():
-                lines.append(f"  {case:12} at {step:8} {who:12} {_errors(errors)}")
-    return lines
-
-
-def _errors(errors: dict[str, Any]) -> str:
-    whole = "all, in order" if errors["is_complete"] else "NOT AS THEY ARE"
-    sizes = f"{errors['rms']:.1e} {errors['largest']:.1e}"
-    return f"{1e6 * errors['late']:10.3f} us  {sizes}  {errors['events']} events {whole}"
 
 
 def _processor() -> str:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.bench import figures, run, timing
+from tests.bench import figures, rivals, run, timing
 from tests.bench.in_c import HERE, PEERS
 from tests.bench.manoeuvre import Manoeuvre
 
@@ -44,6 +44,21 @@ def test_a_small_run_has_every_figure_with_its_errors(
         assert 0.0 < errors["late"] < 1e-6
         assert 0.0 < errors["rms"] <= errors["largest"] < 1e-6
     assert "interpreter_over_scipy" in capsys.readouterr().out
+
+
+def test_a_rival_without_its_environment_is_left_out_with_the_reason(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(rivals, "ROOT", tmp_path)
+    monkeypatch.setattr(rivals, "UV", tmp_path / "uv")
+    assert run.rival("diffrax", 1) == {
+        "missing": f"diffrax: {tmp_path / 'uv'} is missing: make setup"
+    }
+    (tmp_path / "uv").write_text("#!/bin/sh\necho 'no index in reach' >&2\nexit 2\n")
+    (tmp_path / "uv").chmod(0o755)
+    assert run.rival("diffrax", 1)["missing"].endswith("no index in reach")
+    with pytest.raises(SystemExit):
+        run.main(["--peers", "diffraks"])
 
 
 def test_a_ratio_is_the_median_of_pairs_with_its_quartiles() -> None:

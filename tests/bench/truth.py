@@ -86,7 +86,7 @@ class _Series:
         )
         self.mode = 1
         self.torque = mp.mpf(case.torques[0])
-        self.point: Point = [mp.mpf(value) for value in case.start()]
+        self.point: Point = [mp.mpf(v.numerator) / v.denominator for v in case.start()]
         self.events: list[tuple[float, int]] = []
         self.w_em: list[float] = [float(self.point[0])]
 

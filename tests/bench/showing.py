@@ -1,0 +1,71 @@
+"""Showing: ratios and errors as they stand in build/bench.json, and as lines of the table."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+from tests.bench.manoeuvre import Manoeuvre
+from tests.bench.timing import Ratio
+from tests.bench.truth import Solution, accuracy, truth
+
+Figure = dict[str, Any]
+
+
+def errors_of(case: Manoeuvre, found: Solution) -> Figure:
+    """Return the errors of a solution, by name."""
+    return asdict(accuracy(found, truth(case)))
+
+
+def shown(ratio: Ratio, name: str, other: str) -> Figure:
+    """Return a ratio as it stands in build/bench.json: quartiles, and both times [ms]."""
+    return {
+        "median": ratio.median,
+        "low": ratio.low,
+        "high": ratio.high,
+        "pairs": ratio.pairs,
+        f"{name}_ms": 1000 * ratio.seconds,
+        f"{other}_ms": 1000 * ratio.seconds_other,
+    }
+
+
+def table(found: Figure) -> list[str]:
+    """Return the figures as lines."""
+    where = found["machine"]
+    lines = [
+        f"{where['processor']}, {where['cores']} cores, load {where['load'][0]}",
+        f"{where['compiler']}; {where['flags']}",
+        f"Python {where['python']}, numpy {where['numpy']}, scipy {where['scipy']}",
+        "",
+        "processor time over the rival's: median of pairs (quartiles)",
+    ]
+    for group in ("single_run", "sweep"):
+        for name, figure in found.get(group, {}).items():
+            lines.append(f"  {group + '.' + name:36} {_ratio(figure)}")
+    for name, figure in found["rivals"].items():
+        said = figure.get("missing") or f"{_ratio(figure)}, first run {figure['first_run_s']:.1f} s"
+        lines.append(f"  {name + ' over scipy':36} {said}")
+    lines += ["", "errors: events late [us], w_em over its peak (root mean square, largest)"]
+    for name, figure in found["single_run"].items():
+        for who, errors in figure.get("errors", {}).items():
+            lines.append(f"  {name:24} {who:14} {_errors(errors)}")
+    for name, figure in found["rivals"].items():
+        if "errors" in figure:
+            lines.append(f"  {'at the end only':24} {name:14} {_errors(figure['errors'])}")
+    for step, cases in found["accuracy"].items():
+        for case, sides in cases.items():
+            for who, errors in sides.items():
+                lines.append(f"  {case + ' at ' + step:24} {who:14} {_errors(errors)}")
+    return lines
+
+
+def _ratio(figure: Figure) -> str:
+    spread = f"{figure['median']:.3g} ({figure['low']:.3g} .. {figure['high']:.3g})"
+    times = ", ".join(f"{k[:-3]} {v:.4g} ms" for k, v in figure.items() if k.endswith("_ms"))
+    return f"{spread:24} {times}, {figure['pairs']} pairs"
+
+
+def _errors(errors: Figure) -> str:
+    whole = "all, in order" if errors["is_complete"] else "NOT AS THEY ARE"
+    sizes = f"{errors['rms']:.1e} {errors['largest']:.1e}"
+    return f"{1e6 * errors['late']:10.3f} us  {sizes}  {errors['events']} events {whole}"
