@@ -178,18 +178,24 @@ def _why_rebuilt(batch: Batch, scenario: Scenario, name: str) -> str | None:
     """Return why a parameter needs a Program per value: more than a calibration follows from it."""
     owner, _, short = name.partition(".")
     values = batch.parameters[name]
-    ends = [_valued(batch.system, name, float(end)) for end in (np.min(values), np.max(values))]
+    own = _alone(batch.system, owner)
+    ends = [_valued(own, name, end) for end in sorted({float(min(values)), float(max(values))})]
     for system in ends:
         programs_of(system, scenario)
     try:
-        low, high = (
-            programs_of(_as_tunable(system, owner, short), scenario)[owner] for system in ends
-        )
+        made = [programs_of(_as_tunable(system, owner, short), scenario)[owner] for system in ends]
     except SpecError as error:
         return f"{error.problems[0].label}: a Program for each value"
-    if digest(_without_values(low)) == digest(_without_values(high)):
+    if len({digest(_without_values(program)) for program in made}) == 1:
         return None
     return f"`{owner}` has numbers or times that are solved from it: a Program for each value"
+
+
+def _alone(system: System, owner: str) -> System:
+    """Return a system of one instance: its Program does not depend on those of the others."""
+    connections = {key: wire for key, wire in system.connections.items() if key[0] == owner}
+    instances = {owner: system.instances[owner]}
+    return dataclasses.replace(system, instances=instances, connections=connections)
 
 
 def _without_values(program: Program) -> Program:
