@@ -35,11 +35,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         cases = wanted(given.effects, given.count)
     except ValueError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
+        return _refused(str(error))
+    if min(given.seed, given.strength) < 0 or min(given.count, given.jobs) < 1:
+        return _refused("seed and strength are 0 or more, count and jobs 1 or more")
     if given.labels.resolve().is_relative_to(given.out.resolve()):
-        print("error: the labels would lie among the cases", file=sys.stderr)
-        return 2
+        return _refused("the labels would lie among the cases")
+    if given.out.exists() and any(given.out.iterdir()):
+        return _refused(f"{given.out} is not empty")
     order = np.random.Generator(np.random.PCG64(given.seed)).permutation(len(cases)).tolist()
     numbered = [(number, cases[place]) for number, place in enumerate(order)]
     write = partial(write_batch, given.out, given.seed, strength=given.strength, rate=given.rate)
@@ -53,6 +55,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     text = json.dumps({"format": FORMAT, "cases": labels}, indent=1)
     given.labels.write_text(text + "\n", encoding="utf-8")
     return 0
+
+
+def _refused(reason: str) -> int:
+    print(f"error: {reason}", file=sys.stderr)
+    return 2
 
 
 def write_batch(

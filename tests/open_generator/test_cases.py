@@ -142,13 +142,20 @@ def test_an_unknown_entry_is_refused(entry: str) -> None:
         wanted(entry, 1)
 
 
-def test_labels_among_the_cases_are_refused(
+def test_the_command_line_refuses_what_would_give_labels_away_or_mix_cases(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    where = ["--out", str(tmp_path), "--labels", str(tmp_path / "labels.json")]
-    assert main([*where, "--seed", "1"]) == 2
-    assert "labels would lie among the cases" in capsys.readouterr().err
-    assert not list(tmp_path.iterdir())
+    out, used, labels = tmp_path / "out", tmp_path / "used", str(tmp_path / "labels.json")
+    used.mkdir()
+    (used / "case_000").touch()
+    for given, reason in (
+        (["--out", str(out), "--labels", str(out / "labels.json"), "--seed", "1"], "among"),
+        (["--out", str(used), "--labels", labels, "--seed", "1"], "not empty"),
+        (["--out", str(out), "--labels", labels, "--seed", "-1"], "seed"),
+    ):
+        assert main(given) == 2
+        assert reason in capsys.readouterr().err
+    assert not out.exists()
 
 
 def test_the_generator_knows_nothing_of_the_product() -> None:
