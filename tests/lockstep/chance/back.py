@@ -9,6 +9,8 @@ from tests.lockstep.chance.models import Carried
 
 WISH = re.compile(r"<back (\w+) (\w+)>")
 """Where a transition from a mode to another may go back."""
+MEMORY = re.compile(r"rising|falling|after|previous|delay|in\(|\b(b|i|s|e_\d)\b")
+"""What `until` is not asked of, and equations that may read it."""
 WITHINS_MS = (7, 10, 25, 80, 640)
 """Less than a tick, whole ticks, and between them, up to the most that are kept."""
 
@@ -44,7 +46,7 @@ def _rewind(draw: Random, model: Carried, line: str) -> str:
     relation = f"{state} {draw.choice(('<', '>='))} {draw.choice((0, -0.05, 0.1, 0.3))} {unit}"
     guard = line.split('when: "')[1].split('"')[0]
     until = draw.choice((relation, f"q_{draw.randrange(4)}", f"{relation} or q_0"))
-    if not re.search("rising|falling|after|previous|delay|in\\(", guard) and draw.random() < 0.7:
+    if not MEMORY.search(guard) and draw.random() < 0.7:
         until = guard
     return f'{{until: "{until}", within: {draw.choice(WITHINS_MS)} ms}}'
 
