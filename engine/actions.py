@@ -15,7 +15,7 @@ def nothing(v: Frame) -> None:
 
 def in_turn(actions: Sequence[Action]) -> Action:
     """Return what does some actions one after the other."""
-    match actions:
+    match [action for action in actions if action is not nothing]:
         case []:
             return nothing
         case [only]:
@@ -35,13 +35,13 @@ def in_turn(actions: Sequence[Action]) -> Action:
                 third(v)
 
             return three
-    every = tuple(actions)
+        case every:
 
-    def act(v: Frame) -> None:
-        for action in every:
-            action(v)
+            def act(v: Frame) -> None:
+                for action in every:
+                    action(v)
 
-    return act
+            return act
 
 
 def assign(targets: Sequence[int], values: Sequence[Read]) -> Action:
@@ -126,7 +126,9 @@ def store(slot: int, index: Read, value: Read) -> Action:
 
 
 def branch(condition: Read, then: Action, other: Action) -> Action:
-    """Return what does one of two actions."""
+    """Return what does one of two actions; a condition changes nothing."""
+    if then is nothing and other is nothing:
+        return nothing
     if other is nothing:
 
         def act_or_not(v: Frame) -> None:
@@ -146,6 +148,8 @@ def branch(condition: Read, then: Action, other: Action) -> Action:
 
 def choose(slot: int, table: Mapping[int, Action]) -> Action:
     """Return what does the action of the number that a variable has."""
+    if all(action is nothing for action in table.values()):
+        return nothing
 
     def act(v: Frame) -> None:
         table.get(v[slot], nothing)(v)
@@ -168,7 +172,11 @@ def count(slot: int, condition: Read, limit: int) -> Action:
     """Return what counts up to a limit while a condition holds, else back to 0."""
 
     def act(v: Frame) -> None:
-        v[slot] = min(v[slot] + 1, limit) if condition(v) else 0
+        if condition(v):
+            number = v[slot]
+            v[slot] = number + 1 if number < limit else limit
+        else:
+            v[slot] = 0
 
     return act
 

@@ -171,6 +171,8 @@ class Compiler:
                 return shapes.negative(self._read(operand))
             case Unary(_, operand):
                 return shapes.opposite(self._read(operand))
+            case Binary("and", Compare(">=", a, low), Compare("<=", b, high)):
+                return self._range(a, low, b, high) or self._pair("and", expr.left, expr.right)
             case Binary(operator, left, right) | Compare(operator, left, right):
                 return self._pair(operator, left, right)
             case Select(condition, then, other):
@@ -181,6 +183,11 @@ class Compiler:
                 return shapes.called(known, [self._read(argument) for argument in arguments])
             case _:
                 raise TypeError(f"not an expression: {expr!r}")
+
+    def _range(self, *parts: Expr) -> Read | None:
+        slots = [self._slot(part) for part in parts]
+        found = [slot for slot in slots if slot is not None]
+        return shapes.within(*found) if len(found) == len(slots) else None
 
     def _pair(self, operator: str, left: Expr, right: Expr) -> Read:
         """Return the function of two operands; an inner operation of two slots is part of it."""

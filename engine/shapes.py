@@ -114,6 +114,11 @@ READ_PAIR: Mapping[tuple[str, str], Triple] = {
 """As RIGHT, of an expression and two slots."""
 
 
+def within(a: int, low: int, b: int, high: int) -> Read:
+    """Return whether one variable is at least another, and one at most another: a range."""
+    return lambda v: (v[a] >= v[low]) & (v[b] <= v[high])
+
+
 def of_slot(slot: int) -> Read:
     """Return what reads a variable."""
     return lambda v: v[slot]

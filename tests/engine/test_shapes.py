@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import struct
 from typing import Any
 
@@ -77,6 +78,13 @@ def test_operations_on_three_or_four_places_keep_their_order(outer: Any, inner: 
         for expr in (pair(outer, left, c), pair(outer, a, right), pair(outer, left, right)):
             ours, expected = calculated(expr)
             assert ours == expected
+
+
+@pytest.mark.parametrize("x", [-1.1, -1.0, 0.5, 1.0, 1.1, math.nan])
+def test_a_range_holds_both_bounds_and_no_nan(x: float) -> None:
+    inside = Binary("and", Compare(">=", A, real(-1.0)), Compare("<=", A, real(1.0)))
+    left = after((Assign("equation.truth", inside),), a=x)
+    assert left.get("equation.truth") is (abs(x) <= 1.0)
 
 
 def test_literals_of_one_value_and_other_types_or_signs_stay_apart() -> None:
