@@ -60,7 +60,7 @@ def c_files(program: Program) -> dict[str, str]:
     """
     if "step" not in program.blocks:
         raise ValueError(f"inputs of {program.name} vary inside a step: it has no C")
-    context = {**_context(stepped(program)), "digest": digest(program)}
+    context = {**module_context(stepped(program)), "digest": digest(program)}
     files = {
         f"{program.name}.h": render("module.h.jinja", context),
         f"{program.name}.c": render("module.c.jinja", context),
@@ -79,7 +79,8 @@ def stepped(program: Program) -> Program:
     return dataclasses.replace(program, blocks=blocks, variables=variables)
 
 
-def _context(program: Program) -> dict[str, Any]:
+def module_context(program: Program) -> dict[str, Any]:
+    """Return what the templates of a Program's files read."""
     number, constants, variables = program.number, program.constants, program.variables
     local = locals_of(program)
     used = usages(program, local)

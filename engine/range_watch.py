@@ -9,11 +9,8 @@ from operator import le
 
 from engine.interpreter import Stepper
 from engine.trajectory import Event
+from language.assembly import RANGE_SLACK
 from language.program import Program, short
-
-SLACK = 1e-9
-"""Part of a range's width by which a state may pass a bound unreported: what a crossing of a guard
-on that bound is located within, over ten digits above the rounding of a double."""
 
 FINITE = (-sys.float_info.max, sys.float_info.max)
 """The range of a state that has none of its own."""
@@ -45,14 +42,19 @@ class RangeWatch:
     def look(self, time: Fraction) -> None:
         """Report what has left its range since the last look."""
         for (variable, (low, high)), value in zip(self._bounds.items(), self._read(), strict=True):
-            slack = SLACK * (high - low)
+            slack = RANGE_SLACK * (high - low)
             if low - slack <= value <= high + slack:
                 self._outside.discard(variable)
             elif variable not in self._outside:
                 self._outside.add(variable)
                 mode = self._program.mode_name(self._stepper.get("memory.mode"))
-                text = f"`{short(variable)}` = {value:.6g} is outside its range {low:g} .. {high:g}"
+                text = outside_text(variable, value, low, high)
                 self._log(left_range(float(time), self._name, short(variable), mode, text))
+
+
+def outside_text(variable: str, value: float, low: float, high: float) -> str:
+    """Return what is told of a variable outside its range."""
+    return f"`{short(variable)}` = {value:.6g} is outside its range {low:g} .. {high:g}"
 
 
 def left_range(time: float, instance: str, signal: str, mode: str, message: str) -> Event:

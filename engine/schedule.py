@@ -73,7 +73,7 @@ class Schedule:
                 elif reader not in self.ticks and ticking is not None:
                     self._arrivals.append(Grid(ticking.start + line.delay, ticking.period))
         pages = {page.time for page in scenario.pages}
-        self._events = sorted(pages.union(_events(system, scenario.inputs)))
+        self.events = sorted(pages.union(_events(system, scenario.inputs)))
         self._require_bounded(scenario)
 
     @property
@@ -81,11 +81,16 @@ class Schedule:
         captures = [grid for grids in self.captures.values() for grid in grids]
         return [*self.ticks.values(), *self.samples.values(), *captures, *self._arrivals]
 
+    def grids(self) -> dict[str, Grid]:
+        """Return when what ticks, samples or captures does so; of a run without delayed outputs."""
+        late = {f"capture {n}": grids[0] for n, grids in self.captures.items() if grids}
+        return {**self.ticks, **self.samples, **late}
+
     def instants(self) -> Iterator[Fraction]:
         """Yield every instant from 0 to the horizon at which something may happen."""
         last = None
         ends = (Fraction(0), self.horizon)
-        for time in heapq.merge(ends, self._events, *self._grids):
+        for time in heapq.merge(ends, self.events, *self._grids):
             if time > self.horizon:
                 return
             if time != last:

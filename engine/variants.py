@@ -31,7 +31,7 @@ def run_variants(batch: Batch, build: Build = Interpreter) -> BatchResult:
         kept = found or empty_result(batch, group.adjustment, "interpreter")
         found = kept
         for variant in group.variants.tolist():
-            _keep(batch, kept, variant, _run(batch, group.adjustment, variant, build))
+            keep_variant(batch, kept, variant, group.adjustment, build)
     if found is None:
         raise ValueError("a batch has at least one variant")
     return found
@@ -153,7 +153,15 @@ def _stimulus(system: System, name: str, table: InputTable, variant: int) -> Sti
     return Stimulus(pieces, truth=system.inputs[name].truth)
 
 
-def _keep(batch: Batch, result: BatchResult, variant: int, run: Trajectory) -> None:
+def keep_variant(
+    batch: Batch,
+    result: BatchResult,
+    variant: int,
+    adjustment: Adjustment,
+    build: Build = Interpreter,
+) -> None:
+    """Run a variant, and put what is kept of it into the result."""
+    run = _run(batch, adjustment, variant, build)
     for name, kept in result.outputs.items():
         kept[variant, : len(run.times)] = run.signals[name]
     for measure in batch.measures:

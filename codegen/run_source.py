@@ -1,0 +1,296 @@
+"""Run source: a whole system as C that carries out a planned run in one call, for this machine.
+
+The blocks are those of the Programs, printed as everywhere; around them stands what the engine does
+between them (engine/simulate.py, engine/continuous.py), so that both have the same bits.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from codegen.expression import c_expression, literal
+from codegen.mathematics import math_files
+from codegen.names import REAL, CNames, c_member, c_type
+from codegen.rendering import render, version
+from codegen.source import module_context
+from codegen.usage import locals_of, usages
+from language.assembly import RANGE_SLACK, Assembly, Feed, ranged, short_input, wires_of
+from language.continuous import PARTS
+from language.number import NumberType
+from language.operation import Assign
+from language.program import Program, short
+from language.signal import Sensor
+from language.stepping import BETWEEN, EVENTS_PER_STEP
+from language.traversal import block_names
+from language.wiring import finished
+
+INSTANCE = "i_{}"
+"""What an instance is called in C: its name may be any that the language takes."""
+
+
+def run_files(assembly: Assembly) -> dict[str, str]:
+    """Return the files of a system's runs by name."""
+    programs = {name: _part(name, program) for name, program in assembly.programs.items()}
+    places = _Places(assembly, programs)
+    context = _driver(assembly, programs, places)
+    files = {
+        "run.h": render("run.h.jinja", context),
+        "run.c": render("run_driver.c.jinja", context),
+    }
+    numbers: dict[NumberType, None] = {"float64": None} if context["uses_math"] else {}
+    for flow, (name, program) in enumerate(programs.items()):
+        inside = _module(assembly, name, program, places, flow)
+        files[f"{program.name}.h"] = render("module.h.jinja", inside)
+        files[f"{program.name}_run.c"] = render("run_module.c.jinja", inside)
+        if inside["uses_math"]:
+            numbers[program.number] = None
+    for number in numbers:
+        files.update(math_files(number))
+    return files
+
+
+def column_places(assembly: Assembly) -> list[int]:
+    """Return where each recorded column stands among the numbers of a row."""
+    found, formulas = [], len(assembly.slots)
+    for column in assembly.columns:
+        if column.block:
+            found.append(formulas)
+            formulas += 1
+        else:
+            found.append(assembly.slots.index(column.source))
+    return found
+
+
+def row_width(assembly: Assembly) -> int:
+    """Return how many numbers a row has."""
+    return max(1, len(assembly.slots) + sum(1 for c in assembly.columns if c.block))
+
+
+def _part(name: str, program: Program) -> Program:
+    """Return the Program of an instance as it is printed: its parts, or its tick."""
+    own = dataclasses.replace(program, name=INSTANCE.format(name))
+    if program.period is not None:
+        return own
+    return finished(own, ("init", "derive", *PARTS), keep=(*BETWEEN, "work.s"))
+
+
+@dataclass(frozen=True)
+class _Places:
+    """Where signals are in the driver."""
+
+    assembly: Assembly
+    programs: Mapping[str, Program]
+    is_row: bool = False
+    number: NumberType = "float64"
+
+    def __call__(self, name: str) -> str:
+        """Return the C text of `signal.<name>`."""
+        signal = short(name)
+        if self.is_row:
+            return f"out[{self.assembly.slots.index(signal)}]"
+        return self.signal(signal)
+
+    def whole(self, name: str, number: int) -> str:
+        """Return a whole number beside a signal."""
+        return repr(number)
+
+    def signal(self, name: str) -> str:
+        """Return the C text of a signal."""
+        if name in self.assembly.inputs:
+            return f"run->inputs[{self.assembly.inputs.index(name)}]"
+        if name in self.assembly.sensors:
+            return f"run->{INSTANCE.format(name)}.value"
+        owner, _, wire = name.partition(".")
+        program = self.programs[owner]
+        place = CNames(program)(wires_of(program)[wire])
+        return place.replace("self->", f"(double)run->{program.name}.self.")
+
+    def formula(self, block: str) -> str:
+        """Return the C text of a block of the wires."""
+        (op,) = self.assembly.wires.blocks[block]
+        assert isinstance(op, Assign)
+        return f"(double)({c_expression(op.value, self)})"
+
+
+def _module(
+    assembly: Assembly, name: str, program: Program, places: _Places, flow: int
+) -> dict[str, Any]:
+    used = usages(program, locals_of(program))
+    place = CNames(program)
+    is_flow = program.period is None
+    flows = list(assembly.flows)
+    slots = [
+        (k, s.partition(".")[2]) for k, s in enumerate(assembly.slots) if s.startswith(f"{name}.")
+    ]
+    number = assembly.numbers()[name]
+    return {
+        **module_context(program),
+        "digest": "",
+        "title": f"Instance {name}",
+        "is_flow": is_flow,
+        "flow": flows.index(name) if is_flow else -1,
+        "calls": {block: f"{block}({', '.join(used[block].parameters)})" for block in used},
+        "defaults": _defaults(program),
+        "ranges": _ranges(program, number) if is_flow else [],
+        "fired": [place(v) for v in program.fired_variables()],
+        "bound": sum(len(program.modes_of(region)) for region in program.mode_variables()),
+        "number": number,
+        "looks": [(k, place(wires_of(program)[wire])) for k, wire in slots],
+        "width": row_width(assembly),
+        "lagging": [
+            INSTANCE.format(s.name)
+            for s in assembly.sensors.values()
+            if s.lag and s.source.partition(".")[0] == name
+        ],
+        "most_pieces": EVENTS_PER_STEP,
+        "zero": literal(0.0, program.number),
+        "states": [place(v.name) for v in program.variables if v.name.startswith("state.")],
+        "has_faults": any(v.name == "memory.faults" for v in program.variables),
+        "finite": [place(wire.source) for wire in program.outputs if wire.type == "real"],
+    }
+
+
+def _defaults(program: Program) -> list[str]:
+    found = [
+        f"{c_member(f'input.{key}')} = {literal(value, program.number)}"
+        for key, value in program.defaults.items()
+    ]
+    flags = [v.name for v in program.variables if v.name.startswith("is_new.")]
+    return [*found, *(f"is_new.{c_member(name)} = true" for name in flags)]
+
+
+def _ranges(program: Program, number: int) -> list[dict[str, object]]:
+    found = []
+    for k, variable in enumerate(ranged(program)):
+        assert variable.range is not None
+        low, high = variable.range
+        slack = RANGE_SLACK * (high - low)
+        found.append(
+            {
+                "place": CNames(program)(variable.name),
+                "low": repr(low - slack),
+                "high": repr(high + slack),
+                "number": number + len(program.transitions) + k,
+            }
+        )
+    return found
+
+
+def _driver(assembly: Assembly, programs: Mapping[str, Program], places: _Places) -> dict[str, Any]:
+    instances = [_instance(assembly, name, program, places) for name, program in programs.items()]
+    rows = dataclasses.replace(places, is_row=True)
+    formulas = [c for c in assembly.columns if c.block]
+    sensors = [_sensor(sensor, places) for sensor in assembly.sensors.values()]
+    called = {
+        name
+        for block in assembly.wires.blocks.values()
+        for name in block_names(block)
+        if name.startswith("call ")
+    }
+    has_lag = any(sensor.lag for sensor in assembly.sensors.values())
+    return {
+        "version": version(),
+        "title": "A run",
+        "instances": instances,
+        "sensors": sensors,
+        "seen": [seen for part in instances for flag in part["flags"] for seen, _ in flag["seen"]],
+        "width": row_width(assembly),
+        "inputs": len(assembly.inputs),
+        "has_lag": has_lag,
+        "uses_math": has_lag or bool(called),
+        "slots": [
+            {"value": places.signal(s), "is_flow": s.partition(".")[0] in assembly.flows}
+            for s in assembly.slots
+        ],
+        "formulas": [
+            (len(assembly.slots) + k, rows.formula(column.block or ""))
+            for k, column in enumerate(formulas)
+        ],
+        "happenings": _happenings(assembly),
+        "captures": [
+            (assembly.happenings.index(f"capture {n}"), f"{INSTANCE.format(n)}_capture(run, now);")
+            for n, sensor in assembly.sensors.items()
+            if sensor.delay
+        ],
+        "tunables": [
+            (INSTANCE.format(owner), short(c.name), REAL[programs[owner].number])
+            for owner, c in assembly.tunables()
+        ],
+    }
+
+
+def _happenings(assembly: Assembly) -> list[tuple[int, str]]:
+    found = []
+    for name in assembly.order:
+        own = INSTANCE.format(name)
+        if name in assembly.sensors:
+            found.append((assembly.happenings.index(name), f"{own}_sample(run, now);"))
+        elif name not in assembly.flows:
+            line = f"if (!tick_{own}(run, now)) {{ return false; }}"
+            found.append((assembly.happenings.index(name), line))
+    return found
+
+
+def _instance(assembly: Assembly, name: str, program: Program, places: _Places) -> dict[str, Any]:
+    is_flow = program.period is None
+    varied = {c.name for owner, c in assembly.tunables() if owner == name}
+    flags = [
+        {
+            "name": short_input(feed),
+            "seen": [
+                (f"seen_{name}_{short_input(feed)}_{sensor}", INSTANCE.format(sensor))
+                for sensor in feed.sensors
+            ],
+        }
+        for feed in assembly.feeds[name]
+        if feed.sensors
+    ]
+    return {
+        "name": program.name,
+        "is_flow": is_flow,
+        "flow": list(assembly.flows).index(name) if is_flow else -1,
+        "is_controlled": name in assembly.controlled,
+        "ranges": ranged(program) if is_flow else (),
+        "feeds": [_fed(feed, program, places) for feed in assembly.feeds[name]],
+        "flags": flags,
+        "fixed_tunables": [
+            f"{c_member(c.name)} = {literal(c.value, program.number)}"
+            for c in program.constants
+            if c.kind == "tunable" and c.name not in varied and not c.items
+        ],
+    }
+
+
+def _fed(feed: Feed, program: Program, places: _Places) -> dict[str, object]:
+    kind = c_type(feed.variable, program.number)
+    if feed.block:
+        value = places.formula(feed.block)
+    elif isinstance(feed.source, str):
+        value = places.signal(feed.source)
+    else:
+        value = literal(feed.source, "float64")
+    return {
+        "name": c_member(feed.variable.name),
+        "type": kind,
+        "value": f"({value}) != 0.0" if kind == "bool" else f"({kind})({value})",
+        "must_be_finite": feed.variable.type == "real" and not feed.is_limited,
+    }
+
+
+def _sensor(sensor: Sensor, places: _Places) -> dict[str, object]:
+    name, lag = INSTANCE.format(sensor.name), float(sensor.lag)
+    look = f"lag_look(&me->lag, {lag!r}, now, measured)" if sensor.lag else "measured"
+    room = math.ceil(sensor.delay / sensor.period) + 2 if sensor.period and sensor.delay else 0
+    return {
+        "name": name,
+        "source": places.signal(sensor.source),
+        "lag": repr(lag) if sensor.lag else "",
+        "look": look,
+        "sd": repr(float(sensor.noise)) if sensor.noise else "",
+        "quantum": repr(float(sensor.quantum)) if sensor.quantum else "",
+        "room": room,
+    }

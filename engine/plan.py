@@ -1,0 +1,305 @@
+"""Plan: what is known of a run before it begins, as flat arrays for compiled C.
+
+Instants, ends of steps, rows, inputs and noise follow from the scenario alone. Times are exact here
+(whole multiples of a common tick) and pass to C as sums of two doubles.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from bisect import bisect_right
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import islice
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.rows import recorded
+from engine.schedule import Grid, Schedule
+from engine.sensing import noise_numbers
+from engine.signals import LineRun
+from engine.stimulus import Course
+from language.assembly import Assembly, Column, Feed
+from language.declaration import Formula
+from language.experiment import Connection, Scenario, System
+from language.operation import Block
+from language.program import Program
+from language.traversal import block_reads
+from language.wires import block_of, wire_formulas, wires_program
+
+Reals = NDArray[np.float64]
+Wholes = NDArray[np.int64]
+MOST_TICKS = 2**52
+"""A horizon of more common ticks has instants that a double does not count."""
+MOST_HAPPENINGS = 32
+"""Bits of the word that says what happens at an instant."""
+NEVER = -1
+
+
+@dataclass(frozen=True)
+class Times:
+    """Times [s] as sums of two doubles (n,)."""
+
+    high: Reals
+    low: Reals
+
+
+@dataclass(frozen=True)
+class FlowPlan:
+    """The steps of one continuous instance: `first` (instants + 1,) that leads to each instant.
+
+    `left` (steps,) are their lengths [s], `starts` (steps + 1,). Of each row (rows,) the step that
+    it is in (NEVER where it is at an instant), the time since the step's start, and whether it is
+    at the step's end.
+    """
+
+    first: Wholes
+    left: Reals
+    starts: Times
+    row_steps: Wholes
+    row_times: Times
+    row_ends: NDArray[np.uint8]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """One scenario: `inputs` (instants, inputs), `happens` (instants,) bits, `row_at` (instants,)
+    the row of each or NEVER, `rows` [s] (rows,) with the instant that each is at or before.
+
+    `noise` are normal numbers of each sensor that has noise, `early` how many samples of each are
+    taken before the first delayed one arrives.
+    """
+
+    instants: Times
+    inputs: Reals
+    happens: NDArray[np.uint32]
+    row_at: Wholes
+    rows: Reals
+    row_gaps: Wholes
+    flows: Mapping[str, FlowPlan]
+    noise: Mapping[str, Reals]
+    early: Mapping[str, int]
+    exact: tuple[Fraction, ...] = ()
+
+    def pieces(self, starts: Sequence[Fraction]) -> Wholes:
+        """Return the piece that holds at each instant (instants,); before the first, the first."""
+        at = [bisect_right(starts, time) - 1 for time in self.exact]
+        return np.maximum(np.array(at, dtype=np.int64), 0)
+
+
+def why_not_planned(
+    system: System, scenario: Scenario, programs: Mapping[str, Program]
+) -> str | None:
+    """Return why a run cannot be planned before it begins; None where it can."""
+    if scenario.pages:
+        return "a page of the calibration turns during the run"
+    for name, stimulus in scenario.inputs.items():
+        if stimulus.varies:
+            return f"input `{name}` changes inside the steps"
+    for name, line in system.lines.items():
+        if line.source not in system.inputs:
+            return f"`{name}` is a delayed output"
+    flows = {name for name, program in programs.items() if program.period is None}
+    for name, sensor in system.sensors.items():
+        if sensor.period is None:
+            return f"sensor `{name}` has no `sample`"
+        if sensor.lag and sensor.source.partition(".")[0] not in flows:
+            return f"sensor `{name}` has a lag on a sampled output"
+    for name, program in programs.items():
+        if program.invariants:
+            return f"`{name}` has invariants"
+        if program.period is None and ("record" in program.blocks or "step" not in program.blocks):
+            return f"`{name}` has delays or inputs that change inside its steps"
+    if len(assembly_of(system, scenario, programs).happenings) > MOST_HAPPENINGS:
+        return f"more than {MOST_HAPPENINGS} things tick, sample or arrive"
+    if _tick(Schedule(system, scenario, dict(programs)), programs) is None:
+        return "its times have no common tick that a double counts"
+    return None
+
+
+def assembly_of(system: System, scenario: Scenario, programs: Mapping[str, Program]) -> Assembly:
+    """Return what is to be compiled of a system and a resolved scenario."""
+    formulas = wire_formulas(system, scenario)
+    truths = {name for name, thing in system.inputs.items() if thing.truth}
+    truths |= {line.name for line in system.lines.values() if line.source in truths}
+    for owner, program in programs.items():
+        truths |= {f"{owner}.{w.name}" for w in program.outputs if w.type == "truth"}
+    wires = wires_program(formulas, frozenset(truths))
+    feeds: dict[str, list[Feed]] = {name: [] for name in programs}
+    for (owner, _), connection in system.connections.items():
+        feeds[owner].append(_feed(connection, programs[owner], system))
+    columns = [Column(c.name, c.source, c.block) for c in recorded(system, scenario, programs)]
+    slots = dict.fromkeys(column.source for column in columns if not column.block)
+    for column in columns:
+        if column.block:
+            slots.update(dict.fromkeys(_signals(wires.blocks[column.block])))
+    controlled = {
+        owner
+        for (owner, _), connection in system.connections.items()
+        if any(read.partition(".")[0] in programs for read in connection.reads)
+    }
+    return Assembly(
+        programs=programs,
+        order=system.order,
+        inputs=(*system.inputs, *system.lines),
+        feeds={name: tuple(found) for name, found in feeds.items()},
+        sensors=system.sensors,
+        wires=wires,
+        slots=tuple(slots),
+        columns=tuple(columns),
+        controlled=frozenset(controlled),
+    )
+
+
+def plan_of(system: System, scenario: Scenario, assembly: Assembly) -> Plan:
+    """Return the plan of a resolved scenario that can be planned."""
+    programs = assembly.programs
+    schedule = Schedule(system, scenario, dict(programs))
+    tick = _tick(schedule, programs)
+    assert tick is not None
+    end = int(schedule.horizon / tick)
+    grids = {name: _ticks(grid, tick, end) for name, grid in schedule.grids().items()}
+    events = [int(time / tick) for time in schedule.events if time <= schedule.horizon]
+    instants = np.unique(np.concatenate([np.array([0, end, *events]), *grids.values()]))
+    rows = _ticks(schedule.rows, tick, end)
+    happens = np.zeros(len(instants), dtype=np.uint32)
+    for bit, name in enumerate(assembly.happenings):
+        happens[np.searchsorted(instants, grids[name])] |= np.uint32(1 << bit)
+    row_at = np.full(len(instants), NEVER, dtype=np.int64)
+    at = np.isin(rows, instants, assume_unique=True)
+    row_at[np.searchsorted(instants, rows[at])] = np.flatnonzero(at)
+    noise = {
+        name: noise_of(scenario.seed, name, len(grids[name]))
+        for name, sensor in assembly.sensors.items()
+        if sensor.noise
+    }
+    early = {
+        name: int(np.sum(grids[name] < math.ceil(sensor.delay / tick)))
+        for name, sensor in assembly.sensors.items()
+    }
+    return Plan(
+        instants=_times(instants, tick),
+        inputs=input_values(system, scenario, assembly, instants, tick),
+        happens=happens,
+        row_at=row_at,
+        rows=_times(rows, tick).high,
+        row_gaps=np.searchsorted(instants, rows),
+        flows={
+            name: _flow_plan(int(programs[name].major_step / tick), instants, rows, tick)
+            for name in assembly.flows
+        },
+        noise=noise,
+        early=early,
+        exact=tuple(int(instant) * tick for instant in instants),
+    )
+
+
+def noise_of(seed: int, sensor: str, count: int) -> Reals:
+    """Return the first noise numbers of a sensor."""
+    return np.fromiter(islice(noise_numbers(seed, sensor), count), dtype=np.float64, count=count)
+
+
+def input_values(
+    system: System,
+    scenario: Scenario,
+    assembly: Assembly,
+    instants: Wholes,
+    tick: Fraction,
+) -> Reals:
+    """Return the values of the inputs (instants, inputs): pieces hold from their start on."""
+    found = np.zeros((len(instants), len(assembly.inputs)))
+    for place, name in enumerate(assembly.inputs):
+        line = system.lines.get(name)
+        source, delay = (line.source, line.delay) if line else (name, Fraction(0))
+        course = Course(source, scenario.inputs[source], _no_formula)
+        starts = [math.ceil((piece.start + delay) / tick) for piece in course.pieces]
+        values = [float(course.at(piece.start)) for piece in course.pieces]
+        if line:
+            values[0] = float(LineRun(line, course).at(Fraction(0)))
+        pieces = np.maximum(np.searchsorted(np.array(starts), instants, side="right") - 1, 0)
+        found[:, place] = np.array(values)[pieces]
+    return found
+
+
+def _no_formula(block: str, time: float) -> float:
+    raise AssertionError(f"{block} is a formula of time: not planned")
+
+
+def _feed(connection: Connection, program: Program, system: System) -> Feed:
+    name = connection.target[1]
+    variable = next(v for v in program.inputs if v.name == f"input.{name}")
+    source = connection.source
+    limited = any(v.name == f"latched.{name}" for v in program.variables)
+    flagged = any(v.name == f"is_new.{name}" for v in program.variables)
+    sensors = tuple(r for r in connection.reads if r in system.sensors) if flagged else ()
+    if isinstance(source, Formula):
+        return Feed(variable, "", block_of(connection), limited, sensors)
+    value = source if isinstance(source, str) else source.numerator / source.denominator
+    return Feed(variable, value, None, limited, sensors)
+
+
+def _signals(block: Block) -> list[str]:
+    return [n.removeprefix("signal.") for n in block_reads(block) if n.startswith("signal.")]
+
+
+def _tick(schedule: Schedule, programs: Mapping[str, Program]) -> Fraction | None:
+    """Return the largest time [s] of which every time of a run is a multiple."""
+    times = [schedule.horizon, *schedule.events, schedule.rows.period]
+    times += [time for grid in schedule.grids().values() for time in (grid.start, grid.period)]
+    times += [program.major_step for program in programs.values()]
+    bottom = math.lcm(*(time.denominator for time in times))
+    return (
+        Fraction(1, bottom) if max(schedule.horizon, Fraction(1)) * bottom <= MOST_TICKS else None
+    )
+
+
+def _ticks(grid: Grid, tick: Fraction, end: int) -> Wholes:
+    return np.arange(int(grid.start / tick), end + 1, int(grid.period / tick), dtype=np.int64)
+
+
+def _flow_plan(step: int, instants: Wholes, rows: Wholes, tick: Fraction) -> FlowPlan:
+    steps = np.arange(0, int(instants[-1]) + 1, step, dtype=np.int64)
+    ends = np.union1d(steps, instants)
+    first = np.concatenate([[0], np.searchsorted(ends, instants)]).astype(np.int64)
+    inside = ~np.isin(rows, instants, assume_unique=True)
+    of = np.searchsorted(ends, rows, side="left") - 1
+    since = np.where(inside, rows - ends[np.maximum(of, 0)], 0)
+    at_end = inside & np.isin(rows, ends, assume_unique=True)
+    return FlowPlan(
+        first=first,
+        left=np.diff(ends) / tick.denominator,
+        starts=_times(ends, tick),
+        row_steps=np.where(inside, of, NEVER).astype(np.int64),
+        row_times=_times(since, tick),
+        row_ends=at_end.astype(np.uint8),
+    )
+
+
+def _times(ticks: Wholes, tick: Fraction) -> Times:
+    """Return multiples n of a tick 1 / b as n / b, and what that division has left over."""
+    bottom = float(tick.denominator)
+    whole = ticks.astype(np.float64)
+    high = whole / bottom
+    product, rest = _product(high, bottom)
+    low = ((whole - product) - rest) / bottom
+    return Times(high, low)
+
+
+def _product(a: Reals, b: float) -> tuple[Reals, Reals]:
+    """Return a b exactly as a sum of two doubles (Dekker 1971)."""
+    split = 134217729.0  # 2^27 + 1
+    a_high = a * split - (a * split - a)
+    b_high = b * split - (b * split - b)
+    a_low, b_low = a - a_high, b - b_high
+    product = a * b
+    rest = ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low
+    return product, rest
+
+
+def with_seed(plan: Plan, seed: int) -> Plan:
+    """Return a plan with the noise of another seed."""
+    noise = {name: noise_of(seed, name, len(values)) for name, values in plan.noise.items()}
+    return dataclasses.replace(plan, noise=noise)

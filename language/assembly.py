@@ -1,0 +1,100 @@
+"""Assembly: the instances of a system with all that is between them, as one thing to compile.
+
+What is known before a run is not in it: instants, inputs, noise (engine/plan.py).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from language.program import Constant, Program, Variable, short
+from language.signal import Sensor
+
+RANGE_SLACK = 1e-9
+"""Part of a range's width by which a state may pass a bound unreported: what a crossing of a guard
+on that bound is located within, over ten digits above the rounding of a double."""
+
+
+@dataclass(frozen=True)
+class Feed:
+    """What sets an input of an instance: a signal, a number, or a block of the wires.
+
+    `is_limited`: a value that is not finite is held in the range of the input.
+    """
+
+    variable: Variable
+    source: str | float
+    block: str | None
+    is_limited: bool
+    sensors: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Column:
+    """A recorded signal, or a block of the wires."""
+
+    name: str
+    source: str
+    block: str | None
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """Instances with their Programs, `order` of all that ticks or samples, and what they read.
+
+    `inputs` are the system's, delayed ones among them; `controlled` are the continuous instances
+    whose first inputs are those after tick 0; `slots` are the signals that rows are made of.
+    """
+
+    programs: Mapping[str, Program]
+    order: tuple[str, ...]
+    inputs: tuple[str, ...]
+    feeds: Mapping[str, tuple[Feed, ...]]
+    sensors: Mapping[str, Sensor]
+    wires: Program
+    slots: tuple[str, ...]
+    columns: tuple[Column, ...]
+    controlled: frozenset[str]
+
+    @property
+    def flows(self) -> tuple[str, ...]:
+        """The continuous instances."""
+        return tuple(name for name, program in self.programs.items() if program.period is None)
+
+    @property
+    def happenings(self) -> tuple[str, ...]:
+        """What happens at an instant, by bit: ticks, samples, captures of sensors."""
+        ticks = [name for name in self.order if name in self.programs and name not in self.flows]
+        late = [f"capture {name}" for name, sensor in self.sensors.items() if sensor.delay]
+        return (*ticks, *self.sensors, *late)
+
+    def tunables(self) -> Iterator[tuple[str, Constant]]:
+        """Yield the numbers that a variant may change, in the order of its values."""
+        for name, program in self.programs.items():
+            for constant in program.constants:
+                if constant.kind == "tunable" and constant.type == "real" and not constant.items:
+                    yield name, constant
+
+    def numbers(self) -> dict[str, int]:
+        """Return where the events of each instance begin: its transitions, then its ranges."""
+        found, count = {}, 0
+        for name, program in self.programs.items():
+            found[name] = count
+            count += len(program.transitions) + len(ranged(program))
+        return found
+
+
+def ranged(program: Program) -> tuple[Variable, ...]:
+    """Return the variables of a continuous Program whose leaving of a range is an event."""
+    return tuple(v for v in program.variables if v.range is not None)
+
+
+def wires_of(program: Program) -> dict[str, str]:
+    """Return the variable that holds each output."""
+    return {wire.name: wire.source for wire in program.outputs}
+
+
+def short_input(feed: Feed) -> str:
+    """Return the name of the input that a feed sets."""
+    return short(feed.variable.name)
