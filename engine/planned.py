@@ -54,8 +54,13 @@ CHUNK = 2000
 class Library(Protocol):
     """Compiled runs of an assembly (codegen/library.py)."""
 
-    columns: Sequence[int]
-    width: int
+    @property
+    def columns(self) -> Sequence[int]:
+        """The place of each column of the assembly in a row."""
+
+    @property
+    def width(self) -> int:
+        """How many numbers a row has."""
 
     def bound(self, plan: Any, variants: Mapping[str, Any]) -> Callable[[int, int], None]:
         """Return what carries variants out, from a first to one behind the last."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -30,6 +31,7 @@ from language.system import in_numbers, read_system
 from lockstep.compare import Tape, Verdict, compare
 from lockstep.coverage import noted
 from modewright.checking import check as check
+from modewright.compiled import run as run_compiled
 
 Values = Mapping[str, str]
 """Parameter values as text with units, by `parameter` or `instance.parameter`."""
@@ -80,11 +82,14 @@ def simulate(
     reference: bool = False,
     method: str = "RK4",
     calibrations: Sequence[str] = (),
+    compiled: bool | None = None,
 ) -> Trajectory:
     """Return the trajectory of a system, or of an automaton alone, through a scenario.
 
     `method` integrates continuous automata: RK4 of the Program, or DOP853, Radau or LSODA of
-    scipy; `reference` takes scipy (DOP853) and the numbers of filterpy. Raises ValueError.
+    scipy; `reference` takes scipy (DOP853) and the numbers of filterpy. `compiled` takes C, which
+    has the same bits; None does so for long runs; the log tells what did the work. Raises
+    ValueError.
     """
     if method not in METHODS:
         raise ValueError(f"`{method}` is no method of integration: {', '.join(METHODS)}")
@@ -95,7 +100,10 @@ def simulate(
         run = independent.reference if reference else independent.by_method
         scipys: Any = "DOP853" if method == "RK4" else method
         return run(loaded.system, loaded.scenario, scipys)
-    return simulate_system(loaded.system, loaded.scenario)
+    trajectory, means = run_compiled(loaded.system, loaded.scenario, compiled)
+    told = logging.WARNING if compiled and means != "compiled" else logging.INFO
+    logging.getLogger("modewright").log(told, "%s by the %s", scenario, means)
+    return trajectory
 
 
 def program(reference: str, values: Values | None = None, root: Path | None = None) -> Program:

@@ -8,10 +8,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from engine.variants import run_variants
 from language.document import Scalar
 from language.load import command_line_value
 from language.project import Project, read_document
+from modewright.compiled import run_batch
 from modewright.files import OutputError
 from sweep.executor import Executor, InProcess
 from sweep.preparation import prepared
@@ -51,7 +51,7 @@ def sweep(
     }
     ready = prepared(read_study(document, project, scalars))
     count = workers or os.cpu_count() or 1
-    local: Executor = Processes(count, WORKER) if count > 1 else InProcess(run_variants)
+    local: Executor = Processes(count, WORKER) if count > 1 else InProcess(run_batch)
     try:
         return run_study(ready, Path(out), executor or local, block, progress)
     except OSError as error:

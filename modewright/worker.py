@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from modewright.neighbours import claim_neighbours
 
 
 def main() -> None:
     """Answer blocks until who started us is gone."""
     claim_neighbours()
-    from engine.variants import run_variants
+    from modewright.compiled import run_batch
     from sweep.worker import serve
 
-    serve(run_variants)
+    serve(partial(run_batch, threads=1))
 
 
 if __name__ == "__main__":

@@ -38,6 +38,10 @@ def simulate(
     method: Annotated[
         str, typer.Option("--method", help="RK4, or scipy's DOP853, Radau or LSODA")
     ] = "RK4",
+    compiled: Annotated[
+        bool | None,
+        typer.Option("--compiled/--interpreted", help="by C or by the interpreter: the same bits"),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Simulate a system, or an automaton alone, through a scenario.
@@ -59,6 +63,7 @@ def simulate(
             reference=reference,
             method=method,
             calibrations=calibrations or (),
+            compiled=compiled,
         )
     files: dict[Path, bytes] = {}
     if out:

@@ -1,0 +1,63 @@
+"""Compiled: runs and batches in C where a compiler is there, by the interpreter where none is.
+
+Both have the same bits. What did the work is told, with the reason where it is the interpreter.
+"""
+
+from __future__ import annotations
+
+from codegen.build import BuildError
+from codegen.library import library_of
+from engine.batch import Batch, BatchResult
+from engine.plan import why_not_planned
+from engine.planned import PlannedRun, planned_batch
+from engine.simulate import simulate
+from engine.starting import programs_of
+from engine.stimulus import resolved
+from engine.trajectory import Trajectory
+from engine.variants import run_variants
+from language.experiment import Scenario, System
+from language.missing import ToolMissing
+from language.program import Program
+
+LONG = 100_000
+"""Steps and ticks from which on a run is compiled unasked: the interpreter takes seconds for them,
+the compiler about one, once."""
+
+
+def run(system: System, scenario: Scenario, compiled: bool | None = None) -> tuple[Trajectory, str]:
+    """Return the trajectory of a run, and what carried it out: `compiled`, or `interpreter: why`.
+
+    Asked for or not, compiled C does the work where it can; None compiles runs that are long.
+    """
+    scenario = resolved(system, scenario)
+    programs = programs_of(system, scenario)
+    count = _count(scenario, programs)
+    if compiled is False or (compiled is None and count < LONG):
+        why = "asked for" if compiled is False else f"{count} steps are too few to compile for"
+        return simulate(system, scenario, programs=programs), f"interpreter: {why}"
+    why = why_not_planned(system, scenario, programs) or ""
+    if not why:
+        try:
+            found = PlannedRun(system, scenario, programs, library_of).trajectory()
+        except (ToolMissing, BuildError, OSError) as error:
+            found, why = None, str(error).split("\n")[0]
+        else:
+            why = "" if found else "it has to tell what happened"
+        if found:
+            return found, "compiled"
+    return simulate(system, scenario, programs=programs), f"interpreter: {why}"
+
+
+def run_batch(batch: Batch, threads: int | None = None) -> BatchResult:
+    """Return what is kept of each variant of a batch: by C on all cores, or on so many threads."""
+    try:
+        return planned_batch(batch, library_of, threads)
+    except (ToolMissing, BuildError, OSError) as error:
+        note = f"interpreter: {str(error).splitlines()[0]}"
+        return BatchResult(**{**vars(run_variants(batch)), "note": note})
+
+
+def _count(scenario: Scenario, programs: dict[str, Program]) -> int:
+    """Return how many steps and ticks a run has."""
+    assert scenario.horizon is not None
+    return sum(int(scenario.horizon / program.major_step) for program in programs.values())

@@ -1,0 +1,167 @@
+"""Planned runs: compiled C gives what the interpreter gives, bit for bit."""
+
+from __future__ import annotations
+
+import dataclasses
+from fractions import Fraction
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import modewright as mw
+from codegen.build import optimised
+from codegen.library import library_of
+from engine.batch import Batch, BatchResult, InputTable, Measure
+from engine.plan import why_not_planned
+from engine.planned import PlannedRun, planned_batch
+from engine.simulate import simulate
+from engine.starting import programs_of
+from engine.variants import run_variants
+from language.experiment import Scenario, System
+from language.signal import Piece
+from modewright.api import load
+from modewright.compiled import run, run_batch
+from tests.language.making import ROOT
+
+DRIVELINES = ROOT / "tests/data/specs/drivelines"
+quick = partial(library_of, flags=optimised("O0"))
+"""Bits do not depend on the level: a compiler that need not optimise is done sooner."""
+Loaded = tuple[System, Scenario]
+
+
+def drive(
+    name: str, scenario: str, horizon: Fraction, early: Fraction | None = None, root: Path = ROOT
+) -> Loaded:
+    """Return a system with a short scenario; `early` is when its inputs step."""
+    loaded = load(name, scenario, root=root)
+    inputs = dict(loaded.scenario.inputs)
+    for key, stimulus in inputs.items():
+        if early and len(stimulus.pieces) > 1:
+            pieces = (stimulus.pieces[0], Piece(early, stimulus.pieces[1].value))
+            inputs[key] = dataclasses.replace(stimulus, pieces=pieces)
+    return loaded.system, dataclasses.replace(loaded.scenario, horizon=horizon, inputs=inputs)
+
+
+def compiled(system: System, scenario: Scenario) -> mw.Trajectory:
+    programs = programs_of(system, scenario)
+    assert why_not_planned(system, scenario, programs) is None
+    found = PlannedRun(system, scenario, programs, quick).trajectory()
+    assert found is not None
+    return found
+
+
+def assert_same(mine: mw.Trajectory, theirs: mw.Trajectory) -> None:
+    assert mine.events == theirs.events
+    assert mine.times.tobytes() == theirs.times.tobytes()
+    assert list(mine.signals) == list(theirs.signals)
+    for name, values in theirs.signals.items():
+        assert mine.signals[name].dtype == values.dtype
+        assert mine.signals[name].tobytes() == values.tobytes(), name
+    rest = ("name", "units", "modes", "stopped", "faults")
+    assert [getattr(mine, key) for key in rest] == [getattr(theirs, key) for key in rest]
+
+
+@pytest.mark.parametrize(
+    ("name", "scenario"), [("ev_driveline", "tip_out"), ("ev_driveline_sensed", "tip_out_sensed")]
+)
+def test_a_shipped_scenario_has_the_bits_of_the_interpreter(name: str, scenario: str) -> None:
+    system, short = drive(name, scenario, Fraction(15, 100), Fraction(20, 1000))
+    theirs = simulate(system, short)
+    assert len(theirs.events) >= 4
+    assert_same(compiled(system, short), theirs)
+
+
+def with_rows(loaded: Loaded, every: Fraction) -> Loaded:
+    return loaded[0], dataclasses.replace(loaded[1], every=every)
+
+
+def test_rows_at_and_inside_steps_and_events_are_those_of_the_interpreter() -> None:
+    loaded = drive("light_damping", "coasting_down", Fraction(5, 10), root=DRIVELINES)
+    loaded = with_rows(loaded, Fraction(3, 16_000))
+    theirs = simulate(*loaded)
+    assert len(theirs.events) >= 4
+    assert_same(compiled(*loaded), theirs)
+
+
+def batch_of(count: int, **changes: object) -> Batch:
+    system, scenario = drive(
+        "ev_driveline_sensed", "tip_out_sensed", Fraction(1, 10), Fraction(20, 1000)
+    )
+    kinds = ("first", "final", "max", "min", "peak", "mean", "rms")
+    measures = [Measure(kind, "plant.T_hs", kind) for kind in kinds]  # type: ignore[arg-type]
+    late = Measure("late", "est.T_hs", "mean", Fraction(3, 100), Fraction(5, 100))
+    names = {"measures": (*measures, late), "outputs": ("s_em", "est.mode"), "most_events": 3}
+    made = Batch(system, scenario, count, **names)  # type: ignore[arg-type]
+    return dataclasses.replace(made, **changes)  # type: ignore[arg-type]
+
+
+def assert_same_batch(mine: BatchResult, theirs: BatchResult) -> None:
+    for key in ("measures", "outputs"):
+        for name, values in getattr(theirs, key).items():
+            assert getattr(mine, key)[name].tobytes() == values.tobytes(), name
+    for key in ("times", "event_counts", "event_times", "event_kinds", "faults"):
+        assert getattr(mine, key).tobytes() == getattr(theirs, key).tobytes(), key
+    assert (mine.kinds, mine.stopped) == (theirs.kinds, theirs.stopped)
+
+
+def test_variants_of_a_batch_have_the_bits_of_the_interpreter_on_any_number_of_threads() -> None:
+    table = np.array([[30.0, -20.0], [25.0, -30.0], [30.0, 40.0]])
+    batch = batch_of(
+        3,
+        parameters={
+            "plant.k_hs": np.array([4800.0, 7000.0, 5000.0]),
+            "plant.J_em": np.array([0.05, 0.04, 0.06]),
+        },
+        initial={"plant.theta_d": np.array([0.074, 0.06, 0.07])},
+        inputs={"T_req": InputTable((Fraction(0), Fraction(21, 1000)), table)},
+        seeds=np.array([1, 2, 3]),
+    )
+    theirs = run_variants(batch)
+    assert theirs.event_counts.max() > batch.most_events
+    for threads in (1, 2):
+        mine = planned_batch(batch, quick, threads)
+        assert mine.note == "compiled"
+        assert_same_batch(mine, theirs)
+
+
+def test_a_variant_that_leaves_a_range_or_stops_is_told_by_the_interpreter() -> None:
+    batch = batch_of(
+        2,
+        initial={"plant.w_em": np.array([310.0, 2500.0])},
+        inputs={"T_req": InputTable((Fraction(0),), np.array([[30.0], [30.0]]))},
+    )
+    mine = planned_batch(batch, quick)
+    assert list(mine.faults) == [False, True]
+    assert_same_batch(mine, run_variants(batch))
+
+
+def test_what_cannot_be_planned_is_run_by_the_interpreter_which_says_why() -> None:
+    system, scenario = drive("ev_driveline_ideal", "tip_out", Fraction(1, 100))
+    (name, stimulus), *_ = scenario.inputs.items()
+    ramp = (Piece(Fraction(0), Fraction(30), Fraction(-1)),)
+    inputs = {**scenario.inputs, name: dataclasses.replace(stimulus, pieces=ramp)}
+    ramped = dataclasses.replace(scenario, inputs=inputs)
+    trajectory, means = run(system, ramped, compiled=True)
+    assert means == "interpreter: input `T_req` changes inside the steps"
+    assert_same(trajectory, simulate(system, ramped))
+    batch = Batch(system, ramped, 1, measures=(Measure("m", "plant.w_w", "final"),))
+    assert run_batch(batch).note == means
+
+
+def test_without_a_compiler_the_interpreter_does_the_work_and_says_so(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("CC", "no_such_compiler")
+    system, scenario = drive("ev_driveline_ideal", "tip_out", Fraction(1, 100))
+    trajectory, means = run(system, scenario, compiled=True)
+    assert means == (
+        "interpreter: the C compiler `no_such_compiler` is missing: apt-get install gcc libc6-dev"
+    )
+    assert_same(trajectory, simulate(system, scenario))
+
+
+def test_a_short_run_is_not_worth_a_compiler() -> None:
+    system, scenario = drive("ev_driveline_ideal", "tip_out", Fraction(1, 100))
+    assert run(system, scenario)[1] == "interpreter: 50 steps are too few to compile for"
