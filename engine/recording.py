@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import csv
 import dataclasses
-import gzip
-import io
+import itertools
 import math
-import re
-import zlib
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -19,18 +15,20 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.recorded_csv import DECIMAL, read_csv
+from engine.recorded_file import MAX_PROBLEMS, RecordedFile, Samples
 from language.experiment import Column, RecordingMap, Window
-from language.problem import Problems, Source, Span, nearest
-from language.project import shown
+from language.problem import Problems, Span, nearest
+from language.units import UnitError, fits, parse_unit
 
-MAX_BYTES = 512 * 1024 * 1024
-"""Largest recording read, unpacked."""
-DECIMAL = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,3})?", re.ASCII)
 LONGEST_STAMP = 40
 LATEST_TIME = 10**12
 """Time stamps are below this, in their unit."""
-MAX_PROBLEMS = 20
-"""After so many problems of values the rest is not looked at."""
+OTHER_WORDS = {
+    "Nm": "N*m", "1/min": "rpm", "U/min": "rpm", "r/min": "rpm", "kph": "km/h", "m/s2": "m/s^2",
+    "\N{DEGREE SIGN}C": "degC", "\N{DEGREE SIGN}": "deg",
+}  # fmt: skip
+"""Units as loggers and DBC files write them."""
 
 
 @dataclass(frozen=True)
@@ -89,25 +87,49 @@ def cut(recording: Recording, window: Window) -> Recording:
 
 
 def read_recording(path: Path, mapping: RecordingMap, used: Sequence[str]) -> Recording:
-    """Read the used channels of a CSV file (also gzipped). Raises SpecError with all problems."""
-    source = Source(shown(path))
-    lines = _read_lines(path, source)
-    source = Source(source.name, tuple(lines))
+    """Read the used channels of a file: CSV (also gzipped), Parquet, MF4 or a log of CAN frames.
+
+    Raises SpecError with all problems, ToolMissing.
+    """
     problems = Problems()
-    rows = _Rows(source, problems)
+    file = open_recorded(path, mapping, problems)
     columns = [mapping.columns[name] for name in used]
     wanted = [name for column in columns for name in column.columns]
-    wanted += [column.time for column in columns if column.time]
-    rows.require([mapping.time, *wanted], mapping, problems)
+    if not file.is_stamped:
+        if not mapping.time:
+            label = f"map `{mapping.name}` names no column of time, which this file needs"
+            problems.error("missing", mapping.span, label, "`time: {column: t_s, unit: s}`")
+            problems.stop_if_any()
+        wanted = [mapping.time, *wanted, *[column.time for column in columns if column.time]]
+    _require(file, wanted, mapping, problems)
     problems.stop_if_any()
-    clock = rows.times(mapping.time, mapping, problems)
-    channels = {}
-    for column in columns:
-        channels[column.name] = rows.channel(column, clock, mapping, problems)
+    reader = _Reader(file, mapping, problems)
+    channels = {column.name: reader.channel(column) for column in columns}
     problems.stop_if_any()
-    stamps = [time for time in clock if time is not None]
+    stamps = reader.clock
+    if file.is_stamped:
+        stamps = [t for c in channels.values() for t in (c.times[0], c.times[-1])]
+    known = [time for time in stamps if time is not None]
     windows = mapping.windows_of(path.name)
-    return within(Recording(path.name, channels, max(stamps), min(stamps), windows), mapping)
+    return within(Recording(path.name, channels, max(known), min(known), windows), mapping)
+
+
+def open_recorded(path: Path, mapping: RecordingMap, problems: Problems) -> RecordedFile:
+    """Return what a file holds, by the ending of its name. Raises SpecError, ToolMissing."""
+    ending = path.suffix.lower()
+    if ending == ".parquet":
+        from engine.recorded_parquet import read_parquet
+
+        return read_parquet(path)
+    if ending in (".mf4", ".mdf", ".dat"):
+        from engine.recorded_mdf import read_mdf
+
+        return read_mdf(path)
+    if ending in (".blf", ".asc", ".log"):
+        from engine.recorded_can import read_can
+
+        return read_can(path, mapping)
+    return read_csv(path, problems)
 
 
 def within(recording: Recording, mapping: RecordingMap) -> Recording:
@@ -130,158 +152,138 @@ def within(recording: Recording, mapping: RecordingMap) -> Recording:
     return dataclasses.replace(whole, windows=recording.windows)
 
 
-def _read_lines(path: Path, source: Source) -> list[str]:
-    problems = Problems()
-    place = Span(source, 1, 1)
-    text = ""
-    try:
-        if path.stat().st_size > MAX_BYTES:
-            problems.error("huge", place, f"the recording is larger than {MAX_BYTES} bytes")
-            problems.stop_if_any()
-        data = path.read_bytes()
-        if path.suffix == ".gz":
-            data = gzip.GzipFile(fileobj=io.BytesIO(data)).read(MAX_BYTES + 1)
-        if len(data) > MAX_BYTES:
-            problems.error("huge", place, f"the recording is larger than {MAX_BYTES} bytes")
-            problems.stop_if_any()
-        text = data.decode("utf-8-sig")
-    except OSError as error:
-        reason = error.strerror or str(error)
-        problems.error("unreadable", place, f"the recording cannot be read: {reason}")
-    except (zlib.error, EOFError) as error:
-        problems.error("unreadable", place, f"the recording cannot be unpacked: {error}")
-    except UnicodeDecodeError:
-        problems.error("binary", place, "this is not a text file", "a recording is CSV, or CSV.gz")
-    problems.stop_if_any()
-    if "\0" in text:
-        problems.error("binary", place, "this is not a text file", "a recording is CSV, or CSV.gz")
-    elif not text.strip():
-        problems.error("empty", place, "the recording is empty")
-    problems.stop_if_any()
-    return text.splitlines()
+def _require(
+    file: RecordedFile, names: Sequence[str], mapping: RecordingMap, problems: Problems
+) -> None:
+    for name in dict.fromkeys(names):
+        count = list(file.names).count(name)
+        if not count:
+            label = f"there is no {file.noun} `{name}`, which map `{mapping.name}` reads"
+            hint = file.lacking(name) or nearest(name, file.names)
+            problems.error("column", file.head, label, hint)
+        elif count > 1:
+            problems.error("column", file.head, f"there are two {file.noun}s `{name}`")
+    if not file.rows:
+        label = "the recording has a head line and no values"
+        if file.is_stamped:
+            label = "the recording has no values"
+        problems.error("empty", file.head, label)
 
 
-class _Rows:
-    """The cells of a CSV text, each with its place."""
+class _Reader:
+    """Channels of a file by a map, with exact time stamps."""
 
-    def __init__(self, source: Source, problems: Problems) -> None:
-        self.source = source
-        self.head: list[str] = []
-        self.rows: list[tuple[int, list[str]]] = []
-        for number, line in enumerate(source.lines, start=1):
-            if not line.strip():
-                continue
-            row = self._cells_of(number, line, problems)
-            if not self.head:
-                self.head = [cell.strip() for cell in row]
-            elif len(row) != len(self.head):
-                label = f"this row has {len(row)} cells, the head line has {len(self.head)}"
-                hint = "a recording is separated by commas, with decimal points"
-                problems.error("row", Span(source, number, 1, len(line)), label, hint)
-            else:
-                self.rows.append((number, row))
-            if len(problems.found) >= MAX_PROBLEMS:
-                break
+    def __init__(self, file: RecordedFile, mapping: RecordingMap, problems: Problems) -> None:
+        self.file = file
+        self.mapping = mapping
+        self.problems = problems
+        self.clock = [] if file.is_stamped else self.times(mapping.time)
 
-    def _cells_of(self, number: int, line: str, problems: Problems) -> list[str]:
-        try:
-            return next(csv.reader([line], strict=True))
-        except csv.Error as error:
-            problems.error("row", Span(self.source, number, 1, len(line)), f"not CSV: {error}")
-            return [""] * len(self.head)
+    @property
+    def is_full(self) -> bool:
+        """Tell whether so many problems were found that the rest is not looked at."""
+        return len(self.problems.found) >= MAX_PROBLEMS
 
-    def require(self, names: Sequence[str], mapping: RecordingMap, problems: Problems) -> None:
-        head = Span(self.source, 1, 1, max(1, len(self.source.lines[0])))
-        for name in dict.fromkeys(names):
-            if name not in self.head:
-                label = f"there is no column `{name}`, which map `{mapping.name}` reads"
-                problems.error("column", head, label, nearest(name, self.head))
-            elif self.head.count(name) > 1:
-                problems.error("column", head, f"there are two columns `{name}`")
-        if not self.rows:
-            problems.error("empty", head, "the recording has a head line and no values")
-
-    def cells(self, name: str) -> Iterator[tuple[int, list[str], int, str]]:
-        """Yield line, row, position and text of every cell of a column."""
-        position = self.head.index(name)
-        for line, row in self.rows:
-            yield line, row, position, row[position].strip() if position < len(row) else ""
-
-    def span(self, line: int, row: Sequence[str], position: int) -> Span:
-        column = 1 + sum(len(cell) + 1 for cell in row[:position])
-        width = len(row[position]) if position < len(row) else 1
-        return Span(self.source, line, column, max(1, width))
-
-    def times(self, name: str, mapping: RecordingMap, problems: Problems) -> list[Fraction | None]:
+    def times(self, name: str) -> list[Fraction | None]:
         """Return the time stamps of a column [s]; None where it is blank."""
+        samples = self.file.read(name)
         found: list[Fraction | None] = []
         last: Fraction | None = None
-        main = name == mapping.time
-        for line, row, position, text in self.cells(name):
-            if len(problems.found) >= MAX_PROBLEMS:
+        for k in range(len(samples.values)):
+            if self.is_full:
                 break
+            text = samples.text(k)
             value = _exact(text)
             if value is not None:
-                value = value * mapping.time_unit.factor
-            elif main or text:
+                value = value * self.mapping.time_unit.factor
+            elif name == self.mapping.time or text:
                 label = f"the time stamp `{text}` is not a number" if text else "no time stamp"
-                problems.error("time", self.span(line, row, position), label)
+                self.problems.error("time", samples.place(k), label)
             if value is not None and last is not None and value <= last:
-                label = f"the time stamp {text} is not above the one before, {float(last):.9g}"
-                hint = "sort the recording, and remove repeated rows"
-                problems.error("time", self.span(line, row, position), label, hint)
+                self._unsorted(text, last, samples.place(k))
             last = value if value is not None else last
             found.append(value)
         return found
 
-    def channel(
-        self,
-        column: Column,
-        clock: list[Fraction | None],
-        mapping: RecordingMap,
-        problems: Problems,
-    ) -> Channel:
-        stamps = self.times(column.time, mapping, problems) if column.time else clock
-        values = [self._values(name, column, problems) for name in column.columns]
+    def _unsorted(self, text: str, last: Fraction, place: Span) -> None:
+        label = f"the time stamp {text} is not above the one before, {float(last):.9g}"
+        hint = "sort the recording, and remove repeated rows"
+        self.problems.error("time", place, label, hint)
+
+    def _own(self, column: Column, parts: Sequence[Samples]) -> Sequence[Fraction | None]:
+        """Return the stamps that the parts of a column carry themselves."""
+        stamps = parts[0].stamps or ()
+        if any(part.stamps != stamps for part in parts[1:]):
+            label = f"the {self.file.noun}s of `{column.name}` do not have the same time stamps"
+            hint = "a mean is taken of values that were measured together"
+            self.problems.error("time", column.span, label, hint)
+        for k, (before, after) in enumerate(itertools.pairwise(stamps), start=1):
+            if after <= before and not self.is_full:
+                self._unsorted(f"{float(after):.9g}", before, parts[0].place(k))
+        return stamps
+
+    def channel(self, column: Column) -> Channel:
+        """Return the channel of a column of the map, its values in SI."""
+        parts = [self.file.read(name) for name in column.columns]
+        if self.file.is_stamped:
+            stamps = self._own(column, parts)
+        else:
+            stamps = self.times(column.time) if column.time else self.clock
+        cells = [
+            self._values(name, part, column)
+            for name, part in zip(column.columns, parts, strict=True)
+        ]
         times: list[Fraction] = []
         kept: list[float] = []
         scale = float(column.scale[0]) * column.sign
-        for (number, row), stamp, *cells in zip(self.rows, stamps, *values, strict=False):
-            if any(cell is None for cell in cells):
+        for k, (stamp, *row) in enumerate(zip(stamps, *cells, strict=False)):
+            if any(cell is None for cell in row):
                 continue
-            place = self.span(number, row, self.head.index(column.columns[0]))
             if stamp is None:
-                if column.time and not row[self.head.index(column.time)].strip():
+                if column.time and not self.file.read(column.time).text(k):
                     label = f"a value of `{column.name}` without a time stamp"
-                    problems.error("time", place, label)
+                    self.problems.error("time", parts[0].place(k), label)
                 continue
-            value = _mean(cells) * scale
+            value = _mean(row) * scale
             if not math.isfinite(value):
-                problems.error("value", place, f"`{column.name}` is {value} in SI")
+                place = parts[0].place(k)
+                self.problems.error("value", place, f"`{column.name}` is {value} in SI")
             times.append(stamp + column.delay)
             kept.append(value)
-        if not times and not problems.has_errors:
-            place = Span(self.source, 1, 1, max(1, len(self.source.lines[0])))
-            problems.error("empty", place, f"column `{column.columns[0]}` has no values")
+        if not times and not self.problems.has_errors:
+            label = f"{self.file.noun} `{column.columns[0]}` has no values"
+            self.problems.error("empty", self.file.head, label)
         return Channel(column, tuple(times), tuple(kept))
 
-    def _values(self, name: str, column: Column, problems: Problems) -> list[float | None]:
+    def _values(self, name: str, samples: Samples, column: Column) -> list[float | None]:
         factor, offset = float(column.unit.factor), float(column.unit.offset)
+        self._check_unit(name, samples.unit, column)
         found: list[float | None] = []
-        for line, row, position, text in self.cells(name):
-            if len(problems.found) >= MAX_PROBLEMS:
+        for k, value in enumerate(samples.values):
+            if self.is_full:
                 break
-            value = _real(text)
-            if text and (value is None or not math.isfinite(value)):
-                label = f"`{text}` in column `{name}` is not a finite number"
-                problems.error("value", self.span(line, row, position), label)
+            if value is not None and not math.isfinite(value):
+                label = f"`{samples.text(k)}` in {self.file.noun} `{name}` is not a finite number"
+                self.problems.error("value", samples.place(k), label)
                 value = None
-            elif not text and column.blank == "refuse":
-                label = f"column `{name}` has no value here"
+            elif value is None and column.blank == "refuse":
+                label = f"{self.file.noun} `{name}` has no value here"
                 hint = "`blank: skip` in the map leaves empty cells out"
-                problems.error("value", self.span(line, row, position), label, hint)
+                self.problems.error("value", samples.place(k), label, hint)
             found.append(None if value is None else value * factor + offset)
         return found
+
+    def _check_unit(self, name: str, written: str, column: Column) -> None:
+        """A unit that the file itself gives, where we know it, is that of the map."""
+        text = OTHER_WORDS.get(written, written)
+        try:
+            unit = parse_unit(text)
+        except UnitError:
+            return
+        same = fits(unit.dimension, column.unit.dimension)
+        if not same or (unit.factor, unit.offset) != (column.unit.factor, column.unit.offset):
+            label = f"the file gives `{name}` in `{text}`, the map in `{column.unit.text}`"
+            self.problems.error("unit", column.span, label, f"`unit: {text}` in the map")
 
 
 def _mean(cells: Sequence[float | None]) -> float:
@@ -296,7 +298,3 @@ def _exact(text: str) -> Fraction | None:
         return None
     value = Fraction(text)
     return value if abs(value) < LATEST_TIME else None
-
-
-def _real(text: str) -> float | None:
-    return float(text) if DECIMAL.fullmatch(text) else None

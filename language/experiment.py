@@ -10,6 +10,7 @@ from typing import Literal
 from language.declaration import (
     Formula,
 )
+from language.document import Scalar
 from language.kind import Type
 from language.model import (
     Automaton,
@@ -155,6 +156,7 @@ class RecordingMap:
     """How the columns of a recording become signals.
 
     `windows` are the times to use, by file name or `EVERY_FILE`; where there is none, all is used.
+    `time` is empty where files carry time stamps themselves; `databases` are DBC files.
     """
 
     name: str
@@ -164,6 +166,7 @@ class RecordingMap:
     constants: Mapping[str, tuple[Fraction, Dimension]]
     span: Span
     windows: Mapping[str, tuple[Window, ...]] = field(default_factory=dict)
+    databases: tuple[Scalar, ...] = ()
 
     def windows_of(self, file: str) -> tuple[Window, ...]:
         """Return the windows of a file; none where all of it is used."""

@@ -5,15 +5,15 @@ from __future__ import annotations
 from fractions import Fraction
 from typing import Literal, cast
 
-from language.document import Document, Entry, Items, Node, Table
+from language.document import Document, Entry, Items, Node, Scalar, Table
 from language.experiment import EVERY_FILE, Column, RecordingMap, Window
 from language.literal import constant
 from language.problem import Problems, Span
 from language.project import Project, expanded
 from language.reader import Reader
-from language.units import NO_UNIT, NUMBER, SECOND, Dimension, fits, product
+from language.units import NO_UNIT, NUMBER, SECOND, Dimension, fits, parse_unit, product
 
-MAP_KEYS = ("language", "map", "time", "columns", "constants", "windows")
+MAP_KEYS = ("language", "map", "time", "columns", "constants", "windows", "dbc")
 COLUMN_KEYS = (
     "column mean to compare unit scale sign delay hold blank time".split()  # noqa: SIM905
 )
@@ -43,7 +43,8 @@ class _MapReader(Reader):
     def read(self, root: Table, name: str, at: Span) -> RecordingMap:
         tree = self.table(root, f"map {name}", MAP_KEYS)
         time = self.table(tree.get("time"), "time", ("column", "unit"))
-        unit = self.unit(time.get("unit"))
+        has_time = "time" in tree.entries
+        unit = self.unit(time.get("unit")) if has_time else parse_unit("s")
         if not fits(unit.dimension, SECOND):
             self.problems.error(
                 "unit", time.span if time.entries else at, "the unit of `time` is a time"
@@ -57,13 +58,18 @@ class _MapReader(Reader):
             self.problems.error("missing", at, "a map has at least one column in `columns`")
         return RecordingMap(
             name=name,
-            time=self.text(time.get("column"), "time.column", at),
+            time=self.text(time.get("column"), "time.column", at) if has_time else "",
             time_unit=unit,
             columns={column.name: column for column in columns},
             constants=constants,
             span=at,
             windows=self._windows(tree.get("windows")),
+            databases=self._databases(tree.get("dbc")),
         )
+
+    def _databases(self, node: Node | None) -> tuple[Scalar, ...]:
+        """One DBC file or a list of them."""
+        return (node,) if isinstance(node, Scalar) else tuple(self.items(node, "dbc"))
 
     def _windows(self, node: Node | None) -> dict[str, tuple[Window, ...]]:
         """A list of windows for every file, or a mapping from file names to such lists."""

@@ -152,7 +152,7 @@ class TestAFileThatIsNotWhatItSeems:
     def test_a_packed_file_that_is_huge_unpacked(
         self, told: Told, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr("engine.recording.MAX_BYTES", 1000)
+        monkeypatch.setattr("engine.recorded_csv.MAX_BYTES", 1000)
         packed = gzip.compress(GOOD.encode() + b"\n" * 50_000, mtime=0)
         assert len(packed) < 1000
         assert "larger than 1000 bytes" in told(packed, name="drive.csv.gz")

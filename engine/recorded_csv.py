@@ -1,0 +1,111 @@
+"""Recorded CSV: a text with a head line, also gzipped; every cell knows its line and column."""
+
+from __future__ import annotations
+
+import csv
+import gzip
+import io
+import math
+import re
+import zlib
+from pathlib import Path
+
+from engine.recorded_file import MAX_BYTES, MAX_PROBLEMS, RecordedFile, Samples
+from language.problem import Problems, Source, Span
+from language.project import shown
+
+DECIMAL = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,3})?", re.ASCII)
+"""A number: longer ones, and words such as `nan`, are none."""
+
+
+def read_csv(path: Path, problems: Problems) -> RecordedFile:
+    """Read a CSV file; rows that do not fit the head line are reported. Raises SpecError."""
+    source = Source(shown(path))
+    lines = _read_lines(path, source)
+    source = Source(source.name, tuple(lines))
+    rows = _Rows(source, problems)
+    return RecordedFile(source, "column", rows.head, rows.samples, len(rows.rows))
+
+
+def _read_lines(path: Path, source: Source) -> list[str]:
+    problems = Problems()
+    place = Span(source, 1, 1)
+    text = ""
+    try:
+        if path.stat().st_size > MAX_BYTES:
+            problems.error("huge", place, f"the recording is larger than {MAX_BYTES} bytes")
+            problems.stop_if_any()
+        data = path.read_bytes()
+        if path.suffix == ".gz":
+            data = gzip.GzipFile(fileobj=io.BytesIO(data)).read(MAX_BYTES + 1)
+        if len(data) > MAX_BYTES:
+            problems.error("huge", place, f"the recording is larger than {MAX_BYTES} bytes")
+            problems.stop_if_any()
+        text = data.decode("utf-8-sig")
+    except OSError as error:
+        reason = error.strerror or str(error)
+        problems.error("unreadable", place, f"the recording cannot be read: {reason}")
+    except (zlib.error, EOFError) as error:
+        problems.error("unreadable", place, f"the recording cannot be unpacked: {error}")
+    except UnicodeDecodeError:
+        problems.error("binary", place, "this is not a text file", "a recording is CSV, or CSV.gz")
+    problems.stop_if_any()
+    if "\0" in text:
+        problems.error("binary", place, "this is not a text file", "a recording is CSV, or CSV.gz")
+    elif not text.strip():
+        problems.error("empty", place, "the recording is empty")
+    problems.stop_if_any()
+    return text.splitlines()
+
+
+class _Rows:
+    """The cells of a CSV text, each with its place."""
+
+    def __init__(self, source: Source, problems: Problems) -> None:
+        self.source = source
+        self.head: list[str] = []
+        self.rows: list[tuple[int, list[str]]] = []
+        for number, line in enumerate(source.lines, start=1):
+            if not line.strip():
+                continue
+            row = self._cells_of(number, line, problems)
+            if not self.head:
+                self.head = [cell.strip() for cell in row]
+            elif len(row) != len(self.head):
+                label = f"this row has {len(row)} cells, the head line has {len(self.head)}"
+                hint = "a recording is separated by commas, with decimal points"
+                problems.error("row", Span(source, number, 1, len(line)), label, hint)
+            else:
+                self.rows.append((number, row))
+            if len(problems.found) >= MAX_PROBLEMS:
+                break
+
+    def _cells_of(self, number: int, line: str, problems: Problems) -> list[str]:
+        try:
+            return next(csv.reader([line], strict=True))
+        except csv.Error as error:
+            problems.error("row", Span(self.source, number, 1, len(line)), f"not CSV: {error}")
+            return [""] * len(self.head)
+
+    def samples(self, name: str) -> Samples:
+        """Return the cells of a column."""
+        position = self.head.index(name)
+
+        def text(k: int) -> str:
+            row = self.rows[k][1]
+            return row[position].strip() if position < len(row) else ""
+
+        def place(k: int) -> Span:
+            line, row = self.rows[k]
+            column = 1 + sum(len(cell) + 1 for cell in row[:position])
+            width = len(row[position]) if position < len(row) else 1
+            return Span(self.source, line, column, max(1, width))
+
+        texts = (text(k) for k in range(len(self.rows)))
+        return Samples([_number(cell) for cell in texts], text, place)
+
+
+def _number(text: str) -> float | None:
+    if not text:
+        return None
+    return float(text) if DECIMAL.fullmatch(text) else math.nan
