@@ -140,6 +140,7 @@ def _module(
         "bound": sum(len(program.modes_of(region)) for region in program.mode_variables()),
         "number": number,
         "looks": [(k, place(wires_of(program)[wire])) for k, wire in slots],
+        "is_looked_at": any(not _is_carried(wires_of(program)[wire]) for _, wire in slots),
         "width": row_width(assembly),
         "lagging": [
             INSTANCE.format(s.name)
@@ -152,6 +153,11 @@ def _module(
         "has_faults": any(v.name == "memory.faults" for v in program.variables),
         "finite": [place(wire.source) for wire in program.outputs if wire.type == "real"],
     }
+
+
+def _is_carried(variable: str) -> bool:
+    """Tell whether a variable is as it is without its equation."""
+    return variable.startswith(("state.", "discrete.", "memory."))
 
 
 def _defaults(program: Program) -> list[str]:
