@@ -14,7 +14,7 @@ from language.project import Project, read_document
 from modewright.compiled import run_batch
 from modewright.files import OutputError
 from sweep.executor import Executor, InProcess
-from sweep.preparation import prepared
+from sweep.preparation import prepared, resampled
 from sweep.processes import Processes
 from sweep.store import read_store
 from sweep.study_reader import read_study
@@ -36,20 +36,23 @@ def sweep(
     *,
     workers: int | None = None,
     block: int | None = None,
+    samples: int | None = None,
+    seed: int | None = None,
     progress: Progress | None = None,
     executor: Executor | None = None,
 ) -> StudyRun:
     """Run a study into a folder, or go on with it there; what is finished is never lost.
 
-    `workers` processes (all cores), 1: in this process; `block` variants are kept at once.
-    Raises SpecError, OutputError (a full disk: what is finished is kept), ToolMissing.
+    `workers` processes (all cores), 1: in this process; `block` variants are kept at once;
+    `samples` and `seed` replace those of the study.
+    Raises SpecError, OutputError (a full disk: what is finished is kept), ToolMissing, ValueError.
     """
     project = Project(root or Path())
     document = read_document(project.path_of(study))
     scalars: dict[str, Scalar] = {
         name: command_line_value(text, name=name) for name, text in (values or {}).items()
     }
-    ready = prepared(read_study(document, project, scalars))
+    ready = prepared(resampled(read_study(document, project, scalars), samples, seed))
     count = workers or os.cpu_count() or 1
     local: Executor = Processes(count, WORKER) if count > 1 else InProcess(run_batch)
     try:

@@ -117,10 +117,10 @@ MATCH_PARTS = {
 
 @dataclass(frozen=True)
 class Column:
-    """A column of the store: `type` is real, whole or a list of reals; `unit` is in SI."""
+    """A column of the store: `type` is real, whole, a text or a list of reals; `unit` is in SI."""
 
     name: str
-    type: Literal["real", "whole", "list"]
+    type: Literal["real", "whole", "text", "list"]
     unit: str
 
 

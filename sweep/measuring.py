@@ -20,7 +20,7 @@ from sweep.measure import (
 from sweep.observation import Observation
 from sweep.waveform import signal_number
 
-Cell = float | int | list[float] | None
+Cell = float | int | str | list[float] | None
 Window = tuple[float, float] | None
 
 

@@ -24,7 +24,9 @@ def prepared(study: Study) -> Study:
 
     Raises SpecError: for what is wrong with a recording, or a Program that cannot be made.
     """
+    sampling = study.sampling
     identity = dict(study.identity)
+    identity["sampling"] = " ".join(str(value) for value in vars(sampling).values())
     kinds = []
     for kind in study.kinds:
         courses = {}
@@ -34,6 +36,16 @@ def prepared(study: Study) -> Study:
             identity |= _identity(kind, name, scenario)
         kinds.append(Kind(kind.name, kind.system, courses))
     return dataclasses.replace(study, kinds=tuple(kinds), identity=identity)
+
+
+def resampled(study: Study, samples: int | None = None, seed: int | None = None) -> Study:
+    """Return a study with another number of drawn points, or another seed. Raises ValueError."""
+    old = study.sampling
+    if (samples is not None or seed is not None) and not old.count:
+        raise ValueError(f"`{study.name}` draws nothing: it has no samples and no seed")
+    count = old.count if samples is None else samples
+    new = dataclasses.replace(old, count=count, seed=old.seed if seed is None else seed)
+    return dataclasses.replace(study, sampling=new)
 
 
 def digest_of(identity: Mapping[str, str]) -> str:

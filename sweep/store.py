@@ -8,68 +8,21 @@ has its name is finished, whatever happens to the process.
 from __future__ import annotations
 
 import dataclasses
-import json
 import os
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from types import ModuleType
-from typing import Any
 
-from language.missing import ToolMissing
-from language.problem import Problems, Source, Span, SpecError
+from language.problem import SpecError
 from sweep.block import Block, Row
-from sweep.measure import Column, columns_of
-from sweep.preparation import FORMAT, digest_of
-from sweep.study import Presentation, Study
+from sweep.manifest import MANIFEST, Manifest, manifest_json, read_manifest, refused
+from sweep.rows_file import arrow_module, parquet_of
 
-MANIFEST = "study.json"
 BLOCKS = "blocks"
 LOCK = ".lock"
 NAME = re.compile(r"(\d{10})-(\d{10})\.parquet")
-MOST_BLOCKS = 100
-MOST_IN_BLOCK = 5000
-FIXED = ("number", "variant", "scenario", "sample", "replicate", "seed")
-"""The first columns; then what varies, `status`, `message`, the measures."""
-
-
-@dataclass(frozen=True)
-class Manifest:
-    """What a store is of. `identity` are the digests of all that results depend on, by part."""
-
-    study: str
-    digest: str
-    identity: Mapping[str, str]
-    count: int
-    block: int
-    varied: tuple[Column, ...]
-    words: Mapping[str, Sequence[str]]
-    measures: tuple[Column, ...]
-    presentation: Presentation
-
-    @property
-    def blocks(self) -> list[Block]:
-        """All blocks in their order."""
-        starts = range(0, self.count, self.block)
-        return [Block(start, min(start + self.block, self.count)) for start in starts]
-
-
-def manifest_of(study: Study, block: int | None = None) -> Manifest:
-    """Return the manifest of a prepared study; about 100 blocks unless a size is given."""
-    size = min(MOST_IN_BLOCK, max(1, -(-study.count // MOST_BLOCKS)))
-    return Manifest(
-        study=study.name,
-        digest=digest_of(study.identity),
-        identity=study.identity,
-        count=study.count,
-        block=block or size,
-        varied=tuple(Column(varied.name, "real", varied.unit) for varied in study.varied),
-        words={varied.name: varied.words for varied in study.varied if varied.words},
-        measures=tuple(column for measure in study.measures for column in columns_of(measure)),
-        presentation=study.presentation,
-    )
 
 
 @dataclass(frozen=True)
@@ -165,9 +118,9 @@ def open_store(folder: Path, wanted: Manifest) -> Store:
         wanted = dataclasses.replace(wanted, block=there.block)
     elif folder.is_dir() and any(p.name != LOCK and p.suffix != ".part" for p in folder.iterdir()):
         label = "this folder holds something else than the results of a study"
-        raise _refused(folder, "store", label, "name another folder, or a new one")
+        raise refused(folder, "store", label, "name another folder, or a new one")
     (folder / BLOCKS).mkdir(parents=True, exist_ok=True)
-    write_whole(folder / MANIFEST, _json(wanted))
+    write_whole(folder / MANIFEST, manifest_json(wanted))
     store = Store(folder, wanted)
     store.clear_leftovers()
     return store
@@ -196,86 +149,8 @@ def locked(folder: Path) -> Iterator[None]:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
             label = "another process is writing into this folder"
-            raise _refused(folder, "store", label, "wait for it, or name another folder") from None
+            raise refused(folder, "store", label, "wait for it, or name another folder") from None
         yield
-
-
-def parquet_of(manifest: Manifest, rows: Sequence[Row], mark: bytes) -> bytes:
-    """Return rows as a Parquet file that carries a mark: of what study and block it is."""
-    arrow = arrow_module()
-    columns: dict[str, Any] = {
-        "number": arrow.array([row.number for row in rows], arrow.int64()),
-        "variant": arrow.array([row.variant for row in rows], arrow.string()),
-        "scenario": arrow.array([row.scenario for row in rows], arrow.string()),
-        "sample": arrow.array([row.sample for row in rows], arrow.int64()),
-        "replicate": arrow.array([row.replicate for row in rows], arrow.int64()),
-        "seed": arrow.array([row.seed for row in rows], arrow.int64()),
-    }
-    for column in manifest.varied:
-        cells = [row.values.get(column.name) for row in rows]
-        columns[column.name] = arrow.array(cells, arrow.float64())
-    columns["status"] = arrow.array([row.status for row in rows], arrow.string())
-    columns["message"] = arrow.array([row.message for row in rows], arrow.string())
-    types = {
-        "real": arrow.float64(), "whole": arrow.int64(), "list": arrow.list_(arrow.float64()),
-    }  # fmt: skip
-    for column in manifest.measures:
-        measured = [row.measures[column.name] for row in rows]
-        columns[column.name] = arrow.array(measured, types[column.type])
-    units = {column.name: column.unit for column in (*manifest.varied, *manifest.measures)}
-    kept = {b"modewright": mark, b"units": json.dumps(units).encode()}
-    sink = arrow.BufferOutputStream()
-    table = arrow.table(columns, metadata=kept)
-    arrow.parquet.write_table(table, sink, compression="zstd")
-    data: bytes = sink.getvalue().to_pybytes()
-    return data
-
-
-def _json(manifest: Manifest) -> bytes:
-    shown = manifest.presentation
-    data = {
-        "modewright": FORMAT,
-        "study": manifest.study,
-        "digest": manifest.digest,
-        "count": manifest.count,
-        "block": manifest.block,
-        "identity": dict(sorted(manifest.identity.items())),
-        "varied": [vars(column) for column in manifest.varied],
-        "words": {name: list(words) for name, words in manifest.words.items()},
-        "measures": [vars(column) for column in manifest.measures],
-        "presentation": {
-            "by": list(shown.by), "confidence": shown.confidence, "plots": dict(shown.plots),
-        },
-    }  # fmt: skip
-    return (json.dumps(data, indent=1) + "\n").encode()
-
-
-def read_manifest(folder: Path) -> Manifest:
-    """Return what the store in a folder is of. Raises SpecError."""
-    path = folder / MANIFEST
-    try:
-        data = json.loads(path.read_text("utf-8"))
-        if data["modewright"] != FORMAT:
-            label = "these results are in a form that is not known here"
-            raise _refused(folder, "store", label, "run the study into another folder")
-        shown = data["presentation"]
-        return Manifest(
-            study=data["study"],
-            digest=data["digest"],
-            identity=data["identity"],
-            count=data["count"],
-            block=data["block"],
-            varied=tuple(Column(**column) for column in data["varied"]),
-            words=data["words"],
-            measures=tuple(Column(**column) for column in data["measures"]),
-            presentation=Presentation(tuple(shown["by"]), shown["confidence"], shown["plots"]),
-        )
-    except FileNotFoundError:
-        label = "there are no results of a study here"
-        raise _refused(folder, "store", label, "modewright sweep STUDY --out DIR") from None
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        label = f"`{MANIFEST}` cannot be read: {error}"
-        raise _refused(folder, "store", label) from None
 
 
 def _another(folder: Path, there: Manifest, wanted: Manifest) -> SpecError:
@@ -284,23 +159,4 @@ def _another(folder: Path, there: Manifest, wanted: Manifest) -> SpecError:
     other = [n for n in names if there.identity.get(n) != wanted.identity.get(n)]
     parts = f"{', '.join(other[:3])}{' ...' if len(other) > 3 else ''}"
     label = f"the results here are of another state of `{there.study}`: {parts} changed"
-    return _refused(folder, "store", label, "name another folder with --out, or undo the change")
-
-
-def _refused(folder: Path, kind: str, label: str, help: str = "") -> SpecError:
-    problems = Problems()
-    problems.error(kind, Span(Source(str(folder)), 1, 1), label, help)
-    return SpecError(problems.found)
-
-
-def arrow_module() -> ModuleType:
-    """Return pyarrow with its Parquet. Raises ToolMissing."""
-    try:
-        import pyarrow
-        import pyarrow.parquet
-    except ImportError:
-        raise ToolMissing(
-            "a study needs the package `pyarrow`: pip install 'modewright[parquet]'"
-        ) from None
-    found: ModuleType = pyarrow
-    return found
+    return refused(folder, "store", label, "name another folder with --out, or undo the change")

@@ -28,8 +28,8 @@ from sweep.vary_reader import MOST_POINTS, VaryReader
 STUDY_KEYS = tuple(
     "language study of scenarios variants vary set sampling replicates measures record summary plots".split()  # noqa: SIM905, E501
 )
-SHOWN_KEYS = ("summary", "plots", "study", *TEXT_KEYS)
-"""Keys without influence on the results."""
+SHOWN_KEYS = ("summary", "plots", "sampling", "study", *TEXT_KEYS)
+"""Keys without influence on the results; but sampling, which may come from elsewhere."""
 MOST_REPLICATES = 1_000_000
 BASE = "base"
 """The name of the variant that is the system as it is."""

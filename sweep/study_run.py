@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from sweep.block import Block
-from sweep.executor import Executor
-from sweep.store import Store, locked, manifest_of, open_store
+from sweep.executor import Executor, Finished
+from sweep.manifest import Manifest, manifest_of
+from sweep.store import Store, locked, open_store
 from sweep.study import Study
 
 Progress = Callable[[int, int, int], None]
@@ -36,16 +38,29 @@ def run_study(
 
     Raises SpecError where the folder is of another study, OSError where it cannot be written.
     """
+    return fill(manifest_of(study, block), folder, partial(executor, study), progress)
+
+
+def fill(
+    manifest: Manifest,
+    folder: Path,
+    compute: Callable[[Iterable[Block]], Iterator[Finished]],
+    progress: Progress | None = None,
+) -> StudyRun:
+    """Fill a store with blocks of any kind of work; what is there is not computed again.
+
+    Raises SpecError where the folder is of something else, OSError where it cannot be written.
+    """
     with locked(folder):
-        store = open_store(folder, manifest_of(study, block))
-        total = study.count
+        store = open_store(folder, manifest)
+        total = manifest.count
         there = store.finished()
         missing = [each for each in store.manifest.blocks if each.start not in there]
         before = total - sum(each.stop - each.start for each in missing)
         done, lost = before, []
         tell = progress or _silent
         tell(done, before, total)
-        finished = executor(study, missing)
+        finished = compute(missing)
         try:
             for part in finished:
                 if part.lost:

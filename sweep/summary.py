@@ -95,7 +95,7 @@ def summary_of(store: Store) -> Summary:
     lines: list[Line] = []
     rates: list[Rate] = []
     groups = list(_groups(table))
-    for column in manifest.measures:
+    for column in (each for each in manifest.measures if each.type != "text"):
         pooled = table.pooled(column.name)
         for name, chosen in groups:
             values = pooled.values[chosen[pooled.rows]]

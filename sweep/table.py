@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sweep.block import DONE
-from sweep.store import Store, arrow_module
+from sweep.rows_file import arrow_module
+from sweep.store import Store
 
 Reals = NDArray[np.float64]
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from modewright.commands.options import Json, Sets, values_of
+from modewright.commands.options import Json, Sets, usage_errors, values_of
 from modewright.console import announce, console, counted, counting
 from modewright.exits import PROBLEMS
 from modewright.files import OutputError, make_folder, write_files
@@ -31,6 +32,12 @@ def sweep(
     summary: Annotated[
         Path | None, typer.Option("--summary", help="sum up a folder, run nothing")
     ] = None,
+    samples: Annotated[
+        int | None, typer.Option(min=1, help="drawn points, in place of the study's number")
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option(min=0, help="of drawn points, in place of the study's")
+    ] = None,
     block: Annotated[
         int | None, typer.Option(min=1, max=1_000_000, help="variants that are kept at once")
     ] = None,
@@ -47,6 +54,7 @@ def sweep(
     \b
     modewright sweep tip_out_stiffness_and_gap --out build/tip_out
     modewright sweep my_study.yaml --out results --workers 4 --set 'c_hs=20 N*m*s/rad'
+    modewright sweep random_tip_outs --out held_out --samples 200 --seed 7
     modewright sweep --summary results --csv summary.csv
     """
     if (study is None) == (summary is None):
@@ -58,7 +66,9 @@ def sweep(
     lost = 0
     if study is not None:
         assert out is not None
-        lost = _run(study, out, workers, values_of(sets), block, as_json)
+        options: dict[str, Any] = {"block": block, "samples": samples, "seed": seed}
+        options["workers"] = workers or None
+        lost = _run(study, out, values_of(sets), options, as_json)
     folder = out or summary
     assert folder is not None
     _show(folder, table, form, as_json)
@@ -69,9 +79,8 @@ def sweep(
 def _run(
     study: str,
     out: Path,
-    workers: int,
     values: dict[str, str],
-    block: int | None,
+    options: Mapping[str, Any],
     as_json: bool,
 ) -> int:
     """Run the study; return how many blocks could not be computed."""
@@ -84,10 +93,8 @@ def _run(
         progress(now, before, total)
 
     try:
-        with counting(f"sweep {study}", "variants") as progress:
-            found = studies.sweep(
-                study, out, values, workers=workers or None, block=block, progress=tell
-            )
+        with counting(f"sweep {study}", "variants") as progress, usage_errors():
+            found = studies.sweep(study, out, values, **options, progress=tell)
     except KeyboardInterrupt:
         _tell_kept(out, *done)
         raise

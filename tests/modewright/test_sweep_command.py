@@ -111,3 +111,15 @@ def test_values_of_the_command_line_belong_to_the_results(
 def test_wrong_usage_is_told(arguments: tuple[str, ...], code: int, tmp_path: Path) -> None:
     assert run(*arguments) == code
     assert not Path("x").exists()
+
+
+def test_samples_and_seed_of_the_command_line_replace_those_of_the_study(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(studies, "study_pictures", lambda folder: {})
+    out = str(tmp_path / "out")
+    assert run("grid", "--out", out, "--samples", "1", "--seed", "9") == 0
+    assert "15 variants computed" in capsys.readouterr().out
+    assert run("grid", "--out", out, "--samples", "1") == 1
+    assert "sampling changed" in capsys.readouterr().err
+    assert run("alone", "--out", str(tmp_path / "other"), "--seed", "9") == 2

@@ -14,7 +14,8 @@ from language.project import Project, document_of, read_document
 from sweep.block import Block
 from sweep.executor import Finished, InProcess
 from sweep.preparation import prepared
-from sweep.store import Store, arrow_module
+from sweep.rows_file import arrow_module
+from sweep.store import Store
 from sweep.study import Study
 from sweep.study_reader import read_study
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 import resource
@@ -17,12 +18,15 @@ import pytest
 from engine.batch import Batch, BatchResult
 from engine.variants import run_variants
 from language.problem import SpecError
-from sweep.block import Block
+from sweep.block import Block, Row
 from sweep.executor import Finished, InProcess
+from sweep.manifest import Manifest, manifest_of
+from sweep.measure import Column
 from sweep.processes import MOST_DEATHS, Processes
-from sweep.store import MANIFEST, Store, locked, manifest_of, open_store, read_store
-from sweep.study import Study
-from sweep.study_run import run_study
+from sweep.store import Store, locked, open_store, read_store
+from sweep.study import Presentation as Shown, Study
+from sweep.study_run import fill, run_study
+from sweep.summary import summary_of
 from tests.sweep.laying import QUICK, Backwards, content, quick, study
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals and fork of POSIX")
@@ -56,7 +60,7 @@ def test_a_finished_study_is_not_computed_again(tmp_path: Path) -> None:
 
 def test_another_state_of_the_study_is_refused_and_what_changed_is_named(tmp_path: Path) -> None:
     run_study(study(), tmp_path, QUICK)
-    with pytest.raises(SpecError, match="study changed"):
+    with pytest.raises(SpecError, match="sampling changed"):
         run_study(study("grid", ("seed: 3", "seed: 4")), tmp_path, QUICK)
     shown = study("grid", ("{histogram: t_1, by: d}", "{histogram: peak}"))
     assert run_study(shown, tmp_path, QUICK).computed == 0
@@ -92,7 +96,7 @@ def test_two_processes_do_not_write_into_one_folder(tmp_path: Path) -> None:
 
 
 def slow(batch: Batch) -> BatchResult:
-    time.sleep(0.004)
+    time.sleep(0.01)
     return quick(batch)
 
 
@@ -109,13 +113,14 @@ def test_killed_at_random_instants_and_gone_on_with_it_equals_the_undisturbed(
         if child == 0:
             run_study(made, tmp_path / "killed", InProcess(slow), block=2)
             os._exit(0)
-        time.sleep(float(random.uniform(0.02, 0.09)))
+        while len(list((tmp_path / "killed").glob("blocks/0*.parquet"))) <= done[-1]:
+            time.sleep(0.001)
+        time.sleep(float(random.uniform(0.0, 0.05)))
         os.kill(child, signal.SIGKILL)
         os.waitpid(child, 0)
-        made_now = (tmp_path / "killed" / MANIFEST).exists()
-        done.append(len(read_store(tmp_path / "killed").paths()) if made_now else 0)
-    assert done == sorted(done)
-    assert 0 < done[-1] < 30, done
+        done.append(len(read_store(tmp_path / "killed").paths()))
+    assert done == sorted(set(done))
+    assert done[-1] < 30, done
     last = run_study(made, tmp_path / "killed", QUICK)
     assert last.before == 2 * done[-1]
     assert bytes_of(tmp_path / "killed") == bytes_of(tmp_path / "undisturbed")
@@ -211,3 +216,22 @@ def test_what_cannot_be_simulated_is_a_value_of_its_row(tmp_path: Path) -> None:
     faulty = {row["k_now"]: row for row in rows}[4.0]
     assert (faulty["status"], faulty["message"]) == ("fault", "a fault bit is set")
     assert all(row["final"] is None for row in rows if row["status"] in ("stopped", "refused"))
+
+
+def test_a_store_holds_any_work_that_comes_in_blocks(tmp_path: Path) -> None:
+    """As the proof of the diagnosis does: rows of its own, texts too."""
+    of = Manifest("proof", "0" * 64, {}, 5, 2, (), {}, (Column("named", "text", "1"),), Shown())
+
+    def compute(blocks: Iterable[Block]) -> Iterator[Finished]:
+        for block in blocks:
+            numbers = range(block.start, block.stop)
+            rows = [
+                Row(n, "", "", n, 0, 0, {}, "done", "", {"named": f"case {n}"}) for n in numbers
+            ]
+            yield Finished(block, rows)
+
+    fill(of, tmp_path, lambda blocks: itertools.islice(compute(blocks), 1))
+    found = fill(of, tmp_path, compute)
+    assert (found.before, found.computed) == (2, 3)
+    assert [row["named"] for row in content(found.store)] == [f"case {n}" for n in range(5)]
+    assert summary_of(found.store).counts == {"done": 5}

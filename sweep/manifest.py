@@ -1,0 +1,110 @@
+"""Manifest: what the results in a folder are of, as `study.json` there."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from language.problem import Problems, Source, Span, SpecError
+from sweep.block import Block
+from sweep.measure import Column, columns_of
+from sweep.preparation import FORMAT, digest_of
+from sweep.study import Presentation, Study
+
+MANIFEST = "study.json"
+MOST_BLOCKS = 100
+MOST_IN_BLOCK = 5000
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """What a store is of. `identity` are the digests of all that results depend on, by part."""
+
+    study: str
+    digest: str
+    identity: Mapping[str, str]
+    count: int
+    block: int
+    varied: tuple[Column, ...]
+    words: Mapping[str, Sequence[str]]
+    measures: tuple[Column, ...]
+    presentation: Presentation
+
+    @property
+    def blocks(self) -> list[Block]:
+        """All blocks in their order."""
+        starts = range(0, self.count, self.block)
+        return [Block(start, min(start + self.block, self.count)) for start in starts]
+
+
+def manifest_of(study: Study, block: int | None = None) -> Manifest:
+    """Return the manifest of a prepared study; about 100 blocks unless a size is given."""
+    size = min(MOST_IN_BLOCK, max(1, -(-study.count // MOST_BLOCKS)))
+    return Manifest(
+        study=study.name,
+        digest=digest_of(study.identity),
+        identity=study.identity,
+        count=study.count,
+        block=block or size,
+        varied=tuple(Column(varied.name, "real", varied.unit) for varied in study.varied),
+        words={varied.name: varied.words for varied in study.varied if varied.words},
+        measures=tuple(column for measure in study.measures for column in columns_of(measure)),
+        presentation=study.presentation,
+    )
+
+
+def manifest_json(manifest: Manifest) -> bytes:
+    """Return a manifest as the bytes of its file."""
+    shown = manifest.presentation
+    data = {
+        "modewright": FORMAT,
+        "study": manifest.study,
+        "digest": manifest.digest,
+        "count": manifest.count,
+        "block": manifest.block,
+        "identity": dict(sorted(manifest.identity.items())),
+        "varied": [vars(column) for column in manifest.varied],
+        "words": {name: list(words) for name, words in manifest.words.items()},
+        "measures": [vars(column) for column in manifest.measures],
+        "presentation": {
+            "by": list(shown.by), "confidence": shown.confidence, "plots": dict(shown.plots),
+        },
+    }  # fmt: skip
+    return (json.dumps(data, indent=1) + "\n").encode()
+
+
+def read_manifest(folder: Path) -> Manifest:
+    """Return what the store in a folder is of. Raises SpecError."""
+    path = folder / MANIFEST
+    try:
+        data = json.loads(path.read_text("utf-8"))
+        if data["modewright"] != FORMAT:
+            label = "these results are in a form that is not known here"
+            raise refused(folder, "store", label, "run the study into another folder")
+        shown = data["presentation"]
+        return Manifest(
+            study=data["study"],
+            digest=data["digest"],
+            identity=data["identity"],
+            count=data["count"],
+            block=data["block"],
+            varied=tuple(Column(**column) for column in data["varied"]),
+            words=data["words"],
+            measures=tuple(Column(**column) for column in data["measures"]),
+            presentation=Presentation(tuple(shown["by"]), shown["confidence"], shown["plots"]),
+        )
+    except FileNotFoundError:
+        label = "there are no results of a study here"
+        raise refused(folder, "store", label, "modewright sweep STUDY --out DIR") from None
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        label = f"`{MANIFEST}` cannot be read: {error}"
+        raise refused(folder, "store", label) from None
+
+
+def refused(folder: Path, kind: str, label: str, help: str = "") -> SpecError:
+    """Return a problem of a folder, to be raised."""
+    problems = Problems()
+    problems.error(kind, Span(Source(str(folder)), 1, 1), label, help)
+    return SpecError(problems.found)
