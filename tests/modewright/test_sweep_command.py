@@ -20,7 +20,7 @@ from tests.sweep.laying import STUDIES, quick
 @pytest.fixture(autouse=True)
 def _quick_in_the_project(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(STUDIES)
-    monkeypatch.setattr(studies, "run_variants", quick)
+    monkeypatch.setattr(studies, "run_batch", quick)
 
 
 def run(*arguments: str) -> int:
