@@ -68,8 +68,8 @@ class Rewinding:
 
     @property
     def label(self) -> str:
-        """The ending of its blocks."""
-        return f"{self.source.name}_{self.transition.name}"
+        """The ending of its blocks: names may hold `_`, so its place among those of its mode."""
+        return f"{self.source.name}_{self.source.transitions.index(self.transition)}"
 
     @property
     def read_by_jump(self) -> list[str]:

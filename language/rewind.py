@@ -1,10 +1,10 @@
 """Rewind: a transition that comes late is made where its `until` turned true, then carried on.
 
-`back_<transition>` looks back from now for the latest tick at which `until` is false: the crossing
-lies in the tick after it, on the flow of the source from the states and inputs that were kept then,
-located by halvings. The micro-step is made there; the run of the target carries the states over the
-rest of that tick and over each later one. Where `until` was true as far back as is kept, or is
-false now, nothing is taken back and a fault bit is set.
+`back_<mode>_<place>` looks back from now for the latest tick at which `until` of a transition is
+false: the crossing lies in the tick after it, on the flow of the source from the states and inputs
+that were kept then, located by halvings. The micro-step is made there; the run of the target
+carries the states over the rest of that tick and over each later one. Where `until` was true as far
+back as is kept, or is false now, nothing is taken back and a fault bit is set.
 """
 
 from __future__ import annotations
