@@ -56,7 +56,7 @@ def test_what_was_interrupted_is_kept_and_gone_on_with(
             raise KeyboardInterrupt
         return quick(batch)
 
-    monkeypatch.setattr(studies, "run_variants", interrupted)
+    monkeypatch.setattr(studies, "run_batch", interrupted)
     assert run("grid", "--out", out, "--block", "4") == 130
     assert "20 of 60 variants are kept" in capsys.readouterr().err
     monkeypatch.setattr(studies, "study_pictures", lambda folder: {})
