@@ -50,7 +50,12 @@ class _Build:
 
     def at(self, token: int) -> Span:
         """Return the place of a token."""
-        return self.span.inside(self.starts[token], len(self.texts[token]))
+        return self.inside(self.starts[token], len(self.texts[token]))
+
+    def inside(self, start: int, width: int) -> Span:
+        """Return the place of a part of the text, which has at least one character."""
+        span = self.span
+        return span if span.whole else Span(span.source, span.line, span.column + start, width)
 
     def over(self, first: Any, last: Any) -> Span:
         """Return the place from one part to another."""
@@ -63,7 +68,7 @@ def _path(build: _Build, parts: list[int]) -> Tree:
     first, last = parts[0], parts[-1]
     path = build.texts[first] if first == last else ".".join(build.texts[k] for k in parts)
     start, end = build.starts[first], build.starts[last] + len(build.texts[last])
-    return Name(path, build.span.inside(start, end - start))
+    return Name(path, build.inside(start, end - start))
 
 
 def _call(build: _Build, parts: list[Any]) -> Tree:

@@ -114,10 +114,11 @@ class _Check:
     def _with_wholes(self, mode: Mode) -> Mode:
         """Mark the equations whose value is a whole number, in whatever mode it is given so."""
         marked = {
-            name: dataclasses.replace(formula, whole=isinstance(self.names.get(name), WHOLES))
+            name: dataclasses.replace(formula, whole=True)
             for name, formula in mode.equations.items()
+            if isinstance(self.names.get(name), WHOLES)
         }
-        return dataclasses.replace(mode, equations=marked)
+        return dataclasses.replace(mode, equations={**mode.equations, **marked})
 
     def _scope(self, groups: Iterable[Iterable[str]], place: str) -> Scope:
         known = {name: self.names[name] for group in groups for name in group}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import io
 import logging
 import os
@@ -29,6 +30,8 @@ from modewright.console import configure
 from modewright.exits import EXIT_CODES, exit_code
 from modewright.files import require_writable
 
+YOUNG_OBJECTS = 100_000
+"""New objects after which garbage is looked for: trees of expressions have no circles."""
 COMMANDS = (
     new, check, simulate, sweep, lockstep, replay, plot, compare, graph, generate, explain, demo,
     doctor,
@@ -63,6 +66,7 @@ def options(
 
 def main() -> None:
     """Run the command line and leave with its exit code."""
+    gc.set_threshold(YOUNG_OBJECTS, *gc.get_threshold()[1:])
     logging.raiseExceptions = False  # a log that cannot be written is no reason to stop
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:
