@@ -67,6 +67,10 @@ class Scope:
     owners: Mapping[str, str] = field(default_factory=dict)
 
 
+MOST_HINTS = 200
+"""Problems after which no nearest name is looked for: all names are compared with it."""
+
+
 class DimensionCheck:
     """Infers dimensions bottom up; reports each mistake once and goes on."""
 
@@ -183,7 +187,8 @@ class DimensionCheck:
             return None
         if tree.path in self.scope.names:
             return self.scope.names[tree.path]
-        hint = nearest(tree.path, self.scope.names)
+        few = len(self.problems.found) < MOST_HINTS
+        hint = nearest(tree.path, self.scope.names) if few else ""
         owner = self.scope.owners.get(tree.path, self.scope.mode)
         if owner != self.scope.mode:
             hint = f"mode `{owner}` has an equation of it, mode `{self.scope.mode}` has none"

@@ -78,6 +78,46 @@ def circle(edges: Edges) -> list[str]:
     return []
 
 
+def components(edges: Edges) -> list[list[str]]:
+    """Return the groups of names that lead to each other, each in the order of the keys.
+
+    Tarjan 1972, with a stack of its own.
+    """
+    numbers: dict[str, int] = {}
+    lowest: dict[str, int] = {}
+    waiting: dict[str, None] = {}
+    found: list[list[str]] = []
+    place = {name: position for position, name in enumerate(edges)}
+    for start in edges:
+        stack = [(start, iter(list(edges[start])))] if start not in numbers else []
+        while stack:
+            name, targets = stack[-1]
+            if name not in numbers:
+                numbers[name] = lowest[name] = len(numbers)
+                waiting[name] = None
+            target = next(targets, None)
+            if target is None:
+                stack.pop()
+                if stack:
+                    above = stack[-1][0]
+                    lowest[above] = min(lowest[above], lowest[name])
+                if lowest[name] == numbers[name]:
+                    found.append(_closed(waiting, name, place))
+            elif target not in numbers:
+                stack.append((target, iter(list(edges[target]))))
+            elif target in waiting:
+                lowest[name] = min(lowest[name], numbers[target])
+    return found
+
+
+def _closed(waiting: dict[str, None], first: str, place: Mapping[str, int]) -> list[str]:
+    """Take the names from `first` on off what waits: one group."""
+    group: list[str] = []
+    while not group or group[-1] != first:
+        group.append(waiting.popitem()[0])
+    return sorted(group, key=place.__getitem__)
+
+
 def reachable(edges: Edges, start: str) -> set[str]:
     """Return what can be reached from a name, the name included."""
     found, stack = {start}, [start]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Literal
 
 from language.balance import coefficient_of
 from language.declaration import Formula
@@ -59,32 +58,44 @@ what functions with memory are under their `memory_key`."""
 
 def expression(tree: Tree, known: Names) -> Expr:
     """Return the Program's expression of a tree: same order of operations, nothing simplified."""
+    return _typed(tree, known)[0]
+
+
+def _typed(tree: Tree, known: Names) -> tuple[Expr, bool]:
+    """Return the expression of a tree, and whether its value is a whole number."""
     match tree:
         case Broken():
             raise TypeError(f"{tree.span}: an expression with a problem is not lowered")
         case Number(value, _, _):
-            return real(value)
+            return real(value), False
         case Truth(value, _):
-            return Value(value)
+            return Value(value), False
         case Name(path, _):
-            return known[path]
-        case Negative(operand, _) | Not(operand, _):
-            sign: Literal["-", "not"] = "-" if isinstance(tree, Negative) else "not"
-            return Unary(sign, expression(operand, known))
+            return known[path], is_whole(known[path])
+        case Negative(operand, _):
+            inner, whole = _typed(operand, known)
+            return Unary("-", inner), whole
+        case Not(operand, _):
+            return Unary("not", expression(operand, known)), False
         case Arithmetic("/", left, right, _):
-            return Binary("/", _real(left, known), _real(right, known))
+            return Binary("/", _real(left, known), _real(right, known)), False
         case Arithmetic(operator, left, right, _):
-            return Binary(operator, *_matched(left, right, known))  # type: ignore[arg-type]
+            first, second, whole = _matched(left, right, known)
+            return Binary(operator, first, second), whole  # type: ignore[arg-type]
         case Logic(operator, left, right, _):
-            return Binary(operator, expression(left, known), expression(right, known))  # type: ignore[arg-type]
+            sides = expression(left, known), expression(right, known)
+            return Binary(operator, *sides), False  # type: ignore[arg-type]
         case Relation(operator, left, right, _):
-            return Compare(operator, *_matched(left, right, known))  # type: ignore[arg-type]
+            first, second, _ = _matched(left, right, known)
+            return Compare(operator, first, second), False  # type: ignore[arg-type]
         case Power(base, exponent, _):
-            return _power(_real(base, known), exponent)
+            return _power(_real(base, known), exponent), False
         case Choice(condition, then, other, _):
-            return Select(expression(condition, known), *_matched(then, other, known))
+            first, second, whole = _matched(then, other, known)
+            return Select(expression(condition, known), first, second), whole
         case Application():
-            return _application(tree, known)
+            made = _application(tree, known)
+            return made, is_whole(made)
 
 
 def _application(tree: Application, known: Names) -> Expr:
@@ -140,19 +151,23 @@ def is_whole(expr: Expr) -> bool:
 
 
 def _real(tree: Tree, known: Names) -> Expr:
-    return as_real(expression(tree, known))
+    value, whole = _typed(tree, known)
+    return Call("real", (value,)) if whole else value
 
 
-def _matched(left: Tree, right: Tree, known: Names) -> tuple[Expr, Expr]:
-    """Two operands of one type: a literal like `2` beside a whole number is one, else reals."""
-    first, second = expression(left, known), expression(right, known)
-    if is_whole(first) == is_whole(second):
-        return first, second
-    if is_whole(first) and (number := whole_literal(right)) is not None:
-        return first, Value(number)
-    if is_whole(second) and (number := whole_literal(left)) is not None:
-        return Value(number), second
-    return as_real(first), as_real(second)
+def _matched(left: Tree, right: Tree, known: Names) -> tuple[Expr, Expr, bool]:
+    """Two operands of one type and whether they are whole.
+
+    A literal like `2` beside a whole number is one, else they are reals.
+    """
+    (first, is_first), (second, is_second) = _typed(left, known), _typed(right, known)
+    if is_first == is_second:
+        return first, second, is_first
+    if is_first and (number := whole_literal(right)) is not None:
+        return first, Value(number), True
+    if is_second and (number := whole_literal(left)) is not None:
+        return Value(number), second, True
+    return as_real(first), as_real(second), False
 
 
 def _power(base: Expr, exponent: int) -> Expr:

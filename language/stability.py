@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from language.affine import Affine, matrix_of
 from language.eigen import eigenvalues, governing_entry
 from language.field import Field
+from language.graph import components
 from language.problem import Problems, Span
 from language.terms import strongest
 
@@ -29,6 +30,8 @@ LOOK = 1.0 / 64
 FARTHEST = 8.0
 """|h lambda| beyond which none of these methods is stable."""
 HALVINGS = 50
+MOST_COUPLED = 64
+"""States that act on each other whose eigenvalues are found; of more no limit is told."""
 ROUNDING = 2.0**-40
 """Growth per step that is rounding of an eigenvalue."""
 
@@ -45,17 +48,29 @@ class Limit:
 
 
 def limit_of(field: Field, mode: str, parts: Mapping[str, Affine], method: str) -> Limit | None:
-    """Return the limit of a mode whose rates have these affine parts; None where there is none."""
-    a = matrix_of(parts, field.states)
-    if method not in GROWTH or not a or not all(math.isfinite(x) for row in a for x in row):
+    """Return the limit of a mode whose rates have these affine parts; None where there is none.
+
+    The states that do not act on each other in a circle have eigenvalues of their own.
+    """
+    if method not in GROWTH:
         return None
-    damped = [value for value in eigenvalues(a) if value.real < -UNDAMPED * abs(value)]
-    if not damped:
+    best: tuple[float, complex, str, str] | None = None
+    slopes = {name: parts[f"work.rate_{name}"].slopes for name in field.states}
+    if not all(math.isfinite(x) for row in slopes.values() for x in row.values()):
         return None
-    fastest = min(damped, key=lambda value: largest_step(method, value))
-    row, column = (field.states[k] for k in governing_entry(a, fastest))
+    for group in components(slopes):
+        a = matrix_of(parts, tuple(group)) if len(group) <= MOST_COUPLED else ()
+        damped = [v for v in eigenvalues(a) if v.real < -UNDAMPED * abs(v)] if a else []
+        if damped:
+            value = min(damped, key=lambda value: largest_step(method, value))
+            step = largest_step(method, value)
+            if best is None or step < best[0]:
+                row, column = (group[k] for k in governing_entry(a, value))
+                best = step, value, row, column
+    if best is None:
+        return None
+    step, fastest, row, column = best
     term = strongest(field, field.automaton.modes[mode], row, column, parts)
-    step = largest_step(method, fastest)
     return Limit(mode, step, fastest, term, row)
 
 

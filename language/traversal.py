@@ -86,24 +86,23 @@ def block_writes(block: Block) -> Iterator[str]:
 
 def expr_names(expr: Expr) -> Iterator[str]:
     """Yield the variables and constants that an expression reads, and `call <function>`."""
-    match expr:
-        case Ref(name):
-            yield name
-        case Item(name, index):
-            yield name
-            yield from expr_names(index)
-        case Unary(_, operand):
-            yield from expr_names(operand)
-        case Binary(_, left, right) | Compare(_, left, right):
-            yield from expr_names(left)
-            yield from expr_names(right)
-        case Select(condition, then, other):
-            for part in (condition, then, other):
-                yield from expr_names(part)
-        case Call(function, arguments):
-            yield f"call {function}"
-            for argument in arguments:
-                yield from expr_names(argument)
+    stack = [expr]
+    while stack:
+        match stack.pop():
+            case Ref(name):
+                yield name
+            case Item(name, index):
+                yield name
+                stack.append(index)
+            case Unary(_, operand):
+                stack.append(operand)
+            case Binary(_, left, right) | Compare(_, left, right):
+                stack += (right, left)
+            case Select(condition, then, other):
+                stack += (other, then, condition)
+            case Call(function, arguments):
+                yield f"call {function}"
+                stack += reversed(arguments)
 
 
 def reads(blocks: Iterable[Block]) -> set[str]:
