@@ -52,10 +52,10 @@ def looked_at(
     """Return a candidate at a point, with gains made where its modes were seen."""
     values = values_at(candidate, point, 0)
     gains = gains_of(candidate, series, values, noises)
-    outcome = _run(candidate, series, point, gains)
+    outcome = _run(candidate, series, point, gains, noises)
     if outcome.is_whole:
         gains = gains_of(candidate, series, values, noises, outcome)
-        outcome = _run(candidate, series, point, gains)
+        outcome = _run(candidate, series, point, gains, noises)
     cost = outcome.cost() + point.prior(candidate)
     return Estimate(candidate, point, cost, outcome, gains, noises)
 
@@ -64,7 +64,7 @@ def with_normal(estimate: Estimate, series: Sequence[Series]) -> Estimate:
     """Return an estimate with the normal equations at its point."""
 
     def run(point: Point) -> Outcome:
-        return _run(estimate.candidate, series, point, estimate.gains)
+        return _run(estimate.candidate, series, point, estimate.gains, estimate.noises)
 
     normal = normal_of(estimate.candidate, estimate.point, estimate.outcome, run)
     return dataclasses.replace(estimate, normal=normal)
@@ -110,7 +110,7 @@ def _improved(
     assert now.normal is not None
     while damping < LARGEST_DAMPING:
         point = stepped(now.candidate, now.point, now.normal, damping)
-        outcome = _run(now.candidate, series, point, now.gains)
+        outcome = _run(now.candidate, series, point, now.gains, now.noises)
         cost = outcome.cost() + point.prior(now.candidate)
         if cost < now.cost:
             better = dataclasses.replace(now, point=point, cost=cost, outcome=outcome)
@@ -119,11 +119,13 @@ def _improved(
     return None, damping
 
 
-def _run(candidate: Candidate, series: Sequence[Series], point: Point, gains: Gains) -> Outcome:
+def _run(
+    candidate: Candidate, series: Sequence[Series], point: Point, gains: Gains, noises: Noises
+) -> Outcome:
     values = [values_at(candidate, point, k) for k in range(len(series))]
-    return predicted(candidate, series, values, gains)
+    return predicted(candidate, series, values, gains, noises.limits)
 
 
 def outcome_at(estimate: Estimate, series: Sequence[Series], point: Point) -> Outcome:
     """Return how a model foresees some recordings at a point, with the gains of the estimate."""
-    return _run(estimate.candidate, series, point, estimate.gains)
+    return _run(estimate.candidate, series, point, estimate.gains, estimate.noises)

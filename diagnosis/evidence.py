@@ -86,6 +86,6 @@ def _left_out(model: Estimate, series: Sequence[Series], scale: Reals) -> Reals:
         point = stepped(model.candidate, model.point, model.normal.without(k), 0.0)
         alone = dataclasses.replace(point, own=point.own[k : k + 1])
         outcome = outcome_at(model, [one], alone)
-        squares = np.nansum(outcome.innovations[0] ** 2, axis=0)
+        squares = np.nansum(outcome.squares()[0], axis=0)
         found.append(0.5 * float(np.sum(squares / scale)) if outcome.is_whole else np.inf)
     return np.array(found)

@@ -14,8 +14,8 @@ import numpy as np
 from diagnosis.candidate import Candidate
 from diagnosis.estimation import Estimate, estimated, looked_at
 from diagnosis.gain import linearised
-from diagnosis.point import Point, values_at
-from diagnosis.prediction import SMALL, Noises, points_of
+from diagnosis.point import Point
+from diagnosis.prediction import SMALL, Noises, noises_of, points_of
 from diagnosis.series import Series
 
 REACH = 0.2
@@ -23,6 +23,8 @@ LEVELS = (0.0, 0.3, 1.0, 3.0)
 """Standard deviations that a drift may have, in its unit; the last is the most while naming."""
 FREE_LEVELS = (*LEVELS, 10.0, 30.0, 100.0)
 """Those for locating."""
+FAR = 4.0
+"""Standard deviations beyond which an innovation counts as that far."""
 ENOUGH = 2.0
 """Another level is taken where it gains this much [nats]."""
 
@@ -92,14 +94,19 @@ def settled(
     return now
 
 
-def renamed(values: Mapping[str, float], candidate: Candidate) -> dict[str, float]:
-    """Return those of some values that are parameters of a candidate."""
-    return {name: values[name] for name in candidate.names if name in values}
+def recalibrated(
+    candidate: Candidate, series: Sequence[Series], units: Mapping[str, float]
+) -> Estimate:
+    """Return the base fitted to recordings from where it is declared.
 
-
-def values_of(estimate: Estimate) -> dict[str, float]:
-    """Return the parameters of an estimate; those per recording as in the first one."""
-    return values_at(estimate.candidate, estimate.point, 0)
+    It is fitted twice: how far innovations usually are out, beyond which they count no more, is
+    known after the first time.
+    """
+    noises = noises_of(series, units)
+    first = settled(candidate, series, noises, {}, units, turns=1)
+    limits = FAR * first.outcome.robust()
+    noises = dataclasses.replace(first.noises, limits=limits)
+    return settled(candidate, series, noises, first.point, units)
 
 
 def _place(value: float, unit: float, levels: Sequence[float]) -> int:

@@ -48,7 +48,7 @@ def normal_of(
     a = np.zeros((len(outcome.innovations), count, count))
     g = np.zeros((len(outcome.innovations), count))
     for r, innovation in enumerate(outcome.innovations):
-        known = np.isfinite(innovation)
+        known = np.abs(innovation) <= outcome.limits
         jacobian = np.array([np.where(known, one[r], 0.0) for one in jacobians])
         weighted = (jacobian * scale).reshape(count, -1)
         a[r] = weighted @ jacobian.reshape(count, -1).T

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from codegen.predictor import Prediction
 from diagnosis.candidate import Candidate
 from diagnosis.gain import Linear, first_gains, linearised, steady_gain
-from diagnosis.noise import noise_of
+from diagnosis.noise import MAD, noise_of
 from diagnosis.series import Series
 
 Reals = NDArray[np.float64]
@@ -33,11 +33,16 @@ MODEL_NOISE = 1e-7
 
 @dataclass(frozen=True)
 class Noises:
-    """What is known of noise: of the `seen` signals, of the inputs, and of each drift [SI]."""
+    """What is known of noise: of the `seen` signals, of the inputs, and of each drift [SI].
+
+    Innovations beyond `limits` (seen,) count as these: an event that is foreseen a sample late
+    must not outweigh all others.
+    """
 
     seen: Reals
     inputs: Reals
     drifts: Mapping[str, float]
+    limits: Reals
 
 
 @dataclass(frozen=True)
@@ -50,10 +55,14 @@ class Gains:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Innovations of all recordings behind their burn-in, (samples, seen) each."""
+    """Innovations of all recordings behind their burn-in, (samples, seen) each.
+
+    Those beyond `limits` (seen,) count as these.
+    """
 
     innovations: tuple[Reals, ...]
     predictions: tuple[Prediction, ...] = field(repr=False)
+    limits: Reals = field(repr=False)
     is_whole: bool = True
 
     def cost(self) -> float:
@@ -62,6 +71,14 @@ class Outcome:
             return np.inf
         return float(np.sum(0.5 * self.counts() * np.log(self.variances())))
 
+    def squares(self) -> list[Reals]:
+        """Return the squares that count, (samples, seen) for each recording."""
+        return [np.minimum(e * e, self.limits**2) for e in self.innovations]
+
+    def robust(self) -> Reals:
+        """Return the standard deviation of the innovations by their median (seen,)."""
+        return MAD * np.nanmedian(np.abs(np.concatenate(self.innovations)), axis=0)
+
     def counts(self) -> Reals:
         """Return how many innovations each channel has (seen,)."""
         found: Reals = np.sum([np.sum(np.isfinite(e), axis=0) for e in self.innovations], axis=0)
@@ -69,7 +86,7 @@ class Outcome:
 
     def variances(self) -> Reals:
         """Return the mean square innovation of each channel (seen,)."""
-        squares = np.sum([np.nansum(e * e, axis=0) for e in self.innovations], axis=0)
+        squares = np.sum([np.nansum(one, axis=0) for one in self.squares()], axis=0)
         found: Reals = np.maximum(squares / np.maximum(self.counts(), 1.0), 1e-300)
         return found
 
@@ -79,9 +96,8 @@ def noises_of(series: Sequence[Series], drifts: Mapping[str, float]) -> Noises:
     seen = [[noise_of(column) for column in one.measured.T] for one in series]
     inputs = [[noise_of(column) for column in one.inputs.T] for one in series]
     floor = [float(np.nanmax(np.abs(one.measured))) * 1e-6 + 1e-12 for one in series]
-    return Noises(
-        np.maximum(np.median(seen, axis=0), np.median(floor)), np.median(inputs, axis=0), drifts
-    )
+    known = np.maximum(np.median(seen, axis=0), np.median(floor))
+    return Noises(known, np.median(inputs, axis=0), drifts, np.full(len(known), np.inf))
 
 
 def predicted(
@@ -89,6 +105,7 @@ def predicted(
     series: Sequence[Series],
     values: Sequence[Mapping[str, float]],
     gains: Gains,
+    limits: Reals,
 ) -> Outcome:
     """Return the innovations of recordings, each with values of its own (per recording)."""
     found = []
@@ -108,7 +125,7 @@ def predicted(
     burnt = [max(1, round(BURN_IN / float(one.period))) for one in series]
     innovations = tuple(p.innovations[skip:] for p, skip in zip(found, burnt, strict=True))
     whole = all(p.done == one.count for p, one in zip(found, series, strict=True))
-    return Outcome(innovations, tuple(found), whole)
+    return Outcome(innovations, tuple(found), limits, whole)
 
 
 def gains_of(
