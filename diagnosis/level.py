@@ -62,8 +62,11 @@ def levelled(
     units: Mapping[str, float],
     levels: Sequence[float] = LEVELS,
 ) -> Estimate:
-    """Return an estimate with the drifts that the recordings ask for, its parameters held."""
-    for name in now.candidate.drifts:
+    """Return an estimate with the drifts that the recordings ask for, its parameters held.
+
+    Only drifts that have a unit are moved.
+    """
+    for name in units:
         here = _place(now.noises.drifts.get(name, 0.0), units[name], levels)
         for direction in (1, -1):
             while 0 <= here + direction < len(levels):

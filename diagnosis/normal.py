@@ -48,9 +48,10 @@ def normal_of(
     a = np.zeros((len(outcome.innovations), count, count))
     g = np.zeros((len(outcome.innovations), count))
     for r, innovation in enumerate(outcome.innovations):
-        known = np.abs(innovation) <= outcome.limits
+        known = np.isfinite(innovation)
+        far = np.maximum(np.abs(innovation) / outcome.limits, 1.0)
         jacobian = np.array([np.where(known, one[r], 0.0) for one in jacobians])
-        weighted = (jacobian * scale).reshape(count, -1)
+        weighted = (jacobian * np.where(known, scale / far, 0.0)).reshape(count, -1)
         a[r] = weighted @ jacobian.reshape(count, -1).T
         g[r] = weighted @ np.where(known, innovation, 0.0).reshape(-1)
     return Normal(a, g, is_own(candidate))

@@ -35,8 +35,8 @@ MODEL_NOISE = 1e-7
 class Noises:
     """What is known of noise: of the `seen` signals, of the inputs, and of each drift [SI].
 
-    Innovations beyond `limits` (seen,) count as these: an event that is foreseen a sample late
-    must not outweigh all others.
+    Innovations beyond `limits` (seen,) count in proportion, not as squares: an event that is
+    foreseen a sample late must not outweigh all others.
     """
 
     seen: Reals
@@ -57,7 +57,7 @@ class Gains:
 class Outcome:
     """Innovations of all recordings behind their burn-in, (samples, seen) each.
 
-    Those beyond `limits` (seen,) count as these.
+    Those beyond `limits` (seen,) count in proportion.
     """
 
     innovations: tuple[Reals, ...]
@@ -72,8 +72,12 @@ class Outcome:
         return float(np.sum(0.5 * self.counts() * np.log(self.variances())))
 
     def squares(self) -> list[Reals]:
-        """Return the squares that count, (samples, seen) for each recording."""
-        return [np.minimum(e * e, self.limits**2) for e in self.innovations]
+        """Return the squares that count (Huber 1964), (samples, seen) for each recording."""
+        found = []
+        for e in self.innovations:
+            near = np.minimum(np.abs(e), self.limits)
+            found.append(near * (2.0 * np.abs(e) - near))
+        return found
 
     def robust(self) -> Reals:
         """Return the standard deviation of the innovations by their median (seen,)."""

@@ -1,0 +1,108 @@
+"""Selection: which effects are accepted - one after the other, then each looked at again."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from diagnosis.bench import Bench
+from diagnosis.estimation import Estimate
+from diagnosis.evidence import evidence
+from diagnosis.level import settled
+from diagnosis.search import Tell, Tried, searched
+
+THRESHOLD = 45.0
+"""Nats that an effect must gain both in training and left out; a bootstrap gives a better one."""
+MOST_EFFECTS = 3
+CLOSE = 20.0
+"""Candidates whose totals differ by less [nats] cannot be told apart by these recordings."""
+OTHER = 5.0
+"""Nats by which "none of these" trails the threshold in the probabilities."""
+
+
+@dataclass(frozen=True)
+class Selection:
+    """What was accepted: `model` over `base`, the candidates of the first round, best first.
+
+    `rivals` are those that cannot be told from the first accepted one.
+    """
+
+    base: Estimate = field(repr=False)
+    model: Estimate = field(repr=False)
+    accepted: tuple[Tried, ...]
+    first_round: tuple[Tried, ...]
+    rivals: tuple[Tried, ...]
+
+    def probabilities(self) -> dict[str, float]:
+        """Return the probability of each fitted candidate of the first round, and of `other`."""
+        totals = {t.layer.id: t.evidence.total for t in self.first_round if t.evidence}
+        totals["other"] = 2.0 * THRESHOLD - OTHER
+        most = max(totals.values())
+        weights = {name: float(np.exp(0.5 * (total - most))) for name, total in totals.items()}
+        whole = sum(weights.values())
+        return {name: weight / whole for name, weight in weights.items()}
+
+
+def selected(
+    bench: Bench,
+    base: Estimate,
+    units: Mapping[str, float],
+    threshold: float = THRESHOLD,
+    tell: Tell = lambda text: None,
+) -> Selection:
+    """Return the effects that the training recordings ask for: at most three, none too many."""
+    model = base
+    accepted: list[Tried] = []
+    rounds: list[list[Tried]] = []
+    while len(accepted) < MOST_EFFECTS:
+        tried = searched(bench, model, units, tell)
+        rounds.append(tried)
+        best = next(iter(tried), None)
+        if best is None or best.estimate is None or best.evidence is None:
+            break
+        if best.evidence.least <= threshold:
+            break
+        tell(f"accepted {best.layer.id}: {best.evidence.least:.0f} nats")
+        accepted.append(best)
+        model = best.estimate
+    kept, model = _still_needed(bench, base, model, accepted, units, threshold, tell)
+    first = tuple(rounds[0]) if rounds else ()
+    return Selection(base, model, kept, first, _rivals(first, kept))
+
+
+def _still_needed(
+    bench: Bench,
+    base: Estimate,
+    model: Estimate,
+    accepted: list[Tried],
+    units: Mapping[str, float],
+    threshold: float,
+    tell: Tell,
+) -> tuple[tuple[Tried, ...], Estimate]:
+    """Take out what the effects found after it have made needless."""
+    kept = list(accepted)
+    for tried in accepted[:-1]:
+        rest = [other.layer for other in kept if other is not tried]
+        candidate = bench.possible(rest)
+        if candidate is None:
+            continue
+        without = settled(candidate, bench.series, base.noises, model.values(0), units, turns=1)
+        if evidence(model, without, bench.series).least <= threshold:
+            tell(f"{tried.layer.id} is needless beside the others")
+            kept.remove(tried)
+            model = without
+    return tuple(kept), model
+
+
+def _rivals(first: tuple[Tried, ...], kept: tuple[Tried, ...]) -> tuple[Tried, ...]:
+    if not kept or kept[0].evidence is None:
+        return ()
+    best = kept[0].evidence.total
+    ids = {tried.layer.id for tried in kept}
+    return tuple(
+        tried
+        for tried in first
+        if tried.evidence and tried.layer.id not in ids and tried.evidence.total > best - CLOSE
+    )
