@@ -39,11 +39,12 @@ class Columns:
 
 @dataclass(frozen=True)
 class Prediction:
-    """What a run gave: `innovations` (samples, seen); `states` (samples, states), `modes`
-    (samples,); `done` samples before a value left all bounds.
+    """What a run gave: `innovations` and what the model showed, `seen` (samples, seen); `states`
+    (samples, states), `modes` (samples,); `done` samples before a value left all bounds.
     """
 
     innovations: Reals
+    seen: Reals
     states: Reals
     modes: NDArray[np.int16]
     done: int
@@ -102,6 +103,7 @@ class Predictor:
         """
         samples = len(inputs)
         innovations = np.full((samples, len(self.seen)), np.nan)
+        seen = np.full((samples, len(self.seen)), np.nan)
         states = np.empty((samples, len(self.states)))
         modes = np.zeros(samples, dtype=np.int16)
         done = self._library.modewright_predict(
@@ -115,10 +117,11 @@ class Predictor:
             substeps,
             int(linear),
             _at(innovations),
+            _at(seen),
             _at(states),
             modes.ctypes.data,
         )
-        return Prediction(innovations, states, modes, int(done))
+        return Prediction(innovations, seen, states, modes, int(done))
 
 
 def _at(values: Reals) -> int:
@@ -152,7 +155,7 @@ def _loaded(path: Path) -> Any:
     library.modewright_advance.restype = None
     library.modewright_predict.argtypes = [
         *(pointer, pointer, pointer, pointer, whole, pointer),
-        *(whole, whole, ctypes.c_int, pointer, pointer, pointer),
+        *(whole, whole, ctypes.c_int, pointer, pointer, pointer, pointer),
     ]
     library.modewright_predict.restype = whole
     return library

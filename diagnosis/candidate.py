@@ -102,7 +102,8 @@ def _compiled(
     uncertain = uncertain_of(made, brought)
     started = _with_starts(made, seen)
     starts = [name for name in started.parameters if name not in made.parameters]
-    program, substeps = stepped(started, [*(one.name for one in uncertain), *starts], period)
+    names = [*(one.name for one in uncertain), *starts]
+    program, substeps = stepped(started, names, brought, period)
     columns = columns_of(program, seen)
     ranges = [made.states[name].range for name in columns.states]
     recipe = Recipe(

@@ -41,6 +41,11 @@ class Estimate:
     noises: Noises = field(repr=False)
     normal: Normal | None = field(default=None, repr=False)
 
+    @property
+    def likelihood(self) -> float:
+        """The cost without priors [nats]."""
+        return self.outcome.cost()
+
     def values(self, recording: int) -> dict[str, float]:
         """Return the parameters [SI] of a recording."""
         return values_at(self.candidate, self.point, recording)
@@ -76,14 +81,18 @@ def estimated(
     noises: Noises,
     start: Mapping[str, float] | Point,
     rounds: int = MOST_ROUNDS,
+    own_only: bool = False,
 ) -> Estimate:
-    """Return the point that foresees the recordings best, from `start` [SI]."""
+    """Return the point that foresees the recordings best, from `start` [SI].
+
+    `own_only` leaves what all recordings share where it is.
+    """
     point = start if isinstance(start, Point) else point_of(candidate, len(series), start)
     now = looked_at(candidate, series, noises, point)
     damping = FIRST_DAMPING
     for _ in range(rounds if np.isfinite(now.cost) else 0):
         now = with_normal(now, series)
-        better, damping = _improved(now, series, damping)
+        better, damping = _improved(now, series, damping, own_only)
         if better is None:
             break
         renewed = looked_at(candidate, series, noises, better.point)
@@ -104,12 +113,12 @@ def would_reach(estimate: Estimate, series: Sequence[Series]) -> float:
 
 
 def _improved(
-    now: Estimate, series: Sequence[Series], damping: float
+    now: Estimate, series: Sequence[Series], damping: float, own_only: bool
 ) -> tuple[Estimate | None, float]:
     """Return a better point and the damping that led there; None where there is none."""
     assert now.normal is not None
     while damping < LARGEST_DAMPING:
-        point = stepped(now.candidate, now.point, now.normal, damping)
+        point = stepped(now.candidate, now.point, now.normal, damping, own_only)
         outcome = _run(now.candidate, series, point, now.gains, now.noises)
         cost = outcome.cost() + point.prior(now.candidate)
         if cost < now.cost:

@@ -30,6 +30,10 @@ LONGEST_STEP = Fraction(5, 1000)
 """Longest major step [s] of a prediction; events inside it are located."""
 STABLE_PART = Fraction(1, 2)
 """A step is at most this part of the largest stable one: parameters move while they are fitted."""
+FAR = Fraction(4)
+"""How far an effect's parameter may move while it is fitted, as a factor."""
+MOST_STEPS = 40
+"""Most major steps between two samples."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +70,7 @@ def shipped_effects() -> tuple[Effect, ...]:
 def drift(kind: str, place: str) -> Layer:
     """Return the drift of a balance, an element or an output."""
     path = Path(str(resources.files("diagnosis"))) / "drifts" / f"drift_of_{kind}.yaml"
-    return Layer(read_effect(read_document(path), Problems()), place, f"at_{place}")
+    return Layer(read_effect(read_document(path), Problems()), place, f"{kind}_{place}")
 
 
 def fitting(document: Document, effect: Effect) -> tuple[Layer, ...]:
@@ -95,23 +99,45 @@ def automaton(document: Document, project: Project, layers: Sequence[Layer]) -> 
     return automaton_of(laid(document, layers), project)
 
 
-def stepped(given: Automaton, names: Sequence[str], period: Fraction) -> tuple[Program, int]:
-    """Return the Program in which some parameters are tunable, and its steps in a period [s].
+def stepped(
+    given: Automaton, names: Sequence[str], brought: Sequence[str], period: Fraction
+) -> tuple[Program, int]:
+    """Return the Program in which `names` are tunable, and its steps in a period [s].
 
     The step is a whole part of the period, at least two: inputs may run straight between samples.
+    It is stable for parameters that effects `brought` at a quarter and at four times their value.
     """
+    longest = min(
+        _stable(_scaled(given, brought, factor), LONGEST_STEP)
+        for factor in (Fraction(1), FAR, 1 / FAR)
+    )
+    substeps = min(max(2, -(-period // longest)), MOST_STEPS)
     parameters = {
         name: dataclasses.replace(parameter, kind="tunable") if name in names else parameter
         for name, parameter in given.parameters.items()
     }
-    tuned = dataclasses.replace(given, parameters=parameters)
+    tuned = dataclasses.replace(given, parameters=parameters, step=period / substeps)
+    return program_of(tuned), int(substeps)
+
+
+def _stable(given: Automaton, longest: Fraction) -> Fraction:
     motion = program_of(given).motion
-    longest = LONGEST_STEP
     for limit in motion.limits if motion else ():
         stable = Fraction(limit.step).limit_denominator(10**9) if limit.step < 1.0 else Fraction(1)
         longest = min(longest, STABLE_PART * stable)
-    substeps = max(2, -(-period // longest))
-    return program_of(dataclasses.replace(tuned, step=period / substeps)), int(substeps)
+    return max(longest, Fraction(1, 10**6))
+
+
+def _scaled(given: Automaton, names: Sequence[str], factor: Fraction) -> Automaton:
+    """Return an automaton with some parameters scaled, within their ranges."""
+    parameters = dict(given.parameters)
+    for name in names:
+        parameter = parameters.get(name)
+        if parameter and parameter.range and parameter.value and parameter.type == "real":
+            low, high = parameter.range
+            value = min(max(parameter.value * factor, low), high)
+            parameters[name] = dataclasses.replace(parameter, value=value)
+    return dataclasses.replace(given, parameters=parameters)
 
 
 def _places(document: Document) -> list[str]:

@@ -130,17 +130,17 @@ def along(bench: Bench, free: Estimate, drifts: Sequence[Reals]) -> tuple[tuple[
             if state.range and name in states:
                 x = rows[:, states.index(name)]
                 scale = float(np.std(x)) or 1.0
-                columns.setdefault(f"the sign of {name}", []).append(np.tanh(10.0 * x / scale))
+                sign: Reals = np.tanh(10.0 * x / scale)
+                columns.setdefault(f"the sign of {name}", []).append(sign)
                 columns.setdefault(f"the square of {name}", []).append(x * np.abs(x))
                 columns.setdefault(name, []).append(x)
         for k, name in enumerate(bench.automaton.inputs):
             u = one.inputs[: prediction.done, k]
             columns.setdefault(name, []).append(u)
             columns.setdefault(f"the amount of {name}", []).append(np.abs(u))
-            columns.setdefault(f"the rate of {name}", []).append(
-                np.asarray(np.gradient(u, period), dtype=np.float64)
-            )
-        columns.setdefault("time", []).append(np.arange(prediction.done) * period)
+            rate: Reals = np.asarray(np.gradient(u), dtype=np.float64) / period
+            columns.setdefault(f"the rate of {name}", []).append(rate)
+        columns.setdefault("time", []).append(np.arange(prediction.done, dtype=np.float64) * period)
     target = np.concatenate(drifts)
     found = []
     for name, parts in columns.items():

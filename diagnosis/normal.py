@@ -57,14 +57,20 @@ def normal_of(
     return Normal(a, g, is_own(candidate))
 
 
-def stepped(candidate: Candidate, point: Point, normal: Normal, damping: float) -> Point:
+def stepped(
+    candidate: Candidate,
+    point: Point,
+    normal: Normal,
+    damping: float,
+    own_only: bool = False,
+) -> Point:
     """Return the point one damped step further, within the ranges.
 
     A coordinate at its bound that the step would lead out of its range is held (active set).
     `normal` may lack recordings: their own coordinates stay.
     """
     bounds = bounds_of(candidate)
-    held = np.zeros(len(point.shared), dtype=bool)
+    held = np.full(len(point.shared), own_only)
     step = _solved(point, normal, damping, held)
     for _ in held:
         trial = point.shared + step.shared

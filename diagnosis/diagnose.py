@@ -1,0 +1,223 @@
+"""Diagnose: recordings against a model - recalibrate, locate, name, model, show.
+
+Selection knows the training recordings alone. What is held out is opened after that is final; it
+can confirm the verdict or not, and change nothing else.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from diagnosis.bench import Bench, balance_drifts
+from diagnosis.estimation import Estimate
+from diagnosis.evidence import inflation
+from diagnosis.layers import shipped_effects
+from diagnosis.level import recalibrated, units_of
+from diagnosis.location import Locus, located
+from diagnosis.naming import named, place_path, quantities_of, verdict_id
+from diagnosis.prediction import noises_of
+from diagnosis.search import Tell, Tried
+from diagnosis.selection import THRESHOLD, Selection, selected
+from diagnosis.series import Series, series_of
+from diagnosis.simulation import for_recordings, misfits
+from diagnosis.verdict import Misfit, Named, Ranked, Says, Verdict
+from engine.recording import read_recording
+from language.document import Document
+from language.effect import Effect
+from language.experiment import RecordingMap
+from language.load import automaton_of
+from language.model import Automaton
+from language.project import Project
+
+NOT_CANDIDATES = ("unknown_input", "sensor_quantisation")
+"""Effects that could explain anything, or that add noise: described, never named."""
+CLEAR = 3.0
+"""A rival within this of the best [nats] makes the verdict ambiguous."""
+UNKNOWN = 4.0
+"""Times the threshold that a free drift must gain where no effect was accepted."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """What is diagnosed: an expanded automaton, a map, and recordings."""
+
+    document: Document
+    project: Project
+    mapping: RecordingMap
+    train: tuple[Path, ...]
+    held_out: tuple[Path, ...] = ()
+    effects: tuple[Effect, ...] | None = None
+    threshold: float = THRESHOLD
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """A verdict with the models behind it; `bench` holds the training recordings."""
+
+    verdict: Verdict
+    selection: Selection = field(repr=False)
+    bench: Bench = field(repr=False)
+    held_out: tuple[Series, ...] = field(repr=False)
+
+
+def diagnose(case: Case, tell: Tell = lambda text: None) -> Diagnosis:
+    """Return the diagnosis of a case. Raises SpecError, ValueError, ToolMissing."""
+    begun = time.monotonic()
+    automaton = automaton_of(case.document, case.project)
+    seen = compared(case.mapping, automaton)
+    if not seen:
+        raise ValueError(f"map `{case.mapping.name}` compares no output of `{automaton.name}`")
+    series = [_series(path, case, automaton, seen) for path in case.train]
+    bench, base = _recalibrated(case, automaton, series, seen, tell)
+    units = units_of(base.candidate, bench.series, base.noises, base.values(0))
+    loci = located(bench, base)
+    tell(sentence(loci, automaton))
+    selection = selected(bench, base, units, case.threshold, tell)
+    says = _says(selection, loci, bench, case.threshold)
+    fit = {"train": misfits(base, selection.model, bench.series)}
+    verdict = _verdict(says, selection, loci, automaton, fit)
+    hashes = {path.name: _digest(path) for path in case.train}
+    verdict = dataclasses.replace(verdict, inputs=hashes, messages=(sentence(loci, automaton),))
+    held = tuple(
+        dataclasses.replace(
+            _series(path, case, automaton, seen), is_linear=bench.series[0].is_linear
+        )
+        for path in case.held_out
+    )
+    if held:
+        tell("held out: " + ", ".join(f"{path.name} {_digest(path)}" for path in case.held_out))
+        verdict = _confirmed(verdict, selection, held)
+    verdict = dataclasses.replace(verdict, runtime_s=time.monotonic() - begun)
+    return Diagnosis(verdict, selection, bench, held)
+
+
+def compared(mapping: RecordingMap, automaton: Automaton) -> tuple[str, ...]:
+    """Return the outputs that a map compares, in the order of the automaton."""
+    wanted = {column.compare for column in mapping.columns.values() if column.compare}
+    return tuple(name for name in automaton.outputs if name in wanted)
+
+
+def sentence(loci: Sequence[Locus], automaton: Automaton) -> str:
+    """Return where something is missing, in one sentence."""
+    best = loci[0] if loci else None
+    if best is None or best.gain <= 0.0:
+        return "nothing asks for a torque or force that the model lacks"
+    unit = {"flow": "in its balance", "elements": "through it", "outputs": "in its signal"}
+    mode = max(best.modes, key=lambda name: best.modes[name]) if best.modes else ""
+    along = best.along[0] if best.along else ("", 0.0)
+    return (
+        f"missing at {best.path}: {best.rms:.3g} (SI, rms) {unit[best.section]}, "
+        f"{100 * best.modes.get(mode, 0.0):.0f} % of it in mode {mode}, "
+        f"along with {along[0]} (r = {along[1]:.2f}); {best.gain:.0f} nats"
+    )
+
+
+def _series(path: Path, case: Case, automaton: Automaton, seen: Sequence[str]) -> Series:
+    used = [
+        column.name
+        for column in case.mapping.columns.values()
+        if column.to in automaton.inputs or column.compare in seen
+    ]
+    recording = read_recording(path, case.mapping, used)
+    constants = {name: float(value) for name, (value, _) in case.mapping.constants.items()}
+    declared = {
+        name: float(thing.default)
+        for name, thing in automaton.inputs.items()
+        if thing.default is not None
+    }
+    return series_of(recording, list(automaton.inputs), seen, {**declared, **constants})
+
+
+def _recalibrated(
+    case: Case, automaton: Automaton, series: Sequence[Series], seen: tuple[str, ...], tell: Tell
+) -> tuple[Bench, Estimate]:
+    """Fit the base with inputs held, and straight between samples: the better one stays."""
+    effects = case.effects if case.effects is not None else shipped_effects()
+    effects = tuple(effect for effect in effects if effect.name not in NOT_CANDIDATES)
+    drifts = balance_drifts(case.document, automaton)
+    found = []
+    for is_linear in (False, True):
+        own = tuple(dataclasses.replace(one, is_linear=is_linear) for one in series)
+        bench = Bench(case.document, case.project, automaton, effects, own, seen, drifts)
+        candidate = bench.candidate(())
+        units = units_of(candidate, own, noises_of(own, {}), {})
+        found.append((bench, recalibrated(candidate, own, units)))
+    bench, base = min(found, key=lambda pair: pair[1].likelihood)
+    held = "straight between samples" if bench.series[0].is_linear else "held"
+    tell(f"recalibrated, inputs {held}: {base.cost:.0f} nats")
+    return bench, base
+
+
+def _says(selection: Selection, loci: Sequence[Locus], bench: Bench, threshold: float) -> Says:
+    if not selection.accepted:
+        shrink = 1.0 / inflation(selection.base, bench.series)
+        unexplained = max((locus.gain for locus in loci), default=0.0) * shrink
+        return "unknown" if unexplained > UNKNOWN * threshold else "nothing_missing"
+    best = selection.accepted[0].evidence
+    rivals = [tried.evidence for tried in selection.rivals if tried.evidence]
+    if best and any(rival.total > best.total - CLEAR for rival in rivals):
+        return "ambiguous"
+    return "effect"
+
+
+def _verdict(
+    says: Says,
+    selection: Selection,
+    loci: Sequence[Locus],
+    automaton: Automaton,
+    fit: dict[str, dict[str, Misfit]],
+) -> Verdict:
+    probabilities = selection.probabilities()
+    ranked = tuple(
+        Ranked(
+            verdict_id(tried.layer, automaton),
+            place_path(tried.layer),
+            probabilities[tried.layer.id],
+            tried.evidence.train,
+            float(np.std(tried.evidence.each) * np.sqrt(len(tried.evidence.each))),
+        )
+        for tried in selection.first_round
+        if tried.evidence
+    )
+    effects = tuple(named(tried.layer, selection.model, automaton) for tried in selection.accepted)
+    rivals = tuple(_named_alone(tried, automaton) for tried in selection.rivals)
+    before, after = quantities_of(selection.base), quantities_of(selection.model)
+    base = {name: (before[name], after.get(name, before[name])) for name in before}
+    return Verdict(
+        says,
+        effects if says == "effect" else (),
+        ranked,
+        probabilities["other"],
+        rivals if says == "effect" else (*effects, *rivals),
+        tuple(loci),
+        fit,
+        base,
+        None,
+        0.0,
+    )
+
+
+def _named_alone(tried: Tried, automaton: Automaton) -> Named:
+    assert tried.estimate is not None
+    return named(tried.layer, tried.estimate, automaton)
+
+
+def _confirmed(verdict: Verdict, selection: Selection, held: tuple[Series, ...]) -> Verdict:
+    """Return the verdict with what the held out recordings say of it."""
+    base = for_recordings(selection.base, held)
+    model = for_recordings(selection.model, held)
+    fit = {**verdict.fit, "held_out": misfits(base, model, held)}
+    gain = base.likelihood - model.likelihood
+    confirmed = bool(gain > 0.0) if selection.accepted else None
+    return dataclasses.replace(verdict, fit=fit, confirmed=confirmed)
+
+
+def _digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()[:16]
