@@ -9,11 +9,13 @@ import ctypes
 import subprocess
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from codegen.build import FLAGS, SECONDS, BuildError, compiler, compiler_version
-from codegen.cache import key_of, stored
+from codegen.cache import cache_folder, key_of, stored
 from codegen.run_source import column_places, row_width, run_files
 from language.assembly import Assembly
 
@@ -148,6 +150,16 @@ class Library:
         return struct, [*kept, flows, early, plan]
 
 
+@dataclass(frozen=True)
+class _Wanted:
+    """What a library is of: those of one process are loaded once."""
+
+    digest: str
+    command: tuple[str, ...]
+    folder: Path
+    assembly: Assembly = field(compare=False)
+
+
 def library_of(
     assembly: Assembly, flags: Sequence[str] = FLAGS, named: str | None = None
 ) -> Library:
@@ -155,6 +167,13 @@ def library_of(
 
     Raises ToolMissing, BuildError.
     """
+    parts = (*compiler(named), *flags)
+    return _loaded(_Wanted(assembly.digest(), parts, cache_folder(), assembly), tuple(flags), named)
+
+
+@lru_cache(maxsize=64)
+def _loaded(wanted: _Wanted, flags: tuple[str, ...], named: str | None) -> Library:
+    assembly = wanted.assembly
     with tempfile.TemporaryDirectory(prefix="modewright-") as name:
         folder = Path(name)
         for file, text in run_files(assembly).items():

@@ -61,6 +61,10 @@ def adjusted(batch: Batch) -> Adjustment:
     """
     require_known(batch)
     scenario = _without_initial(resolved(batch.system, batch.scenario), batch)
+    at_once = _all_tunable(batch, scenario)
+    if at_once:
+        return at_once
+    arrays = {**batch.parameters, **batch.initial}
     rebuilt: dict[str, str] = {}
     system, tuned = batch.system, {}
     for name in dict.fromkeys([*batch.parameters, *batch.initial]):
@@ -69,8 +73,28 @@ def adjusted(batch: Batch) -> Adjustment:
             rebuilt[name] = reason
         else:
             tuned[name] = _tunable_of(name, batch)
-            system = _tuned(system, name, batch)
+            system = _tuned(system, name, batch, float(arrays[name][0]))
     return Adjustment(system, scenario, programs_of(system, scenario), tuned, rebuilt)
+
+
+def _all_tunable(batch: Batch, scenario: Scenario) -> Adjustment | None:
+    """Return the Programs in which all names are tunable, where nothing but values differs."""
+    names = list(dict.fromkeys([*batch.parameters, *batch.initial]))
+    systems, made = [], []
+    try:
+        for end in (np.min, np.max):
+            system = batch.system
+            for name in names:
+                values = batch.parameters.get(name)
+                value = 0.0 if values is None else float(end(values))
+                system = _tuned(system, name, batch, value)
+            systems.append(system)
+            made.append(programs_of(system, scenario))
+    except SpecError:
+        return None
+    low, high = ({n: digest(_without_values(p)) for n, p in part.items()} for part in made)
+    tuned = {name: _tunable_of(name, batch) for name in names}
+    return Adjustment(systems[0], scenario, made[0], tuned, {}) if low == high else None
 
 
 def groups(batch: Batch) -> list[Group]:
@@ -135,12 +159,12 @@ def _tunable_of(name: str, batch: Batch) -> tuple[str, str]:
     return owner, START.format(short) if name in batch.initial else short
 
 
-def _tuned(system: System, name: str, batch: Batch) -> System:
+def _tuned(system: System, name: str, batch: Batch, first: float) -> System:
+    """Return a system in which a name is tunable; a parameter has the value `first` until then."""
     owner, _, short = name.partition(".")
     automaton = system.instances[owner].automaton
     parameters, states = dict(automaton.parameters), dict(automaton.states)
     if name not in batch.initial:
-        first = float(batch.parameters[name][0])
         return _as_tunable(_valued(system, name, first), owner, short)
     state, fresh = states[short], START.format(short)
     key, span = f"parameters.{fresh}", state.span

@@ -5,9 +5,11 @@ What is known before a run is not in it: instants, inputs, noise (engine/plan.py
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
+from language.printing import digest
 from language.program import Constant, Program, Variable, short
 from language.signal import Sensor
 
@@ -68,6 +70,13 @@ class Assembly:
         ticks = [name for name in self.order if name in self.programs and name not in self.flows]
         late = [f"capture {name}" for name, sensor in self.sensors.items() if sensor.delay]
         return (*ticks, *self.sensors, *late)
+
+    def digest(self) -> str:
+        """Return a digest of all that is printed of it."""
+        programs = [(name, digest(program)) for name, program in self.programs.items()]
+        rest = (self.order, self.inputs, self.feeds, self.slots, self.columns)
+        more = (sorted(self.controlled), list(self.sensors.items()), digest(self.wires))
+        return hashlib.sha256(repr((programs, rest, more)).encode()).hexdigest()
 
     def tunables(self) -> Iterator[tuple[str, Constant]]:
         """Yield the numbers that a variant may change, in the order of its values."""
