@@ -64,6 +64,8 @@ def disagreements(
         if sum(_has(findings, finding) for findings in own.values()) > MOST * len(clear)
     ]
     rest = [f for findings in own.values() for f in findings if not _has(shared, f)]
+    if any(finding.kind != "clock_offset" for finding in shared):
+        rest = [finding for finding in rest if finding.kind != "clock_offset"]
     return [*shared, *rest]
 
 

@@ -23,6 +23,7 @@ from modewright.commands.graph import graph
 from modewright.commands.lockstep import lockstep
 from modewright.commands.new import new
 from modewright.commands.plot import plot
+from modewright.commands.recording import recording
 from modewright.commands.replay import replay
 from modewright.commands.simulate import simulate
 from modewright.commands.sweep import sweep
@@ -46,6 +47,7 @@ app = typer.Typer(
 )
 for command in COMMANDS:
     app.command(epilog=EXIT_CODES)(command)
+app.add_typer(recording, name="recording")
 
 
 @app.callback(epilog=EXIT_CODES)

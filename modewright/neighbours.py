@@ -6,7 +6,7 @@ import os
 import sys
 from importlib.util import module_from_spec, spec_from_file_location
 
-NEIGHBOURS = ("language", "engine", "codegen", "lockstep", "sweep", "spec")
+NEIGHBOURS = ("language", "engine", "codegen", "lockstep", "sweep", "diagnosis", "spec")
 
 
 def claim_neighbours() -> None:

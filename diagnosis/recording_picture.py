@@ -1,0 +1,245 @@
+"""Recording picture: the channels, where the machine has been, and what the data can test."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.gridspec import SubplotSpec
+from numpy.typing import NDArray
+from scipy.signal import welch
+
+from diagnosis.channel_check import ChannelCheck
+from diagnosis.excitation import Excitation, SignalExcitation
+from diagnosis.recording_check import RecordingCheck
+from engine.band import PALETTE
+from engine.plot import Picture
+from engine.recording import Channel, Recording
+from language.text import visible
+
+Values = NDArray[np.float64]
+
+MOST_CHANNELS = 6
+"""Most channels drawn: the picture stays on one page."""
+MOST_POINTS = 4000
+"""Most points of a curve; beyond, the smallest and largest of each stretch are drawn."""
+MOST_FINDINGS = 5
+BLUE, RED, GREEN, YELLOW, _, PURPLE, GREY = PALETTE
+PALE = "#d8d8d8"
+SIGNS = {"error": "\N{BLACK CIRCLE}", "warning": "\N{BLACK UP-POINTING TRIANGLE}", "note": "-"}
+COLOURS = {"error": RED, "warning": "#b58900", "note": GREY}
+
+
+def recording_picture(
+    recordings: Sequence[Recording], check: RecordingCheck, title: str
+) -> Picture:
+    """Return the picture of checked recordings, one after another on the left."""
+    names = list(dict.fromkeys(one.name for one in check.channels))[:MOST_CHANNELS]
+    told = check.findings[:MOST_FINDINGS]
+    height = 1.6 + 1.25 * max(len(names), 5) + 0.24 * max(1, len(told))
+    figure = Figure(figsize=(13.5, height), layout="constrained")
+    figure.suptitle(visible(title), x=0.01, ha="left", fontsize=13, fontweight="bold")
+    grid = figure.add_gridspec(
+        2, 2, width_ratios=(1.9, 1.0), height_ratios=(height, 0.24 * max(1, len(told)) + 0.1)
+    )
+    _channels(figure, grid[0, 0], recordings, check, names)
+    right = grid[0, 1].subgridspec(3, 1, height_ratios=(1.15, 0.9, 1.45))
+    _visited(figure.add_subplot(right[0]), recordings, check.excitation)
+    _spectrum(figure.add_subplot(right[1]), recordings, check)
+    _effects(figure.add_subplot(right[2]), check.excitation)
+    _findings(figure.add_subplot(grid[1, :]), check)
+    return Picture(figure)
+
+
+def _channels(
+    figure: Figure,
+    place: SubplotSpec,
+    recordings: Sequence[Recording],
+    check: RecordingCheck,
+    names: Sequence[str],
+) -> None:
+    rows = place.subgridspec(len(names), 1)
+    axes: list[Axes] = []
+    for row, name in enumerate(names):
+        axis = figure.add_subplot(rows[row], sharex=axes[0] if axes else None)
+        axes.append(axis)
+        shift = 0.0
+        for recording in recordings:
+            channel = recording.channels.get(name)
+            start = float(recording.start)
+            if channel is not None:
+                _trace(axis, channel, shift - start, check)
+                for one in check.channels:
+                    if (one.recording, one.name) == (recording.name, name):
+                        _marks(axis, one, shift - start)
+            for first, last in recording.windows:
+                axis.axvspan(
+                    float(first) + shift - start, float(last) + shift - start,
+                    color=GREEN, alpha=0.07, lw=0,
+                )  # fmt: skip
+            if row == 0 and len(recordings) > 1:
+                _name(axis, recording.name, shift)
+            shift += float(recording.end - recording.start)
+            axis.axvline(shift, color=GREY, lw=0.8, ls=":")
+        one = next(one for one in check.channels if one.name == name)
+        axis.set_title(_facts(one), loc="left", fontsize=8.5, parse_math=False, pad=3)
+        axis.tick_params(labelsize=7.5, labelbottom=row == len(names) - 1)
+        axis.spines[["top", "right"]].set_visible(False)
+        axis.margins(x=0.0)
+    axes[-1].set_xlabel(
+        "time [s]" if len(recordings) == 1 else "recordings in a row, time [s]", fontsize=8
+    )
+
+
+def _name(axis: Axes, name: str, start: float) -> None:
+    across = axis.get_xaxis_transform()
+    text = visible(f" {name}")
+    axis.text(start, 1.0, text, fontsize=7.5, color=GREY, va="top", transform=across,
+              parse_math=False)  # fmt: skip
+
+
+def _facts(one: ChannelCheck) -> str:
+    parts = [
+        f"{one.name}" + (f" \N{RIGHTWARDS ARROW} {one.signal}" if one.signal != one.name else "")
+    ]
+    parts[0] += f"  [{one.unit}]"
+    parts.append(f"{one.rate:.4g} Hz")
+    if one.quantum:
+        parts.append(f"step {one.quantum / one.factor:.3g}")
+    parts.append(f"noise {one.noise / one.factor:.2g}")
+    if one.dropped >= 0.001:
+        parts.append(f"{one.dropped:.1%} missing")
+    return visible("   ".join(parts))
+
+
+def _trace(axis: Axes, channel: Channel, shift: float, check: RecordingCheck) -> None:
+    times, values = _thinned(channel.seconds + shift, channel.array)
+    factor = float(channel.column.unit.factor * channel.column.scale[0])
+    colour = "#cc7a00" if channel.column.to is not None else BLUE
+    axis.plot(times, values / factor, color=colour, lw=0.8)
+
+
+def _marks(axis: Axes, one: ChannelCheck, shift: float) -> None:
+    for start, end in one.gaps:
+        axis.axvspan(start + shift, end + shift, color=RED, alpha=0.25, lw=0)
+    if one.stuck:
+        axis.axvspan(one.stuck[0] + shift, one.stuck[1] + shift, color=YELLOW, alpha=0.35, lw=0)
+
+
+def _thinned(times: Values, values: Values) -> tuple[Values, Values]:
+    """Return the curve, or the ends of each stretch of one that has too many points."""
+    if len(values) <= MOST_POINTS:
+        return times, values
+    size = -(-len(values) // (MOST_POINTS // 2))
+    kept = len(values) // size * size
+    blocks = values[:kept].reshape(-1, size)
+    ends = np.stack((blocks.min(axis=1), blocks.max(axis=1)), axis=1).ravel()
+    starts = times[:kept].reshape(-1, size)[:, 0]
+    return np.repeat(starts, 2), ends
+
+
+def _main(signals: Sequence[SignalExcitation]) -> SignalExcitation | None:
+    """Return the signal that does most: most steps, then the largest band."""
+    return max(signals, key=lambda one: (len(one.steps), one.band), default=None)
+
+
+def _visited(axis: Axes, recordings: Sequence[Recording], excited: Excitation) -> None:
+    """Draw input over speed: where the machine has been."""
+    axis.set_title("where the machine has been", loc="left", fontsize=9.5)
+    first, second = _main(excited.inputs), _main(excited.speeds)
+    pairs = [
+        (r.channels[first.name], r.channels[second.name])
+        for r in recordings
+        if first and second and first.name in r.channels and second.name in r.channels
+    ]
+    if not pairs or first is second:
+        _empty(axis, "no input beside a speed")
+        return
+    for driven, speed in pairs:
+        x = np.interp(driven.seconds, speed.seconds, speed.array) / _factor(speed)
+        y = driven.array / _factor(driven)
+        axis.plot(x, y, color=BLUE, lw=0.3, alpha=0.5)
+        axis.scatter(x[::3], y[::3], s=5, color=BLUE, alpha=0.35, lw=0)
+        axis.set_xlabel(visible(_label(speed)), fontsize=8, parse_math=False)
+        axis.set_ylabel(visible(_label(driven)), fontsize=8, parse_math=False)
+    axis.axhline(0.0, color="black", lw=0.6)
+    axis.axvline(0.0, color="black", lw=0.6)
+    axis.tick_params(labelsize=7.5)
+    axis.spines[["top", "right"]].set_visible(False)
+
+
+def _spectrum(axis: Axes, recordings: Sequence[Recording], check: RecordingCheck) -> None:
+    """Draw what frequencies the input holds, above its noise."""
+    axis.set_title("what the input excites", loc="left", fontsize=9.5)
+    main = _main(check.excitation.inputs)
+    facts = [one for one in check.channels if main and one.name == main.name]
+    if not main or not facts:
+        _empty(axis, "no input")
+        return
+    for recording, one in zip(recordings, facts, strict=False):
+        channel = recording.channels[main.name]
+        if len(channel.array) < 64:
+            continue
+        values = (channel.array - channel.array.mean()) / _factor(channel)
+        frequencies, power = welch(values, one.rate, nperseg=min(len(values), 1024))
+        axis.loglog(frequencies[1:], np.sqrt(power[1:]) + 1e-12, color="#cc7a00", lw=0.9, alpha=0.8)
+    noise = max(facts[0].noise, facts[0].quantum / np.sqrt(12.0)) / facts[0].factor
+    if noise:
+        level = noise * np.sqrt(2.0 / facts[0].rate)
+        axis.axhline(level, color=GREY, lw=1.0, ls="--")
+        axis.annotate("its noise", (0.01, level), xycoords=("axes fraction", "data"), fontsize=7.5,
+                      ha="left", va="bottom", color=GREY)  # fmt: skip
+    axis.set_xlabel("frequency [Hz]", fontsize=8)
+    axis.set_ylabel(visible(f"{main.name} [{main.unit}/\N{SQUARE ROOT}Hz]"), fontsize=8,
+                    parse_math=False)  # fmt: skip
+    axis.tick_params(labelsize=7.5, which="both")
+    axis.spines[["top", "right"]].set_visible(False)
+
+
+def _effects(axis: Axes, excited: Excitation) -> None:
+    """List the effects: those that the data can test in green, the others pale."""
+    able = sum(effect.is_testable for effect in excited.effects)
+    axis.set_title(
+        f"these data can test {able} of {len(excited.effects)} effects", loc="left", fontsize=9.5
+    )
+    axis.axis("off")
+    rows = -(-len(excited.effects) // 2)
+    ordered = sorted(excited.effects, key=lambda effect: (not effect.is_testable, effect.effect))
+    for k, effect in enumerate(ordered):
+        x, y = 0.52 * (k // rows), 1.0 - (k % rows + 0.5) / rows
+        good = effect.is_testable
+        axis.plot([x + 0.012], [y], "o" if good else "x", ms=4.2, transform=axis.transAxes,
+                  color=GREEN if good else PALE, clip_on=False)  # fmt: skip
+        axis.text(x + 0.04, y, effect.effect, fontsize=7.6, va="center",
+                  color="black" if good else "#9a9a9a", transform=axis.transAxes)  # fmt: skip
+
+
+def _findings(axis: Axes, check: RecordingCheck) -> None:
+    axis.axis("off")
+    told = check.findings[:MOST_FINDINGS]
+    if not told:
+        axis.text(0.0, 0.5, "nothing odd was found in these data", color=GREEN, fontsize=10,
+                  va="center", transform=axis.transAxes)  # fmt: skip
+    for k, finding in enumerate(told):
+        where = " ".join(part for part in (finding.recording, finding.channel) if part)
+        rest = len(check.findings) - len(told)
+        more = f"   (and {rest} more)" if rest and k == len(told) - 1 else ""
+        text = f"{SIGNS[finding.severity]} {where}: {finding.text}{more}"
+        axis.text(0.0, 1.0 - (k + 0.5) / len(told), visible(text), fontsize=9, va="center",
+                  color=COLOURS[finding.severity], transform=axis.transAxes,
+                  parse_math=False)  # fmt: skip
+
+
+def _empty(axis: Axes, text: str) -> None:
+    axis.axis("off")
+    axis.text(0.5, 0.5, text, ha="center", color=GREY, fontsize=9, transform=axis.transAxes)
+
+
+def _factor(channel: Channel) -> float:
+    return float(channel.column.unit.factor * channel.column.scale[0])
+
+
+def _label(channel: Channel) -> str:
+    return f"{channel.column.name} [{channel.column.unit.text}]"

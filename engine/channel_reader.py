@@ -1,0 +1,180 @@
+"""Channel reader: the values of a recorded file in SI, each with its time, by the map's columns."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from fractions import Fraction
+
+from engine.recorded_csv import DECIMAL
+from engine.recorded_file import MAX_PROBLEMS, RecordedFile, Samples
+from language.experiment import Column, RecordingMap
+from language.problem import Problems, Span, nearest
+from language.units import Unit, UnitError, fits, parse_unit
+
+LONGEST_STAMP = 40
+LATEST_TIME = 10**12
+"""Time stamps are below this, in their unit."""
+OTHER_WORDS = {
+    "Nm": "N*m", "1/min": "rpm", "U/min": "rpm", "r/min": "rpm", "kph": "km/h", "m/s2": "m/s^2",
+    "\N{DEGREE SIGN}C": "degC", "\N{DEGREE SIGN}": "deg",
+}  # fmt: skip
+"""Units as loggers and DBC files write them."""
+
+
+def require_names(
+    file: RecordedFile, names: Sequence[str], mapping: RecordingMap, problems: Problems
+) -> None:
+    """Report names that a map reads and a file lacks or has twice, and a file without values."""
+    for name in dict.fromkeys(names):
+        count = list(file.names).count(name)
+        if not count:
+            label = f"there is no {file.noun} `{name}`, which map `{mapping.name}` reads"
+            hint = file.lacking(name) or nearest(name, file.names)
+            problems.error("column", file.head, label, hint)
+        elif count > 1:
+            problems.error("column", file.head, f"there are two {file.noun}s `{name}`")
+    if not file.rows:
+        label = "the recording has a head line and no values"
+        if file.is_stamped:
+            label = "the recording has no values"
+        problems.error("empty", file.head, label)
+
+
+class ChannelReader:
+    """Reads channels of a file by a map, with exact time stamps."""
+
+    def __init__(self, file: RecordedFile, mapping: RecordingMap, problems: Problems) -> None:
+        """Read the time that the rows share; what is wrong is reported into `problems`."""
+        self.file = file
+        self.mapping = mapping
+        self.problems = problems
+        self.clock = [] if file.is_stamped else self.times(mapping.time)
+
+    @property
+    def is_full(self) -> bool:
+        """Tell whether so many problems were found that the rest is not looked at."""
+        return len(self.problems.found) >= MAX_PROBLEMS
+
+    def times(self, name: str) -> list[Fraction | None]:
+        """Return the time stamps of a column [s]; None where it is blank."""
+        samples = self.file.read(name)
+        found: list[Fraction | None] = []
+        last: Fraction | None = None
+        for k in range(len(samples.values)):
+            if self.is_full:
+                break
+            text = samples.text(k)
+            value = _exact(text)
+            if value is not None:
+                value = value * self.mapping.time_unit.factor
+            elif name == self.mapping.time or text:
+                label = f"the time stamp `{text}` is not a number" if text else "no time stamp"
+                self.problems.error("time", samples.place(k), label)
+            if value is not None and last is not None and value <= last:
+                self._unsorted(text, last, samples.place(k))
+            last = value if value is not None else last
+            found.append(value)
+        return found
+
+    def _unsorted(self, text: str, last: Fraction, place: Span) -> None:
+        label = f"the time stamp {text} is not above the one before, {float(last):.9g}"
+        hint = "sort the recording, and remove repeated rows"
+        self.problems.error("time", place, label, hint)
+
+    def _own(self, column: Column, parts: Sequence[Samples]) -> Sequence[Fraction | None]:
+        """Return the stamps that the parts of a column carry themselves."""
+        stamps = parts[0].stamps or ()
+        if any(part.stamps != stamps for part in parts[1:]):
+            label = f"the {self.file.noun}s of `{column.name}` do not have the same time stamps"
+            hint = "a mean is taken of values that were measured together"
+            self.problems.error("time", column.span, label, hint)
+        for k, (before, after) in enumerate(itertools.pairwise(stamps), start=1):
+            if after <= before and not self.is_full:
+                self._unsorted(f"{float(after):.9g}", before, parts[0].place(k))
+        return stamps
+
+    def samples(self, column: Column) -> tuple[tuple[Fraction, ...], tuple[float, ...]]:
+        """Return time stamps [s] and values in SI of a column of the map."""
+        parts = [self.file.read(name) for name in column.columns]
+        if self.file.is_stamped:
+            stamps = self._own(column, parts)
+        else:
+            stamps = self.times(column.time) if column.time else self.clock
+        cells = [
+            self._values(name, part, column)
+            for name, part in zip(column.columns, parts, strict=True)
+        ]
+        times: list[Fraction] = []
+        kept: list[float] = []
+        scale = float(column.scale[0]) * column.sign
+        for k, (stamp, *row) in enumerate(zip(stamps, *cells, strict=False)):
+            if any(cell is None for cell in row):
+                continue
+            if stamp is None:
+                if column.time and not self.file.read(column.time).text(k):
+                    label = f"a value of `{column.name}` without a time stamp"
+                    self.problems.error("time", parts[0].place(k), label)
+                continue
+            value = _mean(row) * scale
+            if not math.isfinite(value):
+                place = parts[0].place(k)
+                self.problems.error("value", place, f"`{column.name}` is {value} in SI")
+            times.append(stamp + column.delay)
+            kept.append(value)
+        if not times and not self.problems.has_errors:
+            label = f"{self.file.noun} `{column.columns[0]}` has no values"
+            self.problems.error("empty", self.file.head, label)
+        return tuple(times), tuple(kept)
+
+    def _values(self, name: str, samples: Samples, column: Column) -> list[float | None]:
+        factor, offset = float(column.unit.factor), float(column.unit.offset)
+        self._check_unit(name, samples.unit, column)
+        found: list[float | None] = []
+        for k, value in enumerate(samples.values):
+            if self.is_full:
+                break
+            if value is not None and not math.isfinite(value):
+                label = f"`{samples.text(k)}` in {self.file.noun} `{name}` is not a finite number"
+                self.problems.error("value", samples.place(k), label)
+                value = None
+            elif value is None and column.blank == "refuse":
+                label = f"{self.file.noun} `{name}` has no value here"
+                hint = "`blank: skip` in the map leaves empty cells out"
+                self.problems.error("value", samples.place(k), label, hint)
+            found.append(None if value is None else value * factor + offset)
+        return found
+
+    def _check_unit(self, name: str, written: str, column: Column) -> None:
+        """A unit that the file itself gives, where we know it, is that of the map."""
+        unit = file_unit(written)
+        if unit is None:
+            return
+        text = unit.text
+        same = fits(unit.dimension, column.unit.dimension)
+        if not same or (unit.factor, unit.offset) != (column.unit.factor, column.unit.offset):
+            label = f"the file gives `{name}` in `{text}`, the map in `{column.unit.text}`"
+            self.problems.error("unit", column.span, label, f"`unit: {text}` in the map")
+
+
+def file_unit(written: str) -> Unit | None:
+    """Return the unit that a logger or a DBC file writes, where we know it."""
+    try:
+        return parse_unit(OTHER_WORDS.get(written, written))
+    except UnitError:
+        return None
+
+
+def _mean(cells: Sequence[float | None]) -> float:
+    total = 0.0
+    for cell in cells:
+        total += cell or 0.0
+    return total / len(cells)
+
+
+def _exact(text: str) -> Fraction | None:
+    if len(text) > LONGEST_STAMP or not DECIMAL.fullmatch(text):
+        return None
+    value = Fraction(text)
+    return value if abs(value) < LATEST_TIME else None

@@ -1,0 +1,105 @@
+"""Recording: the command that looks at recordings, its table, JSON, picture and exit codes."""
+
+from __future__ import annotations
+
+import json
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from modewright.cli import app
+from modewright.exits import exit_code
+from tests.diagnosis.driving import MAP, SPEC, Values, tip_in
+
+
+def write(path: Path, spoil: float = 1.0) -> Path:
+    times, values = tip_in()
+    columns = {"t_s": times, **values, "motor": values["motor"] * spoil}
+    return table(path, columns)
+
+
+def table(path: Path, columns: dict[str, Values]) -> Path:
+    rows = zip(*(values.tolist() for values in columns.values()), strict=True)
+    lines = [",".join(columns), *(",".join(f"{v:.9g}" for v in row) for row in rows)]
+    path.write_text("\n".join(lines) + "\n", "utf-8")
+    return path
+
+
+@pytest.fixture
+def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "spec").mkdir()
+    named = SPEC.replace("step: 5 ms", "step: 5 ms\nrecording_map: bench")
+    (tmp_path / "spec" / "small.yaml").write_text(named, "utf-8")
+    (tmp_path / "spec" / "bench.yaml").write_text(MAP, "utf-8")
+    write(tmp_path / "drive.csv")
+    write(tmp_path / "spoiled.csv", 60 / (2 * np.pi))
+    return tmp_path
+
+
+def run(*arguments: str) -> int:
+    return exit_code(partial(app, ["recording", "check", *arguments], standalone_mode=False))
+
+
+def test_a_good_recording_with_the_map_of_the_spec(
+    project: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run("drive.csv", "--spec", "small_driveline", "--plot", "drive.png") == 0
+    text = capsys.readouterr().out
+    assert "drive.csv  torque   T_em" in text and "100 Hz" in text
+    assert "nothing odd was found in these data" in text
+    assert (project / "drive.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_wrong_unit_is_an_exit_code_and_a_line(
+    project: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run("spoiled.csv", "--spec", "small_driveline") == 1
+    assert "rpm taken for rad/s?" in capsys.readouterr().out
+    assert run("spoiled.csv", "--map", "bench") == 0  # without a model nobody can know
+
+
+def test_json_has_the_channels_the_findings_and_the_effects(
+    project: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run("spoiled.csv", "--spec", "small_driveline", "--json") == 1
+    found = json.loads(capsys.readouterr().out)
+    assert found["usable"] is False
+    assert [one["kind"] for one in found["findings"]] == ["unit"]
+    assert found["channels"][0]["rate"] == pytest.approx(100.0)
+    assert found["effects"]["backlash"] == {"testable": True, "needs": []}
+
+
+def test_without_a_map_columns_are_guessed_by_their_names(
+    project: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    times, values = tip_in()
+    columns = {"t_ms": 1e3 * times, "torque_Nm": values["torque"], "motor_rpm": values["motor"]}
+    table(project / "plain.csv", columns)
+    text = (project / "plain.csv").read_text().splitlines()
+    text = [text[0] + ",note", *(line + ",fast" for line in text[1:])]
+    (project / "plain.csv").write_text("\n".join(text) + "\n", "utf-8")
+    assert run("plain.csv", "--json") == 0
+    found = json.loads(capsys.readouterr().out)
+    assert [(c["name"], c["unit"]) for c in found["channels"]] == [
+        ("torque_Nm", "N*m"),
+        ("motor_rpm", "rpm"),
+    ]
+    assert found["channels"][0]["rate"] == pytest.approx(100.0)
+    assert [one["name"] for one in found["inputs"]] == ["torque_Nm"]
+
+
+def test_what_cannot_be_read_is_told_with_its_place(
+    project: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (project / "text.csv").write_text("who,what\nhe,that\n", "utf-8")
+    assert run("text.csv") == 1
+    assert "text.csv:1:1: error: no column of the recording looks like time" in (
+        capsys.readouterr().err
+    )
+    spec = project / "spec" / "small.yaml"
+    spec.write_text(spec.read_text().replace("recording_map: bench\n", ""))
+    assert run("drive.csv", "--spec", "small_driveline") == 1
+    assert "`small_driveline` names no map of recordings" in capsys.readouterr().err
