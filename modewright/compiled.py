@@ -9,7 +9,8 @@ from codegen.build import BuildError
 from codegen.library import library_of
 from engine.batch import Batch, BatchResult
 from engine.plan import why_not_planned
-from engine.planned import PlannedRun, planned_batch
+from engine.planned import PlannedRun
+from engine.planned_batch import planned_batch
 from engine.simulate import simulate
 from engine.starting import programs_of
 from engine.stimulus import resolved

@@ -15,7 +15,8 @@ from codegen.build import optimised
 from codegen.library import library_of
 from engine.batch import Batch, BatchResult, InputTable, Measure
 from engine.plan import why_not_planned
-from engine.planned import PlannedRun, planned_batch
+from engine.planned import PlannedRun
+from engine.planned_batch import planned_batch
 from engine.simulate import simulate
 from engine.starting import programs_of
 from engine.variants import run_variants

@@ -1,0 +1,227 @@
+"""Planned batch: the variants of a batch carried out by a compiled library, on several threads.
+
+Results are those of the interpreter, bit for bit. What a library leaves (a run that stopped, a
+range of a sampled instance) the interpreter does.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.adjustment import Group, groups
+from engine.batch import NO_EVENT, Batch, BatchResult, EventKind
+from engine.plan import Plan, assembly_of, noise_of, plan_of, why_not_planned
+from engine.planned import EVENT, Build
+from engine.variants import (
+    empty_result,
+    event_kinds,
+    first_and_last_row,
+    keep_variant,
+    run_variants,
+    variant_scenario,
+)
+from language.assembly import Assembly, ranged
+from language.program import short
+
+KINDS = ("first", "final", "max", "min", "peak", "mean", "rms")
+CHUNK = 2000
+"""Variants of one call: their events and values are a few megabytes."""
+
+
+def planned_batch(batch: Batch, build: Build, threads: int | None = None) -> BatchResult:
+    """Return what is kept of each variant, by compiled C on several threads."""
+    return PlannedBatch(batch, build).carry_out(threads)
+
+
+class PlannedBatch:
+    """A batch that is planned: it can be carried out again and again.
+
+    Variants with Programs of their own are compiled group by group.
+    """
+
+    def __init__(self, batch: Batch, build: Build) -> None:
+        """Compile what the batch needs; `reason` says why it is left to the interpreter."""
+        self.batch = batch
+        self.reason: str | None = None
+        self._parts: list[_Planned] = []
+        for group in groups(batch):
+            adjustment = group.adjustment
+            scenario = variant_scenario(batch, adjustment.scenario, 0)
+            reason = why_not_planned(adjustment.system, scenario, adjustment.programs)
+            self.reason = reason or _why_not_tuned(group)
+            if self.reason:
+                return
+            self._parts.append(_Planned(batch, group, build))
+        if not self._parts:
+            raise ValueError("a batch has at least one variant")
+
+    def carry_out(self, threads: int | None = None) -> BatchResult:
+        """Return what is kept of each variant."""
+        if self.reason:
+            note = f"interpreter: {self.reason}"
+            return BatchResult(**{**vars(run_variants(self.batch)), "note": note})
+        result = empty_result(self.batch, self._parts[0].group.adjustment, "compiled")
+        for part in self._parts:
+            part.run(result, threads or os.cpu_count() or 1)
+        return result
+
+
+def _why_not_tuned(group: Group) -> str | None:
+    known = {
+        (owner, c.name): c
+        for owner, program in group.adjustment.programs.items()
+        for c in program.constants
+    }
+    for name, (owner, parameter) in group.adjustment.tuned.items():
+        constant = known.get((owner, f"calibration.{parameter}"))
+        if constant and (constant.type != "real" or constant.items):
+            return f"`{name}` is not a real number"
+    return None
+
+
+class _Planned:
+    """The variants of a batch that share their Programs."""
+
+    def __init__(self, batch: Batch, group: Group, build: Build) -> None:
+        self.batch, self.group = batch, group
+        adjustment = group.adjustment
+        self.system, self.programs = adjustment.system, adjustment.programs
+        scenario = variant_scenario(batch, adjustment.scenario, 0)
+        self.assembly = assembly_of(self.system, scenario, self.programs)
+        self.plan = plan_of(self.system, scenario, self.assembly)
+        self.library = build(self.assembly)
+        names = [column.name for column in self.assembly.columns]
+        places = dict(zip(names, self.library.columns, strict=True))
+        count = len(self.plan.rows)
+        spans = [first_and_last_row(m, scenario.every, count) for m in batch.measures]
+        self.fixed: dict[str, Any] = {
+            "measures": len(batch.measures),
+            "measure_columns": _wholes(places[m.signal] for m in batch.measures),
+            "measure_kinds": _wholes(KINDS.index(m.kind) for m in batch.measures),
+            "measure_firsts": _wholes(first for first, _ in spans),
+            "measure_behinds": _wholes(behind for _, behind in spans),
+            "outputs": len(batch.outputs),
+            "output_columns": _wholes(places[name] for name in batch.outputs),
+            "most_events": batch.most_events,
+            **self._tables(),
+        }
+        self.kinds = _kind_places(self.assembly, event_kinds(self.programs))
+
+    def run(self, result: BatchResult, threads: int) -> None:
+        """Carry all out, in chunks on threads; each chunk writes its own part of the result."""
+        variants = self.group.variants
+        chunks = [variants[k : k + CHUNK] for k in range(0, len(variants), CHUNK)]
+        if threads > 1 and len(variants) > threads:
+            size = min(CHUNK, -(-len(variants) // threads))
+            chunks = [variants[k : k + size] for k in range(0, len(variants), size)]
+        with ThreadPoolExecutor(threads) as pool:
+            for left in pool.map(partial(self._chunk, result), chunks):
+                for variant in left:
+                    keep_variant(self.batch, result, variant, self.group.adjustment)
+
+    def _chunk(self, result: BatchResult, variants: NDArray[np.int64]) -> list[int]:
+        """Carry some variants out; return those that are left to the interpreter."""
+        batch, count = self.batch, len(variants)
+        rows, most = len(self.plan.rows), batch.most_events
+        measured = np.empty((count, len(batch.measures)))
+        kept = np.empty((count, len(batch.outputs), rows))
+        events = np.empty((count, most), dtype=EVENT)
+        counts = np.zeros(count, dtype=np.int64)
+        is_left = np.zeros(count, dtype=np.uint8)
+        plan, strides = self._noise(variants)
+        members = {
+            **self.fixed,
+            "values": self._values(variants),
+            "table_values": [
+                np.ascontiguousarray(table.values[variants], dtype=np.float64)
+                for table in self._all_tables()
+            ],
+            "noise_strides": strides,
+            "measured": measured,
+            "kept": kept,
+            "events": events,
+            "counts": counts,
+            "is_left": is_left,
+            "rows": np.empty((rows, self.library.width)),
+            "inputs_room": np.empty(self.plan.inputs.shape),
+        }
+        self.library.bound(plan, members)(0, count)
+        for place, measure in enumerate(batch.measures):
+            result.measures[measure.name][variants] = measured[:, place]
+        for place, name in enumerate(batch.outputs):
+            result.outputs[name][variants] = kept[:, place]
+        result.event_counts[variants] = counts
+        filled = np.arange(most) < counts[:, None]
+        result.event_times[variants] = np.where(filled, events["time"], np.nan)
+        numbers = np.where(filled, events["number"], 0)
+        result.event_kinds[variants] = np.where(filled, self.kinds[numbers], NO_EVENT)
+        return [int(variant) for variant in variants[is_left != 0]]
+
+    def _values(self, variants: NDArray[np.int64]) -> NDArray[np.float64]:
+        names = list(self.assembly.tunables())
+        found = np.empty((len(variants), len(names)))
+        arrays = {**self.batch.parameters, **self.batch.initial}
+        tuned = {place: arrays[name] for name, place in self.group.adjustment.tuned.items()}
+        for place, (owner, constant) in enumerate(names):
+            array = tuned.get((owner, short(constant.name)))
+            found[:, place] = constant.value if array is None else array[variants]
+        return found
+
+    def _noise(self, variants: NDArray[np.int64]) -> tuple[Plan, NDArray[np.int64]]:
+        strides = np.zeros(len(self.assembly.sensors) + 1, dtype=np.int64)
+        if self.batch.seeds is None or not self.plan.noise:
+            return self.plan, strides
+        noise = {}
+        for name, one in self.plan.noise.items():
+            seeds = self.batch.seeds[variants].tolist()
+            noise[name] = np.stack([noise_of(seed, name, len(one)) for seed in seeds])
+            strides[list(self.assembly.sensors).index(name)] = len(one)
+        return Plan(**{**vars(self.plan), "noise": noise}), strides
+
+    def _all_tables(self) -> list[Any]:
+        """Return the table of each column of inputs that a variant changes."""
+        lines = self.system.lines
+        sources = [lines[n].source if n in lines else n for n in self.assembly.inputs]
+        return [self.batch.inputs[s] for s in sources if s in self.batch.inputs]
+
+    def _tables(self) -> dict[str, Any]:
+        lines, tables = self.system.lines, self.batch.inputs
+        inputs, pieces, widths = [], [], []
+        for place, name in enumerate(self.assembly.inputs):
+            line = lines.get(name)
+            table = tables.get(line.source if line else name)
+            if table is not None:
+                delay = line.delay if line else 0
+                inputs.append(place)
+                widths.append(len(table.starts))
+                pieces.append(self.plan.pieces([start + delay for start in table.starts]))
+        return {
+            "tables": len(inputs),
+            "table_inputs": _wholes(inputs),
+            "table_pieces": pieces,
+            "table_widths": _wholes(widths),
+        }
+
+
+def _wholes(values: Any) -> NDArray[np.int64]:
+    return np.array([*values, 0], dtype=np.int64)
+
+
+def _kind_places(assembly: Assembly, kinds: Sequence[EventKind]) -> NDArray[np.int32]:
+    """Return the place among the kinds of each event number in C."""
+    found = []
+    for name, program in assembly.programs.items():
+        for info in program.transitions:
+            source = program.mode_name(info.source, info.region)
+            target = program.mode_name(info.target, info.region)
+            found.append(EventKind(name, info.name, source, target, info.region))
+        for variable in ranged(program):
+            found.append(EventKind(name, f"range {short(variable.name)}", kind="range"))
+    return np.array([kinds.index(kind) for kind in found] or [0], dtype=np.int32)
