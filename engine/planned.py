@@ -1,6 +1,6 @@
 """Planned: a run carried out by a compiled library; a batch is in engine/planned_batch.py.
 
-Results are those of the interpreter, bit for bit. A run that a library leaves, the interpreter makes.
+Results are those of the interpreter, bit for bit. What a library leaves, the interpreter does.
 """
 
 from __future__ import annotations

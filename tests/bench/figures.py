@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from typing import Any
 
 from tests.bench import in_c, ours, with_scipy
 from tests.bench.manoeuvre import CHATTER as CHATTER, TIP_OUT as TIP_OUT, Manoeuvre
 from tests.bench.showing import errors_of, shown
 from tests.bench.timing import interleaved
+from tests.bench.variants import FINE, Sweep
 
 Figure = dict[str, Any]
 STEPS = ("5 ms", "2 ms", "1 ms")
@@ -15,6 +17,10 @@ STEPS = ("5 ms", "2 ms", "1 ms")
 INTERPRETER_STEP, INTERPRETER_ROWS = "2.5 ms", "10 ms"
 """At this step the largest error of w_em is below 1e-6 of its peak, at 4 ms its mean already is.
 Rows are as far apart as the steps of scipy at most."""
+
+COMPILED_STEPS = ("5 ms", "2 ms")
+VARIANTS = 10_000
+"""Of the sweep."""
 
 
 def interpreter_over_scipy(pairs: int) -> Figure:
@@ -28,8 +34,40 @@ def interpreter_over_scipy(pairs: int) -> Figure:
     return {**shown(ratio, "interpreter", "scipy"), "step": INTERPRETER_STEP, "errors": errors}
 
 
+def compiled_over_c(pairs: int, step: str) -> Figure:
+    """A run in our C against the rival at the same step: w_em at each millisecond, every event."""
+    run = ours.ready(TIP_OUT, step, "1 ms").compiled()
+    rival = in_c.InC(TIP_OUT, _seconds(step))
+    ratio = interleaved(run.carry_out, rival.run, pairs)
+    found = run.trajectory()
+    assert found is not None
+    errors = {
+        "compiled": errors_of(TIP_OUT, ours.solution(found)),
+        "c": errors_of(TIP_OUT, rival.solution()),
+    }
+    return {**shown(ratio, "compiled", "c"), "step": step, "errors": errors}
+
+
+def batch_over_c(pairs: int) -> Figure:
+    """Variants per second of our C over the rival's loop, both on all cores."""
+    sweep = Sweep(TIP_OUT, VARIANTS)
+    threads = os.cpu_count() or 1
+    ratio = interleaved(lambda: sweep.theirs(threads), lambda: sweep.ours(threads), pairs)
+    fine = sweep.theirs(threads, FINE)
+    errors = {"batch": sweep.ours(threads).errors(fine), "c": sweep.theirs(threads).errors(fine)}
+    rates = {
+        "batch_variants_per_s": VARIANTS / ratio.seconds_other,
+        "c_variants_per_s": VARIANTS / ratio.seconds,
+    }
+    return {**shown(ratio, "c", "batch"), **rates, "variants": VARIANTS, "errors": errors}
+
+
 def errors_at(step: str, case: Manoeuvre) -> Figure:
     """The errors of a manoeuvre at a step: ours, and those of the rival in C."""
     own = ours.solution(ours.ready(case, step).interpreted())
-    rival = in_c.InC(case, float(step.partition(" ")[0]) / 1000).solution()
+    rival = in_c.InC(case, _seconds(step)).solution()
     return {"modewright": errors_of(case, own), "c": errors_of(case, rival)}
+
+
+def _seconds(step: str) -> float:
+    return float(step.partition(" ")[0]) / 1000

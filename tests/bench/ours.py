@@ -11,8 +11,11 @@ from pathlib import Path
 import numpy as np
 
 import modewright as mw
+from codegen.library import library_of
+from engine.planned import PlannedRun
 from engine.simulate import simulate
 from engine.starting import programs_of
+from engine.stimulus import resolved
 from engine.trajectory import Trajectory
 from language.experiment import Scenario, System
 from language.program import Program
@@ -54,6 +57,11 @@ class Ready:
     def interpreted(self) -> Trajectory:
         """Run once by the interpreter."""
         return simulate(self.system, self.scenario, programs=self.programs)
+
+    def compiled(self) -> PlannedRun:
+        """Return the run in compiled C, which can be carried out again and again."""
+        scenario = resolved(self.system, self.scenario)
+        return PlannedRun(self.system, scenario, self.programs, library_of)
 
 
 def ready(case: Manoeuvre, step: str, every: str | None = None) -> Ready:

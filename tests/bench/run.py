@@ -38,7 +38,8 @@ def main(arguments: list[str] | None = None) -> int:
     cases = (figures.TIP_OUT, figures.CHATTER)
     found: dict[str, Any] = {
         "machine": machine(),
-        "single_run": {"interpreter_over_scipy": figures.interpreter_over_scipy(given.pairs)},
+        "single_run": single_run(given.pairs),
+        "sweep": {"batch_over_c": figures.batch_over_c(given.pairs)},
         "accuracy": {
             step: {case.name: figures.errors_at(step, case) for case in cases}
             for step in figures.STEPS
@@ -49,6 +50,15 @@ def main(arguments: list[str] | None = None) -> int:
     given.out.write_text(json.dumps(found, indent=1) + "\n")
     print("\n".join(table(found)))
     return 0
+
+
+def single_run(pairs: int) -> dict[str, Any]:
+    """Return the figures of one run; those of compiled C at the longer step stand first."""
+    found = {}
+    for number, step in enumerate(figures.COMPILED_STEPS):
+        at = f"_at_{step.replace(' ', '_')}" if number else ""
+        found[f"compiled_over_c{at}"] = figures.compiled_over_c(pairs, step)
+    return {**found, "interpreter_over_scipy": figures.interpreter_over_scipy(pairs)}
 
 
 def rival(name: str, pairs: int) -> dict[str, Any]:

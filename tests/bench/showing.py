@@ -37,7 +37,7 @@ def table(found: Figure) -> list[str]:
         f"{where['compiler']}; {where['flags']}",
         f"Python {where['python']}, numpy {where['numpy']}, scipy {where['scipy']}",
         "",
-        "processor time over the rival's: median of pairs (quartiles)",
+        "processor time over the rival's (sweep: variants per second): median (quartiles)",
     ]
     for group in ("single_run", "sweep"):
         for name, figure in found.get(group, {}).items():
@@ -45,6 +45,12 @@ def table(found: Figure) -> list[str]:
     for name, figure in found["rivals"].items():
         said = figure.get("missing") or f"{_ratio(figure)}, first run {figure['first_run_s']:.1f} s"
         lines.append(f"  {name + ' over scipy':36} {said}")
+    for name, figure in found["sweep"].items():
+        rates = (f"{figure[side + '_variants_per_s']:,.0f}" for side in ("batch", "c"))
+        lines.append(f"  {name}: {figure['variants']} variants, {' and '.join(rates)} a second")
+        for who, errors in figure["errors"].items():
+            late = f"{1e6 * errors['median_late']:.2f}, {1e6 * errors['late']:.0f} us"
+            lines.append(f"    {who:6} first contact late: median, largest {late}")
     lines += ["", "errors: events late [us], w_em over its peak (root mean square, largest)"]
     for name, figure in found["single_run"].items():
         for who, errors in figure.get("errors", {}).items():

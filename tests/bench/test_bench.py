@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import hashlib
 import json
+from functools import partial
 from pathlib import Path
 
 import pytest
 
-from tests.bench import figures, rivals, run, timing
+from codegen.build import optimised
+from codegen.library import library_of
+from tests.bench import figures, ours, rivals, run, timing, variants
 from tests.bench.in_c import HERE, PEERS
 from tests.bench.manoeuvre import Manoeuvre
 
@@ -29,12 +32,16 @@ def test_a_small_run_has_every_figure_with_its_errors(
     monkeypatch.setattr(figures, "TIP_OUT", short)
     monkeypatch.setattr(figures, "CHATTER", short)
     monkeypatch.setattr(figures, "STEPS", ("2 ms",))
+    monkeypatch.setattr(figures, "COMPILED_STEPS", ("2 ms",))
+    monkeypatch.setattr(figures, "VARIANTS", 4)
+    monkeypatch.setattr(ours, "library_of", partial(library_of, flags=optimised("O0")))
+    monkeypatch.setattr(variants, "library_of", partial(library_of, flags=optimised("O0")))
     monkeypatch.setattr(timing, "SHORTEST", 0.0)
     path = tmp_path / "bench.json"
     assert run.main(["--pairs", "1", "--out", str(path)]) == 0
     found = json.loads(path.read_text())
     for group in ("single_run", "sweep"):
-        for ratio in found.get(group, {}).values():
+        for ratio in found[group].values():
             assert 0.0 < ratio["low"] <= ratio["median"] <= ratio["high"]
     assert found["single_run"]["interpreter_over_scipy"]["errors"]["scipy"]["is_complete"]
     for side in ("modewright", "c"):
@@ -43,6 +50,10 @@ def test_a_small_run_has_every_figure_with_its_errors(
         assert errors["events"] == 2
         assert 0.0 < errors["late"] < 1e-6
         assert 0.0 < errors["rms"] <= errors["largest"] < 1e-6
+    assert found["single_run"]["compiled_over_c"]["errors"]["compiled"]["largest"] < 1e-6
+    swept = found["sweep"]["batch_over_c"]
+    assert swept["errors"]["batch"]["other_events"] == swept["errors"]["c"]["other_events"] == 0
+    assert swept["errors"]["batch"]["late"] < 1e-4
     assert "interpreter_over_scipy" in capsys.readouterr().out
 
 

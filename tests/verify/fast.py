@@ -17,6 +17,8 @@ from tests.verify.store import ROOT, Figure, measured
 
 INTERPRETER, SPEED_ERROR = 1.5, 1e-6
 """Most of scipy's time, at this largest error of w_em over its peak."""
+COMPILED, BATCH = 1.25, 0.8
+"""Most of the rival's time in one run, least of its variants per second."""
 LATE = {"5 ms": 15e-6, "2 ms": 1e-6, "1 ms": 1e-6}
 OFF = {"5 ms": 3e-6, "2 ms": 3e-6, "1 ms": 3e-6}
 """Bars of a tip-out: events late [s], and w_em over its peak, root mean square."""
@@ -34,6 +36,10 @@ def main() -> int:
     found: dict[str, Callable[[], Figure]] = {
         "interpreter_over_scipy": partial(interpreter_over_scipy, pairs)
     }
+    for step in figures.COMPILED_STEPS:
+        name = f"compiled_over_c_at_{step.replace(' ', '_')}"
+        found[name] = partial(compiled_over_c, pairs, step)
+    found["batch_over_c"] = partial(batch_over_c, pairs)
     for step in figures.STEPS:
         found[f"accuracy_at_{step.replace(' ', '_')}"] = partial(accuracy, step)
         found[f"crossings_at_{step.replace(' ', '_')}"] = partial(crossings, step)
@@ -46,6 +52,19 @@ def interpreter_over_scipy(pairs: int) -> Figure:
     errors = figure["errors"]["interpreter"]
     met = figure["median"] <= INTERPRETER and errors["is_complete"]
     return {"met": met and errors["largest"] <= SPEED_ERROR, **figure, "machine": machine()}
+
+
+def compiled_over_c(pairs: int, step: str) -> Figure:
+    """Processor time of a run in our C over that of the rival in C."""
+    figure = figures.compiled_over_c(pairs, step)
+    met = figure["median"] <= COMPILED and figure["errors"]["compiled"]["is_complete"]
+    return {"met": met, **figure}
+
+
+def batch_over_c(pairs: int) -> Figure:
+    """Variants per second of our C over those of the rival in C."""
+    figure = figures.batch_over_c(pairs)
+    return {"met": figure["median"] >= BATCH, **figure}
 
 
 def accuracy(step: str) -> Figure:
