@@ -93,8 +93,8 @@ def _refusal(kind: Kind, values: Mapping[Target, float]) -> str:
         if target.kind == "parameter":
             owner, short = target.path
             limits = kind.system.instances[owner].automaton.parameters[short].range
-            if limits and not limits[0] <= value <= limits[1]:
-                low, high = map(float, limits)
+            low, high = map(float, limits) if limits else (-math.inf, math.inf)
+            if not low <= value <= high:
                 return f"`{name}` = {value:.6g} is outside its range [{low:.6g}, {high:.6g}]"
         is_positive = target.kind == "sensor" or target.path[-1] in ("period", "step")
         if target.kind in ("sensor", "clock") and (value < 0 or (is_positive and value == 0)):

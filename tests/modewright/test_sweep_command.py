@@ -11,6 +11,7 @@ import pytest
 from engine.batch import Batch, BatchResult
 from modewright import studies
 from modewright.cli import app
+from modewright.console import counting
 from modewright.exits import exit_code
 from sweep import store as store_module
 from sweep.store import read_store
@@ -123,3 +124,19 @@ def test_samples_and_seed_of_the_command_line_replace_those_of_the_study(
     assert run("grid", "--out", out, "--samples", "1") == 1
     assert "sampling changed" in capsys.readouterr().err
     assert run("alone", "--out", str(tmp_path / "other"), "--seed", "9") == 2
+
+
+def test_progress_has_a_rate_on_a_terminal_and_nothing_elsewhere(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with counting("sweep", "variants") as tell:
+        tell(3, 0, 10)
+    assert capsys.readouterr().err == ""
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("COLUMNS", "120")
+    with counting("sweep", "variants") as tell:
+        tell(2, 2, 10)
+        tell(5, 2, 10)
+    shown = capsys.readouterr().err
+    assert "5/10" in shown and "variants/s" in shown
