@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from sweep.study import Distribution, Study
+from sweep.study import NANOSECONDS, Distribution, Study
 
 Reals = NDArray[np.float64]
 PER_COUNTER = 4
@@ -33,7 +33,10 @@ def drawn_values(study: Study, samples: Sequence[int]) -> list[dict[str, float]]
     columns = []
     for place, varied in enumerate(drawn):
         assert isinstance(varied.course, Distribution)
-        columns.append(quantile(varied.course, shares[:, place]).tolist())
+        values = quantile(varied.course, shares[:, place])
+        if any(target.is_input_time for target in varied.targets):
+            values = np.round(values, NANOSECONDS)
+        columns.append(values.tolist())
     names = [varied.name for varied in drawn]
     return [dict(zip(names, row, strict=True)) for row in zip(*columns, strict=True)]
 

@@ -13,7 +13,7 @@ from language.experiment import Scenario, System
 from language.project import Project
 from language.scenario import read_scenario
 from language.tree import at, put
-from sweep.study import Course, Target
+from sweep.study import NANOSECONDS, Course, Target
 
 Values = Iterable[tuple[Target, float]]
 
@@ -45,7 +45,7 @@ def stimulated(course: Course, system: System, values: Values) -> Scenario:
     assert course.document is not None
     root = course.document.root
     for target, value in given:
-        root = _with_part(root, target.path, value, system)
+        root = _with_part(root, target, value, system)
     document = dataclasses.replace(course.document, root=root)
     found = read_scenario(document, Project(Path()), system)
     kept = course.scenario
@@ -54,9 +54,10 @@ def stimulated(course: Course, system: System, values: Values) -> Scenario:
     )
 
 
-def _with_part(root: Table, path: tuple[str, ...], value: float, system: System) -> Table:
-    name, *part = path
-    is_time = bool(part) and (part[0] == "times" or part[-1] in ("from", "to"))
+def _with_part(root: Table, target: Target, value: float, system: System) -> Table:
+    name, *part = target.path
+    is_time = target.is_input_time
+    value = round(value, NANOSECONDS) if is_time else value
     unit = "s" if is_time else str(system.inputs[name].unit.dimension)
     text = f"{decimal(value)} {unit}" if unit != "1" else decimal(value)
     node = at(root, ("inputs", name))

@@ -18,6 +18,10 @@ TargetKind = Literal["parameter", "initial", "input", "sensor", "clock"]
 Shape = Literal["uniform", "log_uniform", "normal", "lognormal", "choice"]
 
 
+NANOSECONDS = 9
+"""Decimals of a drawn time [s] in an input: so all times of a run are multiples of one tick."""
+
+
 @dataclass(frozen=True)
 class Target:
     """A place where a value goes: a parameter of an instance, a start value, a part of an input.
@@ -28,6 +32,12 @@ class Target:
 
     kind: TargetKind
     path: tuple[str, ...]
+
+    @property
+    def is_input_time(self) -> bool:
+        """Tell whether it is a time in an input; these are rounded to nanoseconds."""
+        is_time = "times" in self.path[1:2] or self.path[-1] in ("from", "to")
+        return self.kind == "input" and is_time
 
 
 @dataclass(frozen=True)
