@@ -14,7 +14,7 @@ from language.graph import chain, circle, topological
 from language.load import automaton_of
 from language.model import Automaton
 from language.number import NumberType
-from language.problem import Problems, Span, nearest
+from language.problem import Problems, Span, SpecError, nearest
 from language.project import Project, expanded, read_document
 from language.reader import Reader
 from language.units import SECOND, fits
@@ -147,8 +147,8 @@ class _SystemReader(Reader):
             offset, unit = self.quantity(node, "offset", node.span, None)
             if offset < 0 or (offset and not fits(unit.dimension, SECOND)):
                 self.problems.error("range", node.span, "`offset` is a time of at least 0 s")
-        self.problems.stop_if_any()
-        assert of is not None
+        if of is None:
+            raise SpecError(())
         automaton = self._automaton(of, values)
         mine = self._overrides_of(entry.key, automaton)
         if mine:

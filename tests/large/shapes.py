@@ -137,15 +137,15 @@ def remembering(count: int) -> str:
     return "".join([*lines, "outputs: [w, a]\n"])
 
 
-def system(instances: int) -> dict[str, str]:
-    """Many instances of one sampled automaton in a row, and a scenario."""
+def system(instances: int, different: int = 8) -> dict[str, str]:
+    """Many instances of one sampled automaton in a row, some different, and a scenario."""
     small = HEAD.replace("automaton: large", "automaton: part") + TICK
     small += "modes: {run: {update: {w: w + 10 ms / J * (T_in - c * w)}}}\n"
     small += "equations: {T_out: k * a + c * w}\noutputs: [w, a, T_out]\n"
     lines = ["language: 1\nsystem: large\ninputs: {T: {unit: N*m}}\ninstances:\n"]
-    lines += [
-        f"  i_{n}: {{of: part, values: {{J: {n % 8 + 1}.{n} kg*m^2}}}}\n" for n in range(instances)
-    ]
+    for n in range(instances):
+        inertia = f"{n % different + 1}.5 kg*m^2"
+        lines.append(f"  i_{n}: {{of: part, values: {{J: {inertia}}}}}\n")
     lines.append("connections:\n")
     lines += [f"  i_{n}.T_in: {f'0.5 * i_{n - 1}.T_out' if n else 'T'}\n" for n in range(instances)]
     lines.append(f"outputs: {{T_out: i_{instances - 1}.T_out}}\n")
@@ -159,8 +159,3 @@ def scenario(steps: int) -> str:
         f"language: 1\nscenario: run\nof: large\nhorizon: {steps} ms\n"
         f"inputs: {{T: {{start: 1 N*m, steps: {{{pairs}}}}}}}\n"
     )
-
-
-def alone(text: str) -> dict[str, str]:
-    """An automaton as the only file."""
-    return {"large": text}

@@ -19,12 +19,15 @@ import numpy as np
 
 import modewright as mw
 from tests.engine.test_tip_out import ALWAYS, DISCONTINUOUS, MANOEUVRES, PAPER, scenario, truth
+from tests.large.shapes import modes_of_equations
 from tests.verify.first_drive import refused
 from tests.verify.store import ROOT, Figure, measured
 
 CORES = ("Haswell", "SandyBridge", "Prescott")
 """Kernels of OpenBLAS that give three patterns of bits."""
 CHECK_SECONDS = 2.0
+LARGE_SECONDS = 20.0
+LARGE_BYTES = 1_000_000_000
 SUITES = {
     "matrices": "tests/language/test_kalman.py",
     "drivelines": "tests/engine/test_drivelines.py",
@@ -53,6 +56,7 @@ def main() -> int:
     found["lockstep_of_types"] = lockstep_of_types
     found["refused"] = refused
     found["check_cold"] = check_cold
+    found["check_of_3_mb"] = check_of_3_mb
     for name, path in ({} if is_part else SUITES).items():
         found[name] = partial(suite, path)
     return measured(3, found)
@@ -106,6 +110,24 @@ def check_cold() -> Figure:
     largest = max(seconds.values())
     met = largest < CHECK_SECONDS
     return {"met": met, "specs": len(seconds), "largest_s": largest, "longest_wall_s": longest}
+
+
+def check_of_3_mb() -> Figure:
+    """`modewright check` of a valid spec of 3 MB: 190 modes with 190 equations each.
+
+    The bars are on processor time and on memory.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "large.yaml"
+        path.write_text(modes_of_equations(190, 190))
+        command = [sys.executable, "-m", "modewright", "check", str(path)]
+        with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL) as child:
+            _, status, used = os.wait4(child.pid, 0)
+            child.returncode = os.waitstatus_to_exitcode(status)
+        size = path.stat().st_size
+    seconds, memory = used.ru_utime + used.ru_stime, used.ru_maxrss * 1024
+    met = status == 0 and seconds < LARGE_SECONDS and memory < LARGE_BYTES
+    return {"met": met, "bytes": size, "check_s": round(seconds, 1), "memory_bytes": memory}
 
 
 def generate_anywhere() -> Figure:
