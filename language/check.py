@@ -292,6 +292,7 @@ class _Check:
 def _check_size(automaton: Automaton, problems: Problems) -> None:
     """What stands at the root holds in every mode: the Program has it once for each."""
     modes = automaton.all_modes
+    before = len(problems.found)
     held = sum(len(mode.equations) + len(mode.flow) for mode in modes)
     if held > MOST_HELD:
         label = f"the modes have {held} equations and balances, those of the root in each of them"
@@ -300,7 +301,8 @@ def _check_size(automaton: Automaton, problems: Problems) -> None:
         if len(mode.transitions) > MOST_WAYS:
             label = f"mode `{mode.name}` has {len(mode.transitions)} transitions"
             problems.error("huge", mode.span, label, f"a mode has at most {MOST_WAYS}")
-    problems.stop_if_any()
+    if len(problems.found) > before:
+        problems.stop_if_any()
 
 
 def _never_entered(automaton: Automaton, region: Region) -> list[str]:
