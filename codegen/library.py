@@ -181,11 +181,13 @@ def _loaded(wanted: _Wanted, flags: tuple[str, ...], named: str | None) -> Libra
         sources = sorted(folder.glob("*.c"))
         command = [*compiler(named), *flags, *SHARED]
         key = key_of(sources, command, compiler_version(named))
-        path = stored(key, lambda target: _build(sources, target, flags, named), folder)
+        path = stored(key, lambda target: build_library(sources, target, flags, named), folder)
         return Library(assembly, path)
 
 
-def _build(sources: Sequence[Path], target: Path, flags: Sequence[str], named: str | None) -> None:
+def build_library(
+    sources: Sequence[Path], target: Path, flags: Sequence[str], named: str | None
+) -> None:
     """Compile the sources side by side, and link them."""
     command = compiler(named)
     objects = [source.with_suffix(".o") for source in sources]

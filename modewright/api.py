@@ -101,7 +101,7 @@ def simulate(
         scipys: Any = "DOP853" if method == "RK4" else method
         return run(loaded.system, loaded.scenario, scipys)
     trajectory, means = run_compiled(loaded.system, loaded.scenario, compiled)
-    told = logging.WARNING if compiled and means != "compiled" else logging.INFO
+    told = logging.WARNING if compiled and means.startswith("interpreter") else logging.INFO
     logging.getLogger("modewright").log(told, "%s by the %s", scenario, means)
     return trajectory
 

@@ -5,8 +5,11 @@ Both have the same bits. What did the work is told, with the reason where it is 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from codegen.build import BuildError
 from codegen.library import library_of
+from codegen.stepper import CompiledStepper
 from engine.batch import Batch, BatchResult
 from engine.plan import why_not_planned
 from engine.planned import PlannedRun
@@ -26,9 +29,9 @@ the compiler about one, once."""
 
 
 def run(system: System, scenario: Scenario, compiled: bool | None = None) -> tuple[Trajectory, str]:
-    """Return the trajectory of a run, and what carried it out: `compiled`, or `interpreter: why`.
+    """Return the trajectory of a run, and what carried it out, with the reason if not all in C.
 
-    Asked for or not, compiled C does the work where it can; None compiles runs that are long.
+    `compiled` takes C where it can; None does so for runs that are long.
     """
     scenario = resolved(system, scenario)
     programs = programs_of(system, scenario)
@@ -36,17 +39,25 @@ def run(system: System, scenario: Scenario, compiled: bool | None = None) -> tup
     if compiled is False or (compiled is None and count < LONG):
         why = "asked for" if compiled is False else f"{count} steps are too few to compile for"
         return simulate(system, scenario, programs=programs), f"interpreter: {why}"
-    why = why_not_planned(system, scenario, programs) or ""
-    if not why:
-        try:
-            found = PlannedRun(system, scenario, programs, library_of).trajectory()
-        except (ToolMissing, BuildError, OSError) as error:
-            found, why = None, str(error).split("\n")[0]
-        else:
-            why = "" if found else "it has to tell what happened"
-        if found:
-            return found, "compiled"
-    return simulate(system, scenario, programs=programs), f"interpreter: {why}"
+    try:
+        found, means = _in_c(system, scenario, programs)
+    except (ToolMissing, BuildError, OSError) as error:
+        found, means = None, str(error).splitlines()[0]
+    if found:
+        return found, means
+    return simulate(system, scenario, programs=programs), f"interpreter: {means}"
+
+
+def _in_c(
+    system: System, scenario: Scenario, programs: Mapping[str, Program]
+) -> tuple[Trajectory | None, str]:
+    """Return a run in one call; block by block where that is not planned; None: it stopped."""
+    why = why_not_planned(system, scenario, programs)
+    if why:
+        found = simulate(system, scenario, CompiledStepper, programs=programs)
+        return found, f"compiled, block by block: {why}"
+    run = PlannedRun(system, scenario, programs, library_of).trajectory()
+    return run, "compiled" if run else "it has to tell what happened"
 
 
 def run_batch(batch: Batch, threads: int | None = None) -> BatchResult:

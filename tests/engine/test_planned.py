@@ -138,17 +138,18 @@ def test_a_variant_that_leaves_a_range_or_stops_is_told_by_the_interpreter() -> 
     assert_same_batch(mine, run_variants(batch))
 
 
-def test_what_cannot_be_planned_is_run_by_the_interpreter_which_says_why() -> None:
+def test_what_cannot_be_planned_is_run_block_by_block_and_says_why() -> None:
     system, scenario = drive("ev_driveline_ideal", "tip_out", Fraction(1, 100))
     (name, stimulus), *_ = scenario.inputs.items()
     ramp = (Piece(Fraction(0), Fraction(30), Fraction(-1)),)
     inputs = {**scenario.inputs, name: dataclasses.replace(stimulus, pieces=ramp)}
     ramped = dataclasses.replace(scenario, inputs=inputs)
     trajectory, means = run(system, ramped, compiled=True)
-    assert means == "interpreter: input `T_req` changes inside the steps"
+    why = "input `T_req` changes inside the steps"
+    assert means == f"compiled, block by block: {why}"
     assert_same(trajectory, simulate(system, ramped))
     batch = Batch(system, ramped, 1, measures=(Measure("m", "plant.w_w", "final"),))
-    assert run_batch(batch).note == means
+    assert run_batch(batch).note == f"interpreter: {why}"
 
 
 def test_without_a_compiler_the_interpreter_does_the_work_and_says_so(

@@ -1,0 +1,196 @@
+"""Stepper: a Program compiled for this machine, run block by block through ctypes.
+
+It has the methods that the engine asks of what runs a Program (engine/interpreter.py), and its
+bits. For whole runs in one call see codegen/library.py.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import dataclasses
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from codegen.build import FLAGS, compiler, compiler_version
+from codegen.cache import key_of, stored
+from codegen.library import SHARED, build_library
+from codegen.mathematics import math_files
+from codegen.names import CNames, c_type
+from codegen.rendering import render
+from codegen.source import module_context
+from codegen.usage import locals_of, usages
+from language.operation import Assign, Block, Branch, Choose, FaultBit, Loop, Op, Value
+from language.printing import digest
+from language.program import Program, Variable
+from language.traversal import walk
+
+NAME = "stepper"
+LEFT = "memory.left_{}"
+KINDS: Mapping[str, Any] = {
+    "double": ctypes.c_double,
+    "float": ctypes.c_float,
+    "bool": ctypes.c_bool,
+    "uint8_t": ctypes.c_uint8,
+    "int16_t": ctypes.c_int16,
+    "uint16_t": ctypes.c_uint16,
+    "int32_t": ctypes.c_int32,
+    "uint32_t": ctypes.c_uint32,
+}
+INLINE = ("init", "step")
+"""Blocks that are no functions of their own where C is printed."""
+
+
+class CompiledStepper:
+    """A Program in compiled C with its values. Variables start at 0 or false, `init` has run."""
+
+    def __init__(self, program: Program, flags: Sequence[str] = FLAGS) -> None:
+        """Compile, or take what was compiled before. Raises ToolMissing, BuildError."""
+        self.program = program
+        marked = _marked(program)
+        library, self._blocks, places = _loaded(_Whole(digest(marked), marked), tuple(flags))
+        self._run = library.stepper_run
+        self._room = ctypes.create_string_buffer(int(library.stepper_size()))
+        self._address = ctypes.addressof(self._room)
+        self._values = {
+            name: KINDS[kind].from_buffer(self._room, offset)
+            for name, (kind, offset) in places.items()
+        }
+        self._fixed = {c.name: c.items or c.value for c in program.constants}
+        self._left = {signal: LEFT.format(k) for k, signal in enumerate(_signals(program))}
+        for entry in ("default_page", "derive", "init"):
+            self.run(entry)
+
+    def get(self, name: str) -> Any:
+        """Return the value of a variable or constant, `group.name`."""
+        value = self._values.get(name)
+        return self._fixed[name] if value is None else value.value
+
+    def set(self, name: str, value: float | int | bool) -> None:
+        """Set a variable; a real is rounded to the number type, once."""
+        self._values[name].value = value
+
+    def has(self, name: str) -> bool:
+        """Tell whether the Program has a variable or constant."""
+        return name in self._values or name in self._fixed
+
+    def run(self, block: str) -> None:
+        """Run a block."""
+        self._run(self._address, self._blocks[block])
+
+    def reader(self, names: tuple[str, ...]) -> Callable[[], tuple[Any, ...]]:
+        """Return a function that returns the values of some variables."""
+        values = [self._values[name] for name in names]
+        return lambda: tuple([value.value for value in values])
+
+    def left(self) -> tuple[str, ...]:
+        """Return the signals that left their range since this was asked last."""
+        found = tuple(signal for signal, name in self._left.items() if self._values[name].value)
+        for signal in found:
+            self._values[self._left[signal]].value = False
+        return found
+
+
+@dataclasses.dataclass(frozen=True)
+class _Whole:
+    digest: str
+    program: Program = dataclasses.field(compare=False)
+
+
+Loaded = tuple[ctypes.CDLL, dict[str, int], dict[str, tuple[str, int]]]
+
+
+@lru_cache(maxsize=64)
+def _loaded(wanted: _Whole, flags: tuple[str, ...]) -> Loaded:
+    """Return a library, the numbers of its blocks, and kind and offset of its variables."""
+    program = dataclasses.replace(wanted.program, name=NAME)
+    files, blocks, names = _files(program)
+    with tempfile.TemporaryDirectory(prefix="modewright-") as name:
+        folder = Path(name)
+        for file, text in files.items():
+            (folder / file).write_text(text)
+        sources = sorted(folder.glob("*.c"))
+        key = key_of(sources, [*compiler(), *flags, *SHARED], compiler_version())
+        path = stored(key, lambda target: build_library(sources, target, flags, None), folder)
+        library = ctypes.CDLL(str(path))
+    library.stepper_run.argtypes = [ctypes.c_void_p, ctypes.c_int32]
+    library.stepper_run.restype = None
+    library.stepper_size.restype = ctypes.c_int64
+    offsets = (ctypes.c_int64 * len(names)).in_dll(library, "stepper_places")
+    places = {n: (kind, o) for (n, kind), o in zip(names.items(), offsets, strict=True)}
+    return library, blocks, places
+
+
+def _files(program: Program) -> tuple[dict[str, str], dict[str, int], dict[str, str]]:
+    """Return the C of a Program, the numbers of its blocks, and the C types of its variables."""
+    context = module_context(program)
+    local = locals_of(program)
+    used, place = usages(program, local), CNames(program)
+    hidden = {name for names in local.values() for name in names}
+    names = {
+        v.name: c_type(v, program.number)
+        for v in program.variables
+        if not v.size and v.name not in hidden
+    }
+    names |= {
+        c.name: c_type(Variable(c.name, c.type, values=c.values), program.number)
+        for c in program.constants
+        if c.kind in ("tunable", "derived") and not c.items
+    }
+    own = [name for name in program.blocks if name not in (*INLINE, "derive")]
+    calls = [f"{name}({', '.join(used[name].parameters)})" for name in own]
+    entries = [name for name in INLINE if name in program.blocks]
+    inline = [(name, context["entries"][name]["lines"]) for name in entries]
+    files = {
+        f"{NAME}.h": render("module.h.jinja", {**context, "digest": ""}),
+        f"{NAME}_stepper.c": render(
+            "stepper.c.jinja",
+            {
+                **context,
+                "calls": calls,
+                "inline": inline,
+                "places": [place(name).replace("->", ".") for name in names],
+            },
+        ),
+    }
+    if context["uses_math"]:
+        files.update(math_files(program.number))
+    numbered = [*own, "derive", "default_page", *entries]
+    return files, {name: number for number, name in enumerate(numbered)}, names
+
+
+def _signals(program: Program) -> tuple[str, ...]:
+    """Return the signals whose leaving of a range is reported."""
+    ops = (op for block in program.blocks.values() for op in walk(block))
+    found = (op.signal for op in ops if isinstance(op, FaultBit) and op.value)
+    return tuple(dict.fromkeys(signal for signal in found if signal))
+
+
+def _marked(program: Program) -> Program:
+    """Return a Program that notes which signals left their range."""
+    signals = _signals(program)
+    if not signals:
+        return program
+    marks = {signal: LEFT.format(k) for k, signal in enumerate(signals)}
+    variables = (*program.variables, *(Variable(name, "truth") for name in marks.values()))
+    blocks = {name: tuple(_with_marks(b, marks)) for name, b in program.blocks.items()}
+    return dataclasses.replace(program, variables=variables, blocks=blocks)
+
+
+def _with_marks(block: Block, marks: Mapping[str, str]) -> Iterator[Op]:
+    for op in block:
+        match op:
+            case Branch(condition, then, other):
+                inner = (tuple(_with_marks(b, marks)) for b in (then, other))
+                yield Branch(condition, *inner)
+            case Choose(selector, cases):
+                yield Choose(selector, tuple((k, tuple(_with_marks(b, marks))) for k, b in cases))
+            case Loop(count, index, body):
+                yield Loop(count, index, tuple(_with_marks(body, marks)))
+            case FaultBit(_, signal, True) if signal:
+                yield op
+                yield Assign(marks[signal], Value(True))
+            case _:
+                yield op
