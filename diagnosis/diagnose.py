@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from diagnosis.bench import Bench, balance_drifts
-from diagnosis.estimation import Estimate
+from diagnosis.estimation import Estimate, adapted
 from diagnosis.evidence import inflation
 from diagnosis.layers import shipped_effects
 from diagnosis.level import recalibrated, units_of
@@ -26,7 +26,7 @@ from diagnosis.prediction import noises_of
 from diagnosis.search import Tell, Tried
 from diagnosis.selection import THRESHOLD, Selection, selected
 from diagnosis.series import Series, series_of
-from diagnosis.simulation import for_recordings, misfits
+from diagnosis.simulation import misfits
 from diagnosis.verdict import Misfit, Named, Ranked, Says, Verdict
 from engine.recording import read_recording
 from language.document import Document
@@ -211,11 +211,10 @@ def _named_alone(tried: Tried, automaton: Automaton) -> Named:
 
 def _confirmed(verdict: Verdict, selection: Selection, held: tuple[Series, ...]) -> Verdict:
     """Return the verdict with what the held out recordings say of it."""
-    base = for_recordings(selection.base, held)
-    model = for_recordings(selection.model, held)
+    base = adapted(selection.base, held)
+    model = adapted(selection.model, held)
     fit = {**verdict.fit, "held_out": misfits(base, model, held)}
-    gain = base.likelihood - model.likelihood
-    confirmed = bool(gain > 0.0) if selection.accepted else None
+    confirmed = model.likelihood < base.likelihood if selection.accepted else None
     return dataclasses.replace(verdict, fit=fit, confirmed=confirmed)
 
 

@@ -81,18 +81,14 @@ def estimated(
     noises: Noises,
     start: Mapping[str, float] | Point,
     rounds: int = MOST_ROUNDS,
-    own_only: bool = False,
 ) -> Estimate:
-    """Return the point that foresees the recordings best, from `start` [SI].
-
-    `own_only` leaves what all recordings share where it is.
-    """
+    """Return the point that foresees the recordings best, from `start` [SI]."""
     point = start if isinstance(start, Point) else point_of(candidate, len(series), start)
     now = looked_at(candidate, series, noises, point)
     damping = FIRST_DAMPING
     for _ in range(rounds if np.isfinite(now.cost) else 0):
         now = with_normal(now, series)
-        better, damping = _improved(now, series, damping, own_only)
+        better, damping = _improved(now, series, damping)
         if better is None:
             break
         renewed = looked_at(candidate, series, noises, better.point)
@@ -101,6 +97,26 @@ def estimated(
         if gained < ENOUGH:
             break
     return now if now.normal else with_normal(now, series) if np.isfinite(now.cost) else now
+
+
+def adapted(model: Estimate, series: Sequence[Series], rounds: int = 5) -> Estimate:
+    """Return a model for other recordings, with the gains that it has.
+
+    What all recordings share stays where it is; only what each has of its own is fitted.
+    """
+    shared = model.point.shared
+    point = Point(shared, np.tile(shared, (len(series), 1)))
+    outcome = _run(model.candidate, series, point, model.gains, model.noises)
+    cost = outcome.cost() + point.prior(model.candidate)
+    now = dataclasses.replace(model, point=point, cost=cost, outcome=outcome, normal=None)
+    damping = FIRST_DAMPING
+    has_own = any(one.per_recording for one in model.candidate.uncertain)
+    for _ in range(rounds if has_own and np.isfinite(cost) else 0):
+        better, damping = _improved(with_normal(now, series), series, damping, own_only=True)
+        if better is None:
+            break
+        now = better
+    return now
 
 
 def would_reach(estimate: Estimate, series: Sequence[Series]) -> float:
@@ -113,7 +129,7 @@ def would_reach(estimate: Estimate, series: Sequence[Series]) -> float:
 
 
 def _improved(
-    now: Estimate, series: Sequence[Series], damping: float, own_only: bool
+    now: Estimate, series: Sequence[Series], damping: float, own_only: bool = False
 ) -> tuple[Estimate | None, float]:
     """Return a better point and the damping that led there; None where there is none."""
     assert now.normal is not None

@@ -22,6 +22,8 @@ from diagnosis.point import point_of
 from language.document import Table
 
 Reals = NDArray[np.float64]
+SMALL_LEVEL = FREE_LEVELS[1]
+"""What all drifts have while one of them is let free."""
 LOUD = 2.0
 """A drift beyond this many of its own standard deviations makes a window."""
 SHORTEST = 0.05
@@ -57,8 +59,8 @@ def located(bench: Bench, base: Estimate) -> tuple[Locus, ...]:
         candidate = bench.candidate((), bench.drifts if known else (*bench.drifts, layer))
         name = layer.named("drift")
         units = units_of(candidate, bench.series, base.noises, base.values(0))
-        small = {other: base.noises.drifts.get(other, 0.0) for other in candidate.drifts}
-        noises = dataclasses.replace(base.noises, drifts={**small, name: 0.0})
+        small = {other: SMALL_LEVEL * unit for other, unit in units.items()}
+        noises = dataclasses.replace(base.noises, drifts=small)
         point = point_of(candidate, len(bench.series), base.values(0))
         quiet = looked_at(candidate, bench.series, noises, point)
         free = levelled(quiet, bench.series, {name: units[name]}, FREE_LEVELS)

@@ -187,7 +187,10 @@ def _process_noise(candidate: Candidate, linear: Linear, noises: Noises, period:
 def points_of(
     candidate: Candidate, series: Sequence[Series], outcome: Outcome | None
 ) -> dict[int, tuple[Reals, Reals]]:
-    """Return states and inputs in the middle of the longest stay in each mode, longest first."""
+    """Return states and inputs during the longest stay in each mode, the longest stay first.
+
+    Where the first compared signal is largest: friction is steep near rest alone.
+    """
     predictor = candidate.predictor
     if outcome is None:
         page = candidate.page({}, series[0])
@@ -211,7 +214,15 @@ def points_of(
         for low, high in zip([0, *edges], [*edges, len(modes)], strict=True):
             stay, mode = int(high - low), int(modes[low]) if low < len(modes) else 0
             if stay >= SHORT_STAY and stay > longest.get(mode, (0,))[0]:
-                middle = int(low + high) // 2
-                longest[mode] = (stay, prediction.states[middle].copy(), one.inputs[middle].copy())
+                k = _away(one.measured, int(low), int(high))
+                longest[mode] = (stay, prediction.states[k].copy(), one.inputs[k].copy())
     ordered = sorted(longest.items(), key=lambda item: -item[1][0])
     return {mode: (states, inputs) for mode, (_, states, inputs) in ordered}
+
+
+def _away(measured: Reals, low: int, high: int) -> int:
+    """Return the sample of a stay, not near its ends, at which the first signal is largest."""
+    margin = (high - low) // 5
+    inner = np.abs(measured[low + margin : high - margin, 0])
+    known = np.where(np.isfinite(inner), inner, -1.0)
+    return low + margin + int(np.argmax(known)) if len(known) else (low + high) // 2

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -38,11 +38,15 @@ class Tried:
 
 
 def searched(
-    bench: Bench, base: Estimate, units: Mapping[str, float], tell: Tell = lambda text: None
+    bench: Bench,
+    base: Estimate,
+    units: Mapping[str, float],
+    layers: Iterable[Layer],
+    tell: Tell = lambda text: None,
 ) -> list[Tried]:
-    """Return every candidate that could be laid on the base's layers, best first."""
+    """Return the candidates that could be laid on the base's layers, best first."""
     promised: list[tuple[float, Layer, Candidate, Point]] = []
-    for layer in bench.layers():
+    for layer in layers:
         candidate = _possible(bench, base, layer)
         if candidate is not None:
             reach, point = screened(bench, candidate, base)

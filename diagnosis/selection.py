@@ -15,6 +15,11 @@ from diagnosis.search import Tell, Tried, searched
 
 THRESHOLD = 45.0
 """Nats that an effect must gain both in training and left out; a bootstrap gives a better one."""
+PART = 0.05
+"""A further effect gains at least this part of what the one before it gained: a strong effect is
+never described so well that nothing small is left beside it."""
+NEXT = 9
+"""Candidates that are looked at again beside an accepted one: the best of the round before."""
 MOST_EFFECTS = 3
 CLOSE = 20.0
 """Candidates whose totals differ by less [nats] cannot be told apart by these recordings."""
@@ -56,14 +61,18 @@ def selected(
     model = base
     accepted: list[Tried] = []
     rounds: list[list[Tried]] = []
+    layers = list(bench.layers())
+    needed = threshold
     while len(accepted) < MOST_EFFECTS:
-        tried = searched(bench, model, units, tell)
+        tried = searched(bench, model, units, layers, tell)
         rounds.append(tried)
+        layers = [other.layer for other in tried[1:NEXT] if other.promised > 0.0]
         best = next(iter(tried), None)
         if best is None or best.estimate is None or best.evidence is None:
             break
-        if best.evidence.least <= threshold:
+        if best.evidence.least <= needed:
             break
+        needed = max(threshold, PART * best.evidence.least)
         tell(f"accepted {best.layer.id}: {best.evidence.least:.0f} nats")
         accepted.append(best)
         model = best.estimate

@@ -12,8 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.estimation import Estimate, estimated
-from diagnosis.point import Point
+from diagnosis.estimation import Estimate
 from diagnosis.prediction import predicted
 from diagnosis.series import Series
 from diagnosis.verdict import Misfit
@@ -23,16 +22,6 @@ OBSERVED = 1.0
 """Seconds in which the observer follows."""
 FREE = 1.5
 """Seconds in which the model is alone."""
-
-
-def for_recordings(model: Estimate, series: Sequence[Series]) -> Estimate:
-    """Return a model for other recordings: only what each has of its own is fitted anew."""
-    shared = model.point.shared
-    point = Point(shared, np.tile(shared, (len(series), 1)))
-    own = model.normal is not None and bool(np.any(model.normal.own))
-    return estimated(
-        model.candidate, series, model.noises, point, rounds=5 if own else 0, own_only=True
-    )
 
 
 def misfits(before: Estimate, after: Estimate, series: Sequence[Series]) -> dict[str, Misfit]:
