@@ -39,9 +39,9 @@ CLEARLY_AGAINST = 0.15
 """How much better the reversed signal has to fit: half a period of a sweep looks alike."""
 CLEARER = 0.02
 """How much better than without a lag the correlation has to be, to believe in the lag."""
-LONGEST_PIECE = Fraction(10)
-MOST_SIMULATED = Fraction(40)
-"""Longest piece, and longest time of all, that is simulated for this [s]."""
+LONGEST_PIECE, SHORTEST_PIECE = Fraction(10), Fraction(4)
+MOST_SIMULATED = Fraction(24)
+"""Longest and shortest piece, and longest time of all, that is simulated for this [s]."""
 
 
 @dataclass(frozen=True)
@@ -79,11 +79,12 @@ def relations(
     """Return how the outputs of each piece go with a simulation under the recorded inputs."""
     found: list[Relation] = []
     left = MOST_SIMULATED
+    each = min(LONGEST_PIECE, max(SHORTEST_PIECE, MOST_SIMULATED / max(1, len(recordings))))
     for recording in recordings:
         for piece in pieces(recording):
             if left <= 0:
                 return found
-            part = _thinned(_part(piece, min(LONGEST_PIECE, left)))
+            part = _thinned(_part(piece, each))
             left -= part.end - part.start
             run = free_run(automaton, part, mapping, build)
             for name, compared in run.compared.items():

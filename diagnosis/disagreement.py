@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from statistics import median
 
 from diagnosis.consistency import Relation
@@ -66,7 +67,14 @@ def disagreements(
     rest = [f for findings in own.values() for f in findings if not _has(shared, f)]
     if any(finding.kind != "clock_offset" for finding in shared):
         rest = [finding for finding in rest if finding.kind != "clock_offset"]
-    return [*shared, *rest]
+    return [*shared, *[_weaker(finding) for finding in rest]]
+
+
+def _weaker(finding: Finding) -> Finding:
+    """A clock that is off in some recordings alone may be an actuator that is slow in these."""
+    if finding.kind != "clock_offset":
+        return finding
+    return replace(finding, severity="warning")
 
 
 def _has(findings: Sequence[Finding], like: Finding) -> bool:
@@ -109,6 +117,7 @@ class _Recorded:
     ) -> None:
         self.name = name
         self.mapping = mapping
+        self.relations = relations
         self.gains = {name: median(r.gain for r in rs) for name, rs in relations.items()}
         self.lags = {name: median(r.believed_lag for r in rs) for name, rs in relations.items()}
         self.inputs = [
@@ -175,15 +184,24 @@ class _Recorded:
             return []
         lags = [self.lags[name] for name in odd]
         together = len(odd) == len(self.lags) and max(lags) - min(lags) < SAME_CLOCK
-        found = []
-        for group in [odd] if together else [[name] for name in odd]:
-            channel, called = self._blamed(group) if together else (group[0], f"`{group[0]}`")
-            lag = median(self.lags[name] for name in group)
-            later = (lag > 0.0) == (channel in self.lags)
-            text = f"the clock of {called} is {abs(lag):.2f} s {'late' if later else 'early'}"
-            severity: Severity = "error" if abs(lag) >= OFFSET_ERROR else "warning"
-            found.append(self._tell("clock_offset", channel, text, severity))
-        return found
+        return [
+            self._offset(group, together) for group in ([odd] if together else [[n] for n in odd])
+        ]
+
+    def _offset(self, odd: Sequence[str], together: bool) -> Finding:
+        """Tell whose clock is off; an error if it is so by the same time wherever it is clear."""
+        lag = median(self.lags[name] for name in odd)
+        channel, called = self._blamed(odd) if together else (odd[0], f"`{odd[0]}`")
+        later = (lag > 0.0) == (channel in self.lags)
+        text = f"the clock of {called} is {abs(lag):.2f} s {'late' if later else 'early'}"
+        if together and len(odd) == 1 and self.inputs:
+            text = (
+                f"the clocks of `{odd[0]}` and input `{self.inputs[0]}` are {abs(lag):.2f} s apart"
+            )
+        each = [r.believed_lag for name in odd for r in self.relations[name]]
+        steady = sum(abs(one - lag) <= SAME_CLOCK for one in each) >= MOST * len(each)
+        is_sure = steady and abs(lag) >= OFFSET_ERROR
+        return self._tell("clock_offset", channel, text, "error" if is_sure else "warning")
 
 
 def _varies(recording: Recording, name: str) -> bool:
