@@ -44,6 +44,7 @@ def test_every_command_in_the_readme_exists() -> None:
         "docs/recordings.md",
         "docs/c_code.md",
         "docs/studies.md",
+        "docs/benchmark.md",
     ],
 )
 def test_every_file_that_a_page_names_exists(page: str) -> None:

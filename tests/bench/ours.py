@@ -6,6 +6,7 @@ import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -64,6 +65,7 @@ class Ready:
         return PlannedRun(self.system, scenario, self.programs, library_of)
 
 
+@cache
 def ready(case: Manoeuvre, step: str, every: str | None = None) -> Ready:
     """Return a manoeuvre at a step like `4 ms`; the motor's speed is kept at each of them."""
     w_em, w_w, theta_d, _ = (_digits(value) for value in case.start())

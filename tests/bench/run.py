@@ -20,6 +20,8 @@ from tests.bench.showing import table
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 RESULT = ROOT / "build" / "bench.json"
+PAGE = ROOT / "docs" / "benchmark.md"
+FIGURES = "\n## Figures\n"
 PAIRS = 15
 """Fewest pairs of which a figure counts."""
 
@@ -29,6 +31,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--pairs", type=int, default=PAIRS, help="of each ratio")
     parser.add_argument("--peers", default="", help=f"some of {', '.join(RIVALS)}")
+    parser.add_argument("--page", action="store_true", help=f"write the table into {PAGE.name}")
     parser.add_argument("--out", type=Path, default=RESULT)
     given = parser.parse_args(arguments)
     peers = [name for name in given.peers.split(",") if name]
@@ -48,8 +51,19 @@ def main(arguments: list[str] | None = None) -> int:
     found["rivals"] = {name: rival(name, given.pairs) for name in peers}
     given.out.parent.mkdir(parents=True, exist_ok=True)
     given.out.write_text(json.dumps(found, indent=1) + "\n")
-    print("\n".join(table(found)))
+    lines = table(found)
+    print("\n".join(lines))
+    if given.page:
+        PAGE.write_text(with_figures(PAGE.read_text(), lines))
     return 0
+
+
+def with_figures(page: str, lines: list[str]) -> str:
+    """Return a page whose last part are the figures."""
+    head, mark, _ = page.partition(FIGURES)
+    if not mark:
+        raise ValueError(f"no line {FIGURES.strip()!r} in the page")
+    return "\n".join([head + FIGURES, "```text", *lines, "```", ""])
 
 
 def single_run(pairs: int) -> dict[str, Any]:

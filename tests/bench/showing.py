@@ -47,7 +47,9 @@ def table(found: Figure) -> list[str]:
         lines.append(f"  {name + ' over scipy':36} {said}")
     for name, figure in found["sweep"].items():
         rates = (f"{figure[side + '_variants_per_s']:,.0f}" for side in ("batch", "c"))
-        lines.append(f"  {name}: {figure['variants']} variants, {' and '.join(rates)} a second")
+        lines.append(
+            f"  {name}: {figure['variants']} variants, {' and '.join(rates)} a second of one core"
+        )
         for who, errors in figure["errors"].items():
             late = f"{1e6 * errors['median_late']:.2f}, {1e6 * errors['late']:.0f} us"
             lines.append(f"    {who:6} first contact late: median, largest {late}")

@@ -72,6 +72,14 @@ def test_a_rival_without_its_environment_is_left_out_with_the_reason(
         run.main(["--peers", "diffraks"])
 
 
+def test_the_page_ends_with_the_figures_of_the_last_run() -> None:
+    page = run.PAGE.read_text()
+    once = run.with_figures(page, ["a", "b"])
+    assert once.startswith(page.partition("## Figures")[0])
+    assert once.endswith("## Figures\n\n```text\na\nb\n```\n")
+    assert run.with_figures(once, ["c"]) == run.with_figures(page, ["c"])
+
+
 def test_a_ratio_is_the_median_of_pairs_with_its_quartiles() -> None:
     assert timing.quartiles([3.0, 1.0, 2.0, 5.0, 4.0]) == (2.0, 3.0, 4.0)
     assert timing.quartiles([7.0]) == (7.0, 7.0, 7.0)
