@@ -18,10 +18,12 @@ if TYPE_CHECKING:
     from lockstep.compare import Verdict
     from modewright.api import Loaded, Replayed, check, generate, load, lockstep, replay, simulate
     from modewright.diagram import Diagram, graph
+    from modewright.recordings import CheckedRecordings, check_recordings
     from modewright.runs import compare, plot, read, save
     from modewright.studies import study_pictures, study_summary, sweep
 
 __all__ = [
+    "CheckedRecordings",
     "Diagram",
     "Event",
     "Loaded",
@@ -33,6 +35,7 @@ __all__ = [
     "Trajectory",
     "Verdict",
     "check",
+    "check_recordings",
     "compare",
     "generate",
     "graph",
@@ -50,6 +53,7 @@ __all__ = [
 ]
 
 PLACES = {
+    "CheckedRecordings": "modewright.recordings",
     "Diagram": "modewright.diagram",
     "Event": "engine.trajectory",
     "Picture": "engine.plot",
@@ -62,6 +66,7 @@ PLACES = {
     "plot": "modewright.runs",
     "read": "modewright.runs",
     "check": "modewright.checking",
+    "check_recordings": "modewright.recordings",
     "graph": "modewright.diagram",
     "render_all": "language.problem",
     "save": "modewright.runs",

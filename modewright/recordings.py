@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from diagnosis.guessed_map import guessed_map
-from diagnosis.recording_check import RecordingCheck, check_recordings
+from diagnosis.recording_check import RecordingCheck, check_recordings as checked
 from engine.recording import Recording, read_recording
 from language.experiment import RecordingMap
 from language.load import automaton_of
@@ -37,7 +37,7 @@ class CheckedRecordings:
         return recording_picture(self.recordings, self.check, title or names)
 
 
-def check_files(
+def check_recordings(
     files: Sequence[str | Path],
     map: str | None = None,
     spec: str | None = None,
@@ -64,7 +64,7 @@ def check_files(
         mapping = guessed_map(Path(files[0]), databases)
     used = _used(mapping, automaton)
     recordings = tuple(read_recording(Path(file), mapping, used) for file in files)
-    return CheckedRecordings(check_recordings(recordings, mapping, automaton), mapping, recordings)
+    return CheckedRecordings(checked(recordings, mapping, automaton), mapping, recordings)
 
 
 def _automaton(spec: str, project: Project) -> Automaton:

@@ -47,11 +47,11 @@ def check(
     Exit code 1 if something makes a verdict about physics worthless.
     """
     from modewright import show, show_recording
-    from modewright.recordings import check_files
+    from modewright.recordings import check_recordings
 
     require_writable(plot)
     with working(f"looking at {counted(len(files), 'recording')}"):
-        checked = check_files(files, mapping, spec, databases or ())
+        checked = check_recordings(files, mapping, spec, databases or ())
     if plot:
         title = ", ".join(file.name for file in files) + (f" against {spec}" if spec else "")
         write_files({plot: checked.plot(title).data(graphic_format(plot))})

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import modewright as mw
 from diagnosis.free_run import FreeRun, free_run
 from engine.recording import pieces, read_recording
 from language.experiment import RecordingMap
@@ -107,3 +108,23 @@ def test_on_a_flat_road_the_i3_is_missed_by_some_km_per_h(recordings: Path) -> N
     missed = [run.compared["velocity_kmh"].rms * 3.6 for run in found]
     assert len(found) == 24
     assert 4.0 < np.median(missed) < 9.0
+
+
+@pytest.mark.recordings
+@pytest.mark.parametrize(
+    ("name", "files", "step", "rate"),
+    [
+        ("leaf_motor_side", ["nissan_leaf/drive_eco.csv", "nissan_leaf/drive_2.csv"], 0.5, 100),
+        ("emps", ["emps/emps.csv.gz"], 0.0, 1000),
+        ("brfd_damper", ["brfd_damper/sine_0.5Hz_36lb_0.5in_1024Hz.csv.gz"], 0.0, 1024),
+        ("bmw_i3", ["bmw_i3/trip_a11.csv.gz"], 0.01, 10),
+    ],
+)
+def test_real_recordings_are_taken_for_what_they_are(
+    recordings: Path, name: str, files: list[str], step: float, rate: float
+) -> None:
+    found = mw.check_recordings([recordings / file for file in files], spec=name).check
+    assert found.is_usable, found.findings
+    torque = found.channels[-1 if name in ("emps", "brfd_damper") else 0]
+    assert torque.quantum / torque.factor == pytest.approx(step, abs=1e-9)
+    assert torque.rate == pytest.approx(rate, rel=1e-3)
