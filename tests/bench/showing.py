@@ -53,6 +53,9 @@ def table(found: Figure) -> list[str]:
         for who, errors in figure["errors"].items():
             late = f"{1e6 * errors['median_late']:.2f}, {1e6 * errors['late']:.0f} us"
             lines.append(f"    {who:6} first contact late: median, largest {late}")
+    first = found["first_step"]
+    took = f"{first['total_s']:.2f} s, {first['compiler_s']:.2f} s of them the compiler's"
+    lines.append(f"  specs to the end of a first compiled run, nothing kept before: {took}")
     lines += ["", "errors: events late [us], w_em over its peak (root mean square, largest)"]
     for name, figure in found["single_run"].items():
         for who, errors in figure.get("errors", {}).items():

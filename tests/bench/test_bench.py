@@ -37,6 +37,7 @@ def test_a_small_run_has_every_figure_with_its_errors(
     monkeypatch.setattr(ours, "library_of", partial(library_of, flags=optimised("O0")))
     monkeypatch.setattr(variants, "library_of", partial(library_of, flags=optimised("O0")))
     monkeypatch.setattr(timing, "SHORTEST", 0.0)
+    monkeypatch.setattr(run, "first_step", lambda: {"total_s": 1.0, "compiler_s": 0.5})
     path = tmp_path / "bench.json"
     assert run.main(["--pairs", "1", "--out", str(path)]) == 0
     found = json.loads(path.read_text())
