@@ -18,9 +18,10 @@ from diagnosis.uncertain import Uncertain, uncertain_of
 from language.declaration import Formula, Parameter
 from language.document import Document
 from language.effect import own_names
+from language.memory import applications
 from language.model import Automaton
 from language.project import Project
-from language.syntax import Name
+from language.syntax import Name, names
 
 Reals = NDArray[np.float64]
 START = "start_of_{}"
@@ -113,9 +114,17 @@ def _compiled(
         uncertain,
         tuple(layer.named(DRIFT) for layer in drifts),
         tuple(float(made.parameters[layer.named("memory")].value or 1) for layer in drifts),
+        _delays(made),
     )
     with built(program, columns) as library:
         return recipe, library.read_bytes()
+
+
+def _delays(made: Automaton) -> tuple[str, ...]:
+    """Return the uncertain parameters that are the time of a `delay`."""
+    times = [tree.arguments[1] for tree in applications(made, ("delay",)).values()]
+    read = {part.path for time in times for part in names(time)}
+    return tuple(name for name in made.parameters if name in read)
 
 
 def _with_starts(given: Automaton, seen: Sequence[str]) -> Automaton:

@@ -139,8 +139,12 @@ def gains_of(
     noises: Noises,
     outcome: Outcome | None = None,
 ) -> Gains:
-    """Return the gains of a candidate at `values`, near where `outcome` saw each mode."""
-    page = candidate.page(values, series[0])
+    """Return the gains of a candidate at `values`, near where `outcome` saw each mode.
+
+    Delays are left out of them: what is shown late would seem to know nothing of the states.
+    """
+    prompt = dict.fromkeys(candidate.recipe.delays, 0.0)
+    page = candidate.page({**values, **prompt}, series[0])
     period = float(series[0].period)
     count = max(1, round(BURN_IN / period))
     modes = candidate.predictor.modes

@@ -30,7 +30,8 @@ from language.document import Items, Node, Scalar, Table
 @dataclass(frozen=True)
 class Recipe:
     """A candidate but for its library: `columns` of its arrays, `substeps` of a sample, `spans` of
-    its states, `uncertain` parameters, `drifts` (states) and their `memories` [s].
+    its states, `uncertain` parameters, `drifts` (states) and their `memories` [s]; `delays` are
+    parameters that are one.
     """
 
     columns: Columns
@@ -39,6 +40,7 @@ class Recipe:
     uncertain: tuple[Uncertain, ...]
     drifts: tuple[str, ...]
     memories: tuple[float, ...]
+    delays: tuple[str, ...] = ()
 
 
 def recipe_key(*parts: str) -> str:
@@ -113,6 +115,7 @@ def _recipe(known: dict[str, Any]) -> Recipe:
         uncertain,
         tuple(known["drifts"]),
         tuple(known["memories"]),
+        tuple(known["delays"]),
     )
 
 
