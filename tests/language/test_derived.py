@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from engine.interpreter import Interpreter
-from language.load import program_of
+from language.load import lowered, program_of
 from language.program import Program
 from tests.language.making import program, project_of, shipped, solved, told
 
@@ -93,7 +93,7 @@ def test_a_measured_equation_is_read_with_what_remains_of_it(tmp_path: Path) -> 
 
 
 def test_the_estimator_has_the_numbers_of_the_written_one() -> None:
-    taken, written = (program_of(shipped(n)) for n in ("estimator", "estimator_written"))
+    taken, written = (lowered(shipped(n)) for n in ("estimator", "estimator_written"))
     ours, theirs = (
         {k: v for k, v in solved(p).items() if "_lin" not in k} for p in (taken, written)
     )

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.linalg import expm, solve_discrete_are
 
 from engine.interpreter import Interpreter
-from language.load import automaton_of, program_of
+from language.load import automaton_of, lowered
 from language.program import Program
 from language.project import read_document
 from tests.language.making import ROOT, program, project_of, solved, stepper
@@ -49,7 +49,7 @@ def at_rate(
         folder = tmp_path_factory.mktemp(rate)
         project = project_of(folder, other=VARIANT.format(base=request.param, period=period))
         document = read_document(project.path_of("other_rate"))
-        made[rate] = program_of(automaton_of(document, project))
+        made[rate] = lowered(automaton_of(document, project))
     return made
 
 
