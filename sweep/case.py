@@ -39,9 +39,22 @@ def case_of(study: Study, point: Point) -> Case:
         if all(_is_parameter(kind.system, name) for name in names):
             found = _value(setting.formula, point.values, values, kind.system)
             values.update(dict.fromkeys(setting.targets, found))
+    values = {target: value for target, value in values.items() if _has(kind.system, target)}
     changed = tuple((t, v) for t, v in values.items() if t.kind not in ("parameter", "initial"))
     seed = point.seed(scenario.seed, study.replicates)
     return Case(point, values, seed, _refusal(kind, values), changed)
+
+
+def _has(system: System, target: Target) -> bool:
+    """Tell whether a system has a place: of several variants, one may lack what others have."""
+    owner = target.path[0]
+    if target.kind in ("input", "sensor"):
+        return owner in (system.inputs if target.kind == "input" else system.sensors)
+    if owner not in system.instances:
+        return False
+    automaton = system.instances[owner].automaton
+    known = {"parameter": automaton.parameters, "initial": automaton.states}
+    return target.kind == "clock" or target.path[1] in known[target.kind]
 
 
 def _is_parameter(system: System, name: str) -> bool:

@@ -15,7 +15,9 @@ from sweep.study import Presentation, Study
 
 MANIFEST = "study.json"
 MOST_BLOCKS = 100
+FEWEST_BLOCKS = 8
 MOST_IN_BLOCK = 5000
+LEAST_IN_BATCH = 200
 
 
 @dataclass(frozen=True)
@@ -40,19 +42,34 @@ class Manifest:
 
 
 def manifest_of(study: Study, block: int | None = None) -> Manifest:
-    """Return the manifest of a prepared study; about 100 blocks unless a size is given."""
-    size = min(MOST_IN_BLOCK, max(1, -(-study.count // MOST_BLOCKS)))
+    """Return the manifest of a prepared study, in blocks of a size that suits it or is given."""
     return Manifest(
         study=study.name,
         digest=digest_of(study.identity),
         identity=study.identity,
         count=study.count,
-        block=block or size,
+        block=block or block_size(study),
         varied=tuple(Column(varied.name, "real", varied.unit) for varied in study.varied),
         words={varied.name: varied.words for varied in study.varied if varied.words},
         measures=tuple(column for measure in study.measures for column in columns_of(measure)),
         presentation=study.presentation,
     )
+
+
+def block_size(study: Study) -> int:
+    """Return how many variants are computed and kept at once: about a hundred blocks.
+
+    What goes through one batch is prepared once a block: such blocks are larger, if there are some
+    for every worker.
+    """
+    places = [target for varied in study.varied for target in varied.targets]
+    places += [target for setting in study.settings for target in setting.targets]
+    is_batch = all(
+        place.kind in ("parameter", "initial", "input") and not place.is_input_time
+        for place in places
+    )
+    least = min(LEAST_IN_BATCH, -(-study.count // FEWEST_BLOCKS)) if is_batch else 1
+    return min(MOST_IN_BLOCK, max(least, -(-study.count // MOST_BLOCKS)))
 
 
 def manifest_json(manifest: Manifest) -> bytes:

@@ -125,7 +125,7 @@ def _parallel(table: Table, plot: Mapping[str, Any]) -> Figure:
     kept = np.flatnonzero(~np.any(np.isnan(columns), axis=0))
     step = max(1, -(-len(kept) // MOST_LINES))
     columns = columns[:, kept[::step]]
-    figure = Figure(figsize=(max(6.0, 1.5 * len(names)), 5.0), layout="constrained")
+    figure = Figure(figsize=(min(18.0, max(6.0, 1.5 * len(names))), 5.0), layout="constrained")
     axis = figure.subplots()
     low, high = _ends(columns)
     share = (columns - low[:, None]) / (high - low)[:, None]

@@ -15,7 +15,7 @@ from language.problem import Problems, Span, nearest
 from language.project import Project, expanded, read_document
 from language.reader import TEXT_KEYS, Reader
 from language.scenario import read_scenario
-from language.system import Overrides, read_system
+from language.system import Overrides, around, read_system
 from language.tree import put
 from language.units import SECOND, fits
 from sweep.measure import Measure, SignalMeasure
@@ -61,6 +61,7 @@ class _StudyReader(Reader):
         self.project = project
         self.overrides = overrides
         self.identity: dict[str, str] = {}
+        self.alone = ""  # an automaton alone is called like the first in all variants
 
     def read(self, document: Document) -> Study:
         tree = self.table(document.root, f"study {document.name}", STUDY_KEYS)
@@ -155,7 +156,12 @@ class _StudyReader(Reader):
         plain = _plain(expanded(document, self.project).root, TEXT_KEYS)
         overrides = {key: scalar.text for key, scalar in self.overrides.items()}
         self.identity[f"system of variant `{name}`"] = _digest([plain, overrides])
-        return read_system(document, self.project, self.overrides)
+        system = read_system(document, self.project, self.overrides)
+        if not system.alone:
+            return system
+        self.alone = self.alone or system.alone
+        only = system.instances[system.alone].automaton
+        return around(dataclasses.replace(only, name=self.alone))
 
     def _scenarios(self, tree: Table, at: Span) -> dict[str, Document]:
         found: dict[str, Document] = {}
@@ -186,7 +192,7 @@ class _StudyReader(Reader):
         for system in systems.values():
             for scenario in scenarios:
                 here = places_of(system, [scenario])
-                found = here if found is None else {n: p for n, p in found.items() if n in here}
+                found = here if found is None else _common(found, here)
         return found or {}
 
     def _every(self, tree: Table) -> Fraction | None:
@@ -198,6 +204,16 @@ class _StudyReader(Reader):
             self.problems.error("range", node.span, "`every` is a time above zero, like `1 ms`")
             return None
         return value
+
+
+def _common(first: Mapping[str, Place], other: Mapping[str, Place]) -> dict[str, Place]:
+    """Return the places that both have, each with the targets of both."""
+    found = {}
+    for name, place in first.items():
+        if name in other:
+            targets = dict.fromkeys((*place.targets, *other[name].targets))
+            found[name] = dataclasses.replace(place, targets=tuple(targets))
+    return found
 
 
 def _are_inputs(varied: tuple[Varied, ...], settings: tuple[Setting, ...]) -> bool:

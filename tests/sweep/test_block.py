@@ -94,3 +94,21 @@ def test_a_variant_with_many_events_keeps_all_of_them() -> None:
     undamped = ("[0.1 1/s, 0.2 1/s, 0.4 1/s]", "[0 1/s]")
     row = block_rows(study("grid", fast, undamped), Block(0, 1), run_variants)[0]
     assert row.measures["falls"] == pytest.approx(4.0 * 49.0 / (2.0 * np.pi), abs=1.0)
+
+
+def test_variants_are_systems_or_automata_in_place_of_others() -> None:
+    names = ("of: oscillator", "of: oscillator\nvariants: [oscillator, stiff]")
+    made = study("alone", names, ("  w: [1 rad/s, 3 rad/s]\n", ""))
+    rows = block_rows(made, Block(0, made.count), run_variants)
+    assert [row.variant for row in rows] == ["oscillator"] * 3 + ["stiff"] * 3
+    for row, name in ((rows[0], "oscillator"), (rows[3], "stiff")):
+        run = mw.simulate(name, "swing", root=STUDIES)
+        assert row.measures["falls"] == len(events(run, name, "below"))
+        assert row.measures["final"] == run.signals[f"{name}.x"][-1]
+    inner = ("of: measured", "of: measured\nvariants: {plain: {}, hard: {plant: stiff}}")
+    own = ("set: {w: turns * 6.25 rad/s, initial", "set: {initial")
+    made = study("seen", inner, own)
+    assert [kind.name for kind in made.kinds] == ["plain", "hard"]
+    assert made.kinds[1].system.instances["plant"].automaton.parameters["w"].value == 4
+    last = block_rows(made, Block(made.count - 1, made.count), run_variants)[0]
+    assert (last.variant, last.status) == ("hard", "done")
