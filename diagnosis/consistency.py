@@ -18,6 +18,7 @@ from diagnosis.free_run import Compared, free_run
 from engine.interpreter import Interpreter, Stepper
 from engine.recording import Channel, Recording, cut, pieces
 from language.experiment import RecordingMap
+from language.load import program_of
 from language.model import Automaton
 from language.program import Program
 
@@ -39,6 +40,8 @@ CLEARLY_AGAINST = 0.15
 """How much better the reversed signal has to fit: half a period of a sweep looks alike."""
 CLEARER = 0.02
 """How much better than without a lag the correlation has to be, to believe in the lag."""
+LONGEST_STEP, STABLE = 0.004, 3.0
+"""Longest major step [s], and how far it stays below the largest stable one."""
 LONGEST_PIECE, SHORTEST_PIECE = Fraction(10), Fraction(4)
 MOST_SIMULATED = Fraction(24)
 """Longest and shortest piece, and longest time of all, that is simulated for this [s]."""
@@ -79,6 +82,7 @@ def relations(
     """Return how the outputs of each piece go with a simulation under the recorded inputs."""
     found: list[Relation] = []
     left = MOST_SIMULATED
+    automaton = _coarse(automaton)
     each = min(LONGEST_PIECE, max(SHORTEST_PIECE, MOST_SIMULATED / max(1, len(recordings))))
     for recording in recordings:
         for piece in pieces(recording):
@@ -92,6 +96,18 @@ def relations(
                 if relation:
                     found.append(relation)
     return found
+
+
+def _coarse(automaton: Automaton) -> Automaton:
+    """Return an automaton with as long a major step as is stable and sees motion of 4 Hz."""
+    motion = program_of(automaton).motion
+    limits = [limit.step for limit in motion.limits] if motion else []
+    if not limits:
+        return automaton
+    most = min(LONGEST_STEP, min(limits) / STABLE)
+    return dataclasses.replace(
+        automaton, step=max(automaton.step, Fraction(round(most * 1e6), 10**6))
+    )
 
 
 def _part(piece: Recording, longest: Fraction) -> Recording:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -26,7 +27,26 @@ class Finding:
     window: tuple[float, float] | None = None
 
 
-def by_severity(findings: list[Finding]) -> tuple[Finding, ...]:
+def by_severity(findings: Sequence[Finding]) -> tuple[Finding, ...]:
     """Return findings without repetitions, the worst first."""
     unique = dict.fromkeys(findings)
     return tuple(sorted(unique, key=lambda finding: ORDER.index(finding.severity)))
+
+
+def told(findings: Sequence[Finding]) -> list[tuple[Severity, str]]:
+    """Return findings as lines, those of one kind together, the worst first."""
+    groups: dict[tuple[Severity, str], list[Finding]] = {}
+    for finding in by_severity(findings):
+        groups.setdefault((finding.severity, finding.kind), []).append(finding)
+    return [(severity, _line(group)) for (severity, _), group in groups.items()]
+
+
+def _line(group: Sequence[Finding]) -> str:
+    first = group[0]
+    channels = ", ".join(f"`{name}`" for name in dict.fromkeys(f.channel for f in group) if name)
+    files = ", ".join(name for name in dict.fromkeys(f.recording for f in group) if name)
+    if "`" in first.text:  # it names the channel itself
+        more = f", and {len(group) - 1} more like that" if len(group) > 1 else ""
+        return first.text + more + (f" ({files})" if files else "")
+    channels += f" ({files})" if files and channels else files
+    return f"{channels}: {first.text}" if channels else first.text

@@ -13,11 +13,12 @@ from scipy.signal import welch
 
 from diagnosis.channel_check import ChannelCheck
 from diagnosis.excitation import Excitation, SignalExcitation
+from diagnosis.finding import told
 from diagnosis.recording_check import RecordingCheck
 from engine.band import PALETTE
 from engine.plot import Picture
 from engine.recording import Channel, Recording
-from language.text import visible
+from language.text import shortened, visible
 
 Values = NDArray[np.float64]
 
@@ -26,10 +27,11 @@ MOST_CHANNELS = 6
 MOST_POINTS = 4000
 """Most points of a curve; beyond, the smallest and largest of each stretch are drawn."""
 MOST_FINDINGS = 5
+LONGEST_LINE = 200
 BLUE, RED, GREEN, YELLOW, _, PURPLE, GREY = PALETTE
 PALE = "#d8d8d8"
 SIGNS = {"error": "\N{BLACK CIRCLE}", "warning": "\N{BLACK UP-POINTING TRIANGLE}", "note": "-"}
-COLOURS = {"error": RED, "warning": "#b58900", "note": GREY}
+COLOURS = {"error": "#cc3344", "warning": "#b58900", "note": GREY}
 
 
 def recording_picture(
@@ -37,12 +39,12 @@ def recording_picture(
 ) -> Picture:
     """Return the picture of checked recordings, one after another on the left."""
     names = list(dict.fromkeys(one.name for one in check.channels))[:MOST_CHANNELS]
-    told = check.findings[:MOST_FINDINGS]
-    height = 1.6 + 1.25 * max(len(names), 5) + 0.24 * max(1, len(told))
+    count = max(1, len(told(check.findings)[:MOST_FINDINGS]))
+    height = 1.6 + 1.25 * max(len(names), 5) + 0.24 * count
     figure = Figure(figsize=(13.5, height), layout="constrained")
     figure.suptitle(visible(title), x=0.01, ha="left", fontsize=13, fontweight="bold")
     grid = figure.add_gridspec(
-        2, 2, width_ratios=(1.9, 1.0), height_ratios=(height, 0.24 * max(1, len(told)) + 0.1)
+        2, 2, width_ratios=(1.9, 1.0), height_ratios=(height, 0.24 * count + 0.1)
     )
     _channels(figure, grid[0, 0], recordings, check, names)
     right = grid[0, 1].subgridspec(3, 1, height_ratios=(1.15, 0.9, 1.45))
@@ -218,17 +220,17 @@ def _effects(axis: Axes, excited: Excitation) -> None:
 
 def _findings(axis: Axes, check: RecordingCheck) -> None:
     axis.axis("off")
-    told = check.findings[:MOST_FINDINGS]
-    if not told:
+    lines = told(check.findings)
+    if not lines:
         axis.text(0.0, 0.5, "nothing odd was found in these data", color=GREEN, fontsize=10,
                   va="center", transform=axis.transAxes)  # fmt: skip
-    for k, finding in enumerate(told):
-        where = " ".join(part for part in (finding.recording, finding.channel) if part)
-        rest = len(check.findings) - len(told)
-        more = f"   (and {rest} more)" if rest and k == len(told) - 1 else ""
-        text = f"{SIGNS[finding.severity]} {where}: {finding.text}{more}"
-        axis.text(0.0, 1.0 - (k + 0.5) / len(told), visible(text), fontsize=9, va="center",
-                  color=COLOURS[finding.severity], transform=axis.transAxes,
+    shown = lines[:MOST_FINDINGS]
+    for k, (severity, line) in enumerate(shown):
+        rest = len(lines) - len(shown)
+        more = f"   (and {rest} more)" if rest and k == len(shown) - 1 else ""
+        text = visible(shortened(f"{SIGNS[severity]} {line}{more}", LONGEST_LINE))
+        axis.text(0.0, 1.0 - (k + 0.5) / len(shown), text, fontsize=9, va="center",
+                  color=COLOURS[severity], transform=axis.transAxes,
                   parse_math=False)  # fmt: skip
 
 

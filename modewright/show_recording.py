@@ -13,7 +13,7 @@ from rich.table import Table
 
 from diagnosis.channel_check import ChannelCheck
 from diagnosis.excitation import Excitation
-from diagnosis.finding import Finding
+from diagnosis.finding import told
 from diagnosis.recording_check import RecordingCheck
 
 STYLES = {"error": "red", "warning": "yellow", "note": "dim"}
@@ -29,13 +29,8 @@ def print_check(screen: Console, check: RecordingCheck) -> None:
         screen.print("\n[green]nothing odd was found in these data[/]")
     else:
         screen.print()
-    for group in _grouped(check.findings):
-        first = group[0]
-        channels = ", ".join(f"`{c}`" for c in dict.fromkeys(f.channel for f in group if f.channel))
-        files = ", ".join(dict.fromkeys(f.recording for f in group if f.recording))
-        where = " of ".join(part for part in (channels, files) if part)
-        text = escape(f"{where}: {first.text}" if where else first.text)
-        screen.print(f"[{STYLES[first.severity]}]{first.severity}[/]: {text}", highlight=False)
+    for severity, line in told(check.findings):
+        screen.print(f"[{STYLES[severity]}]{severity}[/]: {escape(line)}", highlight=False)
 
 
 def channel_table(channels: Sequence[ChannelCheck]) -> Table:
@@ -77,14 +72,6 @@ def _print_excitation(screen: Console, excited: Excitation) -> None:
             unable.setdefault(" and ".join(effect.lacking), []).append(effect.effect)
     for lacking, effects in unable.items():
         screen.print(f"not {', '.join(effects)}: needs {lacking}", highlight=False)
-
-
-def _grouped(findings: Sequence[Finding]) -> list[list[Finding]]:
-    """Return findings of one kind and severity together, the worst first."""
-    groups: dict[tuple[str, str], list[Finding]] = {}
-    for finding in findings:
-        groups.setdefault((finding.severity, finding.kind), []).append(finding)
-    return list(groups.values())
 
 
 def check_json(check: RecordingCheck) -> dict[str, Any]:

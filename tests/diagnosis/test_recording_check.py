@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from diagnosis.excitation import EFFECTS, NEEDS
+from diagnosis.finding import told
 from diagnosis.recording_check import RecordingCheck, check_recordings
 from engine.recording import Recording
 from language.project import Project
@@ -32,7 +33,7 @@ def check(*recordings: Recording) -> RecordingCheck:
     return check_recordings(recordings, bench(), driveline())
 
 
-def told(found: RecordingCheck) -> set[tuple[str, str, str]]:
+def seen(found: RecordingCheck) -> set[tuple[str, str, str]]:
     return {(one.severity, one.kind, one.channel) for one in found.findings}
 
 
@@ -69,7 +70,7 @@ def test_a_spoiled_channel_is_named_and_nothing_else(
     spoil: Spoil, expected: tuple[str, str, str]
 ) -> None:
     found = check(spoiled(spoil))
-    assert told(found) == {expected}
+    assert seen(found) == {expected}
     assert not found.is_usable
 
 
@@ -107,12 +108,21 @@ def held(times: Values, values: dict[str, Values]) -> None:
 def test_lost_samples_are_counted() -> None:
     found = check(spoiled(lost))
     assert all(c.dropped == pytest.approx(0.2, abs=0.03) for c in found.channels)
-    assert ("error", "dropped", "motor") in told(found)
+    assert ("error", "dropped", "motor") in seen(found)
 
 
 def test_samples_that_were_held_instead_of_lost_are_seen() -> None:
     found = check(spoiled(held))
-    assert ("error", "repeated", "motor") in told(found)
+    assert ("error", "repeated", "motor") in seen(found)
+
+
+def test_findings_of_one_kind_are_one_line() -> None:
+    found = check(spoiled(lost, "a"), spoiled(lost, "b"))
+    assert told(found.findings) == [
+        ("error", "`torque`, `brake`, `motor`, `wheel` (a, b): 20% of its samples are missing")
+    ]
+    (line,) = told(check(spoiled(scaled("wheel", -1.0))).findings)
+    assert line[1].startswith("`wheel` has the wrong sign") and line[1].endswith(" (tip_in)")
 
 
 def test_a_long_gap_is_told_with_its_place() -> None:
@@ -129,14 +139,14 @@ def test_a_clipped_and_a_stuck_signal_are_seen() -> None:
         values["torque"] = np.minimum(values["torque"], 60.0)
         values["wheel"][300:360] = values["wheel"][300]
 
-    found = told(check(spoiled(limit)))
+    found = seen(check(spoiled(limit)))
     assert {("warning", "clipped", "torque"), ("warning", "stuck", "wheel")} <= found
 
 
 def test_a_short_recording_and_a_still_one_tell_nothing_apart() -> None:
-    assert ("error", "too_short", "") in told(check(shortened(spoiled(), 1)))
+    assert ("error", "too_short", "") in seen(check(shortened(spoiled(), 1)))
     times, values = tip_in(constant=True)
-    assert ("error", "no_excitation", "") in told(check(recording_of("still", times, values)))
+    assert ("error", "no_excitation", "") in seen(check(recording_of("still", times, values)))
 
 
 def test_what_is_excited_says_which_effects_can_be_tested() -> None:
