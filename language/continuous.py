@@ -17,57 +17,45 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Collection
 
-from language.action import discrete_variables, first_entry
-from language.constants import derive_block, parameter_constants, values_of
+from language.action import discrete_variables
+from language.constants import parameter_constants, values_of
 from language.field import (
     Field,
-    at_state,
-    at_time,
-    by_mode,
-    entered,
     field_blocks,
     field_variables,
     switch,
 )
 from language.history import (
     AGE,
-    History,
     alarm_names,
     alarms_of,
     delayed,
-    fill_block,
     histories_of,
     history_variables,
-    record_block,
 )
 from language.integration import method_of
 from language.invariant import INVARIANTS, invariant_block, invariant_variables
 from language.linear import Point
-from language.lower import Names, equation_names, equations, variable_names
+from language.lower import Names, equations, variable_names
 from language.model import Automaton, Mode, Transition
-from language.motion import FLOW_HALVINGS, motion_blocks, motion_variables
+from language.motion import FLOW_HALVINGS, Method, motion_blocks, motion_variables
 from language.operation import (
     Assign,
     Binary,
     Block,
-    Branch,
-    Choose,
     Expr,
-    Loop,
     Ref,
     Run,
-    Unary,
-    Value,
     add,
     multiply,
-    real,
     whole,
 )
 from language.parallel import Selection, parallel_blocks, parallel_step
 from language.parameter import constant_names
+from language.part import parts_block
 from language.problem import Problems
 from language.program import Program, TransitionInfo, Variable, fired_variable
-from language.region import in_modes, slots
+from language.region import in_modes
 from language.stepping import (
     BETWEEN,
     LIVELOCK,
@@ -82,15 +70,12 @@ from language.stepping import (
     waits_of,
 )
 from language.transition import infos_of, transition_infos
-from language.turning import edge_names, forgotten, level_variables, settled
+from language.turning import edge_names, forgotten, level_variables
 from language.wiring import (
     assembled,
-    enter_initial,
     finished,
-    initial_ops,
     input_variables,
     mode_and_fired,
-    none_fired,
     state_variables,
 )
 
@@ -121,62 +106,77 @@ def continuous_program(
     """
     parameters = parameter_constants(automaton, problems)
     transitions = transition_infos(automaton, problems)
-    variables_known = variable_names(automaton, "before")
-    inputs = {name: variables_known[name] for name in automaton.inputs}
+    histories, alarms = histories_of(automaton), alarms_of(automaton)
     known = {
         **constant_names(automaton),
-        **variables_known,
+        **variable_names(automaton, "before"),
         **in_modes(automaton, "memory.mode"),
+        **delayed(automaton, histories),
     }
-    histories = histories_of(automaton)
-    known.update(delayed(automaton, histories))
-    moving = {**inputs, **{name: _parabola(name) for name in varying}}
-    field = Field(
-        automaton,
-        known,
-        moving,
-        "memory.mode",
-        f"{automaton.name} ",
-        bool(varying or histories),
-        _remembered(automaton),
-    )
+    field = _field(automaton, known, varying, bool(histories))
     flows = field_blocks(field)
     point = Point(automaton, values_of(parameters), {})
     method, info = method_of(
         automaton.method, field, flows, point, automaton.step, automaton.span, problems
     )
-    armed = {slot: f"memory.armed_{slot}" for slot in field.slots}
-    alarms = alarms_of(automaton)
     waits = waits_of(transitions, alarms)
-    selection = _selection(automaton, transitions, waits)
-    halvings = FLOW_HALVINGS[automaton.numbers]
     blocks = {
         **flows,
-        **method.blocks,
-        **motion_blocks(
-            field, method, Ref("work.merge"), halvings, lambda mode: armed, Ref("work.is_wait")
-        ),
+        **_motion(field, method),
         **stepping_blocks(field, waits, (AGE.name,) if histories else ()),
+        **_in_modes(field, known, transitions, _selection(automaton, transitions, waits)),
+        **invariant_block(automaton, known),
+        **parts_block(field, known, waits, histories),
     }
-    for mode in automaton.modes.values():
-        ops = equations(mode, dict(known), "equation.", field.prefix)
-        blocks[f"equations_{mode.name}"] = tuple(ops)
-        blocks[f"jump_{mode.name}"] = _jump(field, mode, transitions, selection)
-    if automaton.regions:
-        blocks.update(parallel_blocks(field, selection))
-    blocks.update(invariant_block(automaton, known))
-    blocks.update(_entries(field, known, waits, histories))
     problems.stop_if_any()
-    constants = (*parameters.values(), *method.constants)
     variables = [*_variables(automaton, field), *stepping_variables(field, waits)]
     variables += motion_variables(field, method)
     variables += [Variable(name, "real") for name in _courses(varying)]
     variables += history_variables(histories)
     variables += [Variable(alarm.variable, "truth") for alarm in alarms]
+    constants = (*parameters.values(), *method.constants)
     program = assembled(automaton, blocks, constants, variables, transitions)
     program = dataclasses.replace(program, motion=info, faults=(ZENO, LIVELOCK))
     entries = (*(ENTRIES if not varying else ENTRIES[:2]), *PARTS)
     return finished(program, entries, keep=(*BETWEEN, *_courses(varying)))
+
+
+def _field(
+    automaton: Automaton, known: Names, varying: Collection[str], has_history: bool
+) -> Field:
+    held = {name: known[name] for name in automaton.inputs}
+    return Field(
+        automaton,
+        known,
+        {**held, **{name: _parabola(name) for name in varying}},
+        "memory.mode",
+        f"{automaton.name} ",
+        bool(varying or has_history),
+        _remembered(automaton),
+    )
+
+
+def _motion(field: Field, method: Method) -> dict[str, Block]:
+    """The flow of each mode up to the first change of a guard, by the method's steps."""
+    armed = {slot: f"memory.armed_{slot}" for slot in field.slots}
+    halvings = FLOW_HALVINGS[field.automaton.numbers]
+    merge, is_wait = Ref("work.merge"), Ref("work.is_wait")
+    moves = motion_blocks(field, method, merge, halvings, lambda mode: armed, is_wait)
+    return {**method.blocks, **moves}
+
+
+def _in_modes(
+    field: Field, known: Names, infos: tuple[TransitionInfo, ...], selection: Selection
+) -> dict[str, Block]:
+    """What each mode evaluates, and where it goes."""
+    blocks: dict[str, Block] = {}
+    for mode in field.automaton.modes.values():
+        ops = equations(mode, dict(known), "equation.", field.prefix)
+        blocks[f"equations_{mode.name}"] = tuple(ops)
+        blocks[f"jump_{mode.name}"] = _jump(field, mode, infos, selection)
+    if field.automaton.regions:
+        blocks.update(parallel_blocks(field, selection))
+    return blocks
 
 
 def _parabola(name: str) -> Expr:
@@ -245,64 +245,6 @@ def _jump(
             *selection.moved(transition),
         )
     return (guards, *switch(field, mode, enabled, fired))
-
-
-def _entries(
-    field: Field, known: dict[str, Expr], waits: Waits, histories: tuple[History, ...]
-) -> dict[str, Block]:
-    automaton = field.automaton
-    now = (*at_state(field), *at_time(field, real(0.0)))
-    ends = [Assign(f"state.{name}", Ref(f"work.at_{name}")) for name in field.states]
-    modes = automaton.modes.values()
-    at_start = at_time(field, real(0.0))
-    evaluate: Block = (*at_start, by_mode(field, "equations"))
-    whole_known = {**known, **equation_names(automaton, "equation.")}
-    # A delayed quantity may read another one: each round fills one more from what is inside it.
-    rounds = (*evaluate, *fill_block(histories, whole_known))
-    fill: Block = (Loop(len(histories), "work.round", rounds),) if histories else ()
-    keep: Block = (*evaluate, *record_block(histories, whole_known), Assign(AGE.name, real(0.0)))
-    record = {"record": keep} if histories else {}
-    watch = tuple((mode.number, _watch(automaton, mode)) for mode in automaton.modes.values())
-    begins = begun(waits)
-    return {
-        "derive": derive_block(automaton),
-        "init": (
-            Assign("memory.started", Value(False)),
-            *enter_initial(automaton, "memory.mode"),
-            Assign("memory.faults", whole(0)),
-        ),
-        "start": (
-            *initial_ops(automaton, known, field.prefix),
-            *enter_initial(automaton, "memory.mode"),
-            *(wait.load for wait in waits),
-            *forgotten(automaton),
-            *(op for r in automaton.all_regions for op in of_mode(begins, r.modes[r.initial])),
-            *((Assign(AGE.name, real(0.0)),) if histories else ()),
-            Assign("memory.time", real(0.0)),
-            Assign("memory.started", Value(True)),
-            *entered(field, automaton.modes[automaton.initial], first_entry(automaton)),
-            *fill,
-        ),
-        "equations": evaluate,
-        **record,
-        "watch": (*now, Choose("memory.mode", watch), Run("load")),
-        "jump": (*none_fired(automaton), *now, by_mode(field, "jump")),
-        "flow": (by_mode(field, "move"),),
-        "dense": (Choose(field.mode, tuple((m.number, _dense(m)) for m in modes)),),
-        "peek": (Run("point"), *ends),
-    }
-
-
-def _dense(mode: Mode) -> Block:
-    """The polynomial of the flow that was just done, where no crossing was looked for on it."""
-    run: Block = (Run(f"series_{mode.name}"),)
-    is_known = Binary("or", Ref("work.crossed"), Ref("work.is_wait"))
-    return (Branch(Unary("not", is_known), run),) if slots(mode) else run
-
-
-def _watch(automaton: Automaton, mode: Mode) -> Block:
-    armed = [Assign(f"memory.armed_{slot}", Ref(f"work.guard_{slot}")) for slot in slots(mode)]
-    return (Run(f"guards_{mode.name}"), *armed, *settled(automaton))
 
 
 def _remembered(automaton: Automaton) -> dict[str, Names]:
