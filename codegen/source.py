@@ -22,6 +22,7 @@ from codegen.names import (
 )
 from codegen.rendering import render, version
 from codegen.statement import Writer
+from codegen.unassigned import unassigned
 from codegen.usage import Usage, locals_of, usages
 from language.functions import FUNCTIONS_OF
 from language.invariant import GROUP, INVARIANTS
@@ -122,6 +123,7 @@ def module_context(program: Program) -> dict[str, Any]:
         "memory": [_field(v, number) for v in variables if v.name.startswith("memory.")],
         "outputs": _outputs(program),
         "work": [_field(variable, number) for variable in shared],
+        "begun": _begun(program, shared, kinds),
         "blocks": [block for block in blocks if block["name"] not in ENTRIES],
         "entries": {block["name"]: block for block in blocks if block["name"] in ENTRIES},
         "has_stamps": "compare_stamps" in program.blocks,
@@ -192,6 +194,20 @@ def _outputs(program: Program) -> list[dict[str, str]]:
 def _work(program: Program, local: Mapping[str, Iterable[str]]) -> list[Variable]:
     inside = {name for names in local.values() for name in names}
     return [v for v in program.variables if v.name.startswith("work.") and v.name not in inside]
+
+
+def _begun(
+    program: Program, shared: list[Variable], kinds: Mapping[str, str]
+) -> list[tuple[str, str]] | None:
+    """Return what is set when a step begins, and to what; None where all of it is."""
+    if "step" not in program.blocks:
+        return None
+    names = unassigned(program, "step", frozenset(variable.name for variable in shared))
+    early = [variable for variable in shared if variable.name in names]
+    if any(variable.size for variable in early):
+        return None
+    zero = {"bool": "false", REAL[program.number]: literal(0.0, program.number)}
+    return [(c_member(v.name), zero.get(kinds[v.name], "0")) for v in early]
 
 
 def _block(

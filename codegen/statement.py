@@ -16,6 +16,7 @@ from language.operation import (
     Branch,
     Choose,
     Count,
+    Expr,
     FaultBit,
     Loop,
     Op,
@@ -24,6 +25,7 @@ from language.operation import (
     Value,
 )
 from language.program import Program, short
+from language.traversal import expr_names
 
 INDENT = "    "
 WIDTH = 100
@@ -58,10 +60,7 @@ class Writer:
             case Choose(selector, cases):
                 yield from self._choose(selector, cases)
             case Loop(count, index, body):
-                name = short(index)
-                yield f"for (int32_t {name} = 0; {name} < {count}; {name}++) {{"
-                yield from self.lines(body)
-                yield "}"
+                yield from self._loop(count, index, body)
             case Count(timer, condition, limit, key):
                 yield from self._count(self.place(timer), condition, limit, key)
             case FaultBit(fault, _, True):
@@ -101,6 +100,16 @@ class Writer:
         yield f"{INDENT}break;"
         yield "}"
 
+    def _loop(self, count: int, index: str, body: Block) -> Iterator[str]:
+        name = short(index)
+        bound = f"{name} < {count}"
+        condition, inner = _while(index, body)
+        if condition is not None:
+            bound = f"({bound}) && ({c_expression(condition, self.place)})"
+        yield f"for (int32_t {name} = 0; {bound}; {name}++) {{"
+        yield from self.lines(inner)
+        yield "}"
+
     def _count(self, timer: str, condition: object, limit: int, key: str) -> Iterator[str]:
         test = c_expression(condition, self.place)  # type: ignore[arg-type]
         yield f"if ({test}) {{{_comment(key)}"
@@ -110,6 +119,18 @@ class Writer:
         yield "} else {"
         yield f"{INDENT}{timer} = 0U;"
         yield "}"
+
+
+def _while(index: str, body: Block) -> tuple[Expr | None, Block]:
+    """Return the condition under which a body does anything, where it has one, and what it does.
+
+    Once that is false it stays so, for nothing else is done: the loop may end.
+    """
+    if len(body) == 1 and isinstance(body[0], Branch) and not body[0].other:
+        inner = body[0]
+        if index not in expr_names(inner.condition):
+            return inner.condition, inner.then
+    return None, body
 
 
 def _comment(key: str) -> str:

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from language.field import Field, by_mode
+from language.lower import WHOLE_TYPES
 from language.model import Mode
 from language.motion import merge_time
 from language.operation import (
@@ -233,7 +234,7 @@ def _segment(field: Field) -> Block:
 
 
 def _step(field: Field, has_record: bool) -> Block:
-    left = Ref("work.left")
+    left, event = Ref("work.left"), Ref("work.event")
     is_left = Compare(">", left, real(0.0))
     segments = Loop(EVENTS_PER_STEP + 1, "work.piece", (Branch(is_left, (Run("segment"),)),))
     flow: Block = (
@@ -241,13 +242,25 @@ def _step(field: Field, has_record: bool) -> Block:
         Assign(left.name, real(field.automaton.step)),
         segments,
         Branch(is_left, (FaultBit(ZENO),)),
+        Assign(event.name, _is_due(field, event)),
         Run("latch"),
     )
+    enter: Block = (Run("latch"), Run("start"), Assign(event.name, Value(True)))
     return (
-        Branch(Ref("memory.started"), flow, (Run("latch"), Run("start"))),
-        Run("settle"),
+        Branch(Ref("memory.started"), flow, enter),
+        Branch(event, (Run("settle"),)),
         Run("equations"),
     )
+
+
+def _is_due(field: Field, event: Ref) -> Expr:
+    """Whether guards are read again: something happened at the end of the step, or an input did."""
+    due: Expr = event
+    for name, thing in field.automaton.inputs.items():
+        is_whole = thing.type in WHOLE_TYPES
+        now, before = Ref(f"input.{name}", is_whole), Ref(f"before.{name}", is_whole)
+        due = Binary("or", due, Compare("!=", now, before))
+    return due
 
 
 def _each_wait(field: Field, waits: Waits, block: Callable[[Wait], Block]) -> tuple[Choose, ...]:

@@ -100,7 +100,7 @@ typedef struct {
     double reset_w_w;
 } Work;
 
-static void predict_drive(estimator_simple_Self *self)
+static inline void predict_drive(estimator_simple_Self *self)
 {
     /* estimator_simple modes.drive.observer.f.w_em */
     const double f_w_em = self->derived.k_hs_per_R_per_J_em * self->state.theta_b;
@@ -147,7 +147,7 @@ static void predict_drive(estimator_simple_Self *self)
     }
 }
 
-static void correct_drive(estimator_simple_Self *self, const estimator_simple_In *in)
+static inline void correct_drive(estimator_simple_Self *self, const estimator_simple_In *in)
 {
     self->innovation.y_em = in->is_new.y_em ? (self->latched.y_em - self->state.w_em) : 0.0;
     self->innovation.y_w = in->is_new.y_w ? (self->latched.y_w - self->state.w_w) : 0.0;
@@ -178,7 +178,7 @@ static void correct_drive(estimator_simple_Self *self, const estimator_simple_In
     }
 }
 
-static void predict_coast(estimator_simple_Self *self)
+static inline void predict_coast(estimator_simple_Self *self)
 {
     /* estimator_simple modes.coast.observer.f.w_em */
     const double f_w_em = self->derived.k_hs_per_R_per_J_em * self->state.theta_b;
@@ -225,7 +225,7 @@ static void predict_coast(estimator_simple_Self *self)
     }
 }
 
-static void correct_coast(estimator_simple_Self *self, const estimator_simple_In *in)
+static inline void correct_coast(estimator_simple_Self *self, const estimator_simple_In *in)
 {
     self->innovation.y_em = in->is_new.y_em ? (self->latched.y_em - self->state.w_em) : 0.0;
     self->innovation.y_w = in->is_new.y_w ? (self->latched.y_w - self->state.w_w) : 0.0;
@@ -256,7 +256,7 @@ static void correct_coast(estimator_simple_Self *self, const estimator_simple_In
     }
 }
 
-static void equations_drive(estimator_simple_Self *self)
+static inline void equations_drive(estimator_simple_Self *self)
 {
     /* estimator_simple equations.w_d */
     self->equation.w_d = (self->state.w_em * constant.per_R) - self->state.w_w;
@@ -266,7 +266,7 @@ static void equations_drive(estimator_simple_Self *self)
         + (constant.c_hs * (self->equation.w_d - self->equation.w_b));
 }
 
-static void jump_drive(estimator_simple_Self *self)
+static inline void jump_drive(estimator_simple_Self *self)
 {
     if (self->equation.T_hs <= 0.0) { /* estimator_simple modes.drive.transitions.gap.when */
         if (self->timer.drive_gap < 2U) {
@@ -282,7 +282,7 @@ static void jump_drive(estimator_simple_Self *self)
     }
 }
 
-static void equations_gap(estimator_simple_Self *self)
+static inline void equations_gap(estimator_simple_Self *self)
 {
     /* estimator_simple equations.w_d */
     self->equation.w_d = (self->state.w_em * constant.per_R) - self->state.w_w;
@@ -292,7 +292,7 @@ static void equations_gap(estimator_simple_Self *self)
         + (constant.c_hs * (self->equation.w_d - self->equation.w_b));
 }
 
-static void jump_gap(estimator_simple_Self *self, Work *work)
+static inline void jump_gap(estimator_simple_Self *self, Work *work)
 {
     if (self->latched.T_req > 0.0) { /* estimator_simple modes.gap.transitions.drive.when */
         if (self->timer.gap_drive < 2U) {
@@ -381,7 +381,7 @@ static void jump_gap(estimator_simple_Self *self, Work *work)
     }
 }
 
-static void update_gap(estimator_simple_Self *self)
+static inline void update_gap(estimator_simple_Self *self)
 {
     const double next_w_em = self->latched.y_em; /* estimator_simple modes.gap.update.w_em */
     const double next_w_w = self->latched.y_w; /* estimator_simple modes.gap.update.w_w */
@@ -413,7 +413,7 @@ static void update_gap(estimator_simple_Self *self)
     }
 }
 
-static void equations_coast(estimator_simple_Self *self)
+static inline void equations_coast(estimator_simple_Self *self)
 {
     /* estimator_simple equations.w_d */
     self->equation.w_d = (self->state.w_em * constant.per_R) - self->state.w_w;
@@ -423,7 +423,7 @@ static void equations_coast(estimator_simple_Self *self)
         + (constant.c_hs * (self->equation.w_d - self->equation.w_b));
 }
 
-static void jump_coast(estimator_simple_Self *self)
+static inline void jump_coast(estimator_simple_Self *self)
 {
     if (self->equation.T_hs >= 0.0) { /* estimator_simple modes.coast.transitions.gap.when */
         if (self->timer.coast_gap < 2U) {
@@ -439,14 +439,14 @@ static void jump_coast(estimator_simple_Self *self)
     }
 }
 
-static void compare_stamps(estimator_simple_Self *self, const estimator_simple_Cal *cal)
+static inline void compare_stamps(estimator_simple_Self *self, const estimator_simple_Cal *cal)
 {
     if (cal->J_em != solved_stamp_J_em) {
         self->faults |= estimator_simple_FAULT_stale_calibration;
     }
 }
 
-static void latch(estimator_simple_Self *self, const estimator_simple_In *in)
+static inline void latch(estimator_simple_Self *self, const estimator_simple_In *in)
 {
     if ((in->y_em >= (-400.0)) && (in->y_em <= 2400.0)) {
         self->latched.y_em = in->y_em; /* inputs.y_em */
@@ -480,13 +480,13 @@ static void latch(estimator_simple_Self *self, const estimator_simple_In *in)
     }
 }
 
-static void remember(estimator_simple_Self *self)
+static inline void remember(estimator_simple_Self *self)
 {
     self->before.T_em = self->latched.T_em;
     self->before.T_br = self->latched.T_br;
 }
 
-static void start(estimator_simple_Self *self, const estimator_simple_In *in)
+static inline void start(estimator_simple_Self *self, const estimator_simple_In *in)
 {
     if ((constant.alpha >= (-0.5)) && (constant.alpha <= 0.5)) {
         self->state.theta_d = constant.alpha; /* estimator_simple states.theta_d.initial */
@@ -548,7 +548,7 @@ void estimator_simple_Calibrate(estimator_simple_Self *self, const estimator_sim
 void estimator_simple_Step(estimator_simple_Self *self, const estimator_simple_Cal *cal, const estimator_simple_In *in,
     estimator_simple_Out *out)
 {
-    Work scratch = {0};
+    Work scratch;
     Work *const work = &scratch;
 
     (void)cal;

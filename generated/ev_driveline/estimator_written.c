@@ -316,7 +316,7 @@ typedef struct {
     double order;
 } Work;
 
-static void rates_drive_contact(const estimator_written_Self *self, Work *work)
+static inline void rates_drive_contact(const estimator_written_Self *self, Work *work)
 {
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w; /* driveline equations.w_d */
     const double w_w_squared = work->at_w_w * work->at_w_w; /* w_w * w_w */
@@ -340,7 +340,7 @@ static void rates_drive_contact(const estimator_written_Self *self, Work *work)
     work->rate_theta_b = at_w_b; /* driveline flow.theta_b */
 }
 
-static void guards_drive_contact(Work *work)
+static inline void guards_drive_contact(Work *work)
 {
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w; /* driveline equations.w_d */
     /* driveline equations.w_free */
@@ -348,7 +348,7 @@ static void guards_drive_contact(Work *work)
     work->guard_0 = at_w_free < 0.0; /* driveline modes.drive_contact.transitions.no_contact.when */
 }
 
-static void rates_no_contact(const estimator_written_Self *self, Work *work)
+static inline void rates_no_contact(const estimator_written_Self *self, Work *work)
 {
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w; /* driveline equations.w_d */
     const double theta_d_minus_theta_b = work->at_theta_d - work->at_theta_b; /* theta_d - theta_b */
@@ -373,7 +373,7 @@ static void rates_no_contact(const estimator_written_Self *self, Work *work)
     work->rate_theta_b = at_w_b; /* driveline flow.theta_b */
 }
 
-static void guards_no_contact(Work *work)
+static inline void guards_no_contact(Work *work)
 {
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w; /* driveline equations.w_d */
     /* driveline equations.w_free */
@@ -384,7 +384,7 @@ static void guards_no_contact(Work *work)
     work->guard_1 = (work->at_theta_b <= (-constant.alpha)) && (at_w_free < 0.0);
 }
 
-static void rates_coast_contact(const estimator_written_Self *self, Work *work)
+static inline void rates_coast_contact(const estimator_written_Self *self, Work *work)
 {
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w; /* driveline equations.w_d */
     const double w_w_squared = work->at_w_w * work->at_w_w; /* w_w * w_w */
@@ -408,7 +408,7 @@ static void rates_coast_contact(const estimator_written_Self *self, Work *work)
     work->rate_theta_b = at_w_b; /* driveline flow.theta_b */
 }
 
-static void guards_coast_contact(Work *work)
+static inline void guards_coast_contact(Work *work)
 {
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w; /* driveline equations.w_d */
     /* driveline equations.w_free */
@@ -416,7 +416,7 @@ static void guards_coast_contact(Work *work)
     work->guard_0 = at_w_free > 0.0; /* driveline modes.coast_contact.transitions.no_contact.when */
 }
 
-static void series_drive_contact(const estimator_written_Self *self, Work *work)
+static inline void series_drive_contact(const estimator_written_Self *self, Work *work)
 {
     work->order = 1.0;
     work->series_w_w[0] = (solved_drive_contact_A_w_w_w_w * self->state.w_w)
@@ -446,7 +446,7 @@ static void series_drive_contact(const estimator_written_Self *self, Work *work)
     }
 }
 
-static void point(const estimator_written_Self *self, Work *work)
+static inline void point(const estimator_written_Self *self, Work *work)
 {
     work->sum_w_w = 0.0;
     work->sum_w_em = 0.0;
@@ -464,7 +464,7 @@ static void point(const estimator_written_Self *self, Work *work)
     work->at_theta_b = self->state.theta_b + (work->s * work->sum_theta_b);
 }
 
-static void step_drive_contact(const estimator_written_Self *self, Work *work)
+static inline void step_drive_contact(const estimator_written_Self *self, Work *work)
 {
     work->at_w_w = self->state.w_w;
     work->at_w_em = self->state.w_em;
@@ -564,7 +564,7 @@ static void step_drive_contact(const estimator_written_Self *self, Work *work)
     }
 }
 
-static void series_no_contact(const estimator_written_Self *self, Work *work)
+static inline void series_no_contact(const estimator_written_Self *self, Work *work)
 {
     work->order = 1.0;
     work->series_w_w[0] = (solved_no_contact_A_w_w_w_w * self->state.w_w) + work->pull_w_w;
@@ -588,7 +588,7 @@ static void series_no_contact(const estimator_written_Self *self, Work *work)
     }
 }
 
-static void step_no_contact(const estimator_written_Self *self, Work *work)
+static inline void step_no_contact(const estimator_written_Self *self, Work *work)
 {
     work->at_w_w = self->state.w_w;
     work->at_w_em = self->state.w_em;
@@ -666,7 +666,7 @@ static void step_no_contact(const estimator_written_Self *self, Work *work)
     }
 }
 
-static void series_coast_contact(const estimator_written_Self *self, Work *work)
+static inline void series_coast_contact(const estimator_written_Self *self, Work *work)
 {
     work->order = 1.0;
     work->series_w_w[0] = (solved_coast_contact_A_w_w_w_w * self->state.w_w)
@@ -696,7 +696,7 @@ static void series_coast_contact(const estimator_written_Self *self, Work *work)
     }
 }
 
-static void step_coast_contact(const estimator_written_Self *self, Work *work)
+static inline void step_coast_contact(const estimator_written_Self *self, Work *work)
 {
     work->at_w_w = self->state.w_w;
     work->at_w_em = self->state.w_em;
@@ -796,7 +796,7 @@ static void step_coast_contact(const estimator_written_Self *self, Work *work)
     }
 }
 
-static void locate_drive_contact(const estimator_written_Self *self, Work *work)
+static inline void locate_drive_contact(const estimator_written_Self *self, Work *work)
 {
     work->low = 0.0;
     work->high = work->h;
@@ -817,7 +817,7 @@ static void locate_drive_contact(const estimator_written_Self *self, Work *work)
     work->elapsed = ha_min(work->high, work->h);
 }
 
-static void move_drive_contact(estimator_written_Self *self, Work *work)
+static inline void move_drive_contact(estimator_written_Self *self, Work *work)
 {
     step_drive_contact(self, work);
     work->elapsed = work->h;
@@ -837,7 +837,7 @@ static void move_drive_contact(estimator_written_Self *self, Work *work)
     self->state.theta_b = work->end_theta_b;
 }
 
-static void locate_no_contact(const estimator_written_Self *self, Work *work)
+static inline void locate_no_contact(const estimator_written_Self *self, Work *work)
 {
     work->low = 0.0;
     work->high = work->h;
@@ -873,7 +873,7 @@ static void locate_no_contact(const estimator_written_Self *self, Work *work)
     work->elapsed = ha_min(work->high, work->h);
 }
 
-static void move_no_contact(estimator_written_Self *self, Work *work)
+static inline void move_no_contact(estimator_written_Self *self, Work *work)
 {
     step_no_contact(self, work);
     work->elapsed = work->h;
@@ -893,7 +893,7 @@ static void move_no_contact(estimator_written_Self *self, Work *work)
     self->state.theta_b = work->end_theta_b;
 }
 
-static void locate_coast_contact(const estimator_written_Self *self, Work *work)
+static inline void locate_coast_contact(const estimator_written_Self *self, Work *work)
 {
     work->low = 0.0;
     work->high = work->h;
@@ -914,7 +914,7 @@ static void locate_coast_contact(const estimator_written_Self *self, Work *work)
     work->elapsed = ha_min(work->high, work->h);
 }
 
-static void move_coast_contact(estimator_written_Self *self, Work *work)
+static inline void move_coast_contact(estimator_written_Self *self, Work *work)
 {
     step_coast_contact(self, work);
     work->elapsed = work->h;
@@ -934,14 +934,14 @@ static void move_coast_contact(estimator_written_Self *self, Work *work)
     self->state.theta_b = work->end_theta_b;
 }
 
-static void switch_drive_contact(estimator_written_Self *self, const Work *work)
+static inline void switch_drive_contact(estimator_written_Self *self, const Work *work)
 {
     if (work->guard_0) {
         self->run_mode = estimator_written_RUN_no_contact;
     }
 }
 
-static void switch_no_contact(estimator_written_Self *self, const Work *work)
+static inline void switch_no_contact(estimator_written_Self *self, const Work *work)
 {
     if (work->guard_0) {
         /* driveline modes.no_contact.transitions.drive_contact.reset.theta_b */
@@ -954,14 +954,14 @@ static void switch_no_contact(estimator_written_Self *self, const Work *work)
     }
 }
 
-static void switch_coast_contact(estimator_written_Self *self, const Work *work)
+static inline void switch_coast_contact(estimator_written_Self *self, const Work *work)
 {
     if (work->guard_0) {
         self->run_mode = estimator_written_RUN_no_contact;
     }
 }
 
-static void predict_drive(estimator_written_Self *self)
+static inline void predict_drive(estimator_written_Self *self)
 {
     const double k_hs_theta_b = constant.k_hs * self->state.theta_b; /* k_hs * theta_b */
     /* estimator_written modes.drive.observer.f.w_em */
@@ -1009,7 +1009,7 @@ static void predict_drive(estimator_written_Self *self)
     }
 }
 
-static void correct_drive(estimator_written_Self *self, const estimator_written_In *in)
+static inline void correct_drive(estimator_written_Self *self, const estimator_written_In *in)
 {
     self->innovation.y_em = in->is_new.y_em ? (self->latched.y_em - self->state.w_em) : 0.0;
     self->innovation.y_w = in->is_new.y_w ? (self->latched.y_w - self->state.w_w) : 0.0;
@@ -1040,45 +1040,43 @@ static void correct_drive(estimator_written_Self *self, const estimator_written_
     }
 }
 
-static void run_gap(estimator_written_Self *self, Work *work)
+static inline void run_gap(estimator_written_Self *self, Work *work)
 {
     work->left = 0.001; /* estimator_written modes.gap.runs */
-    for (int32_t event = 0; event < 5; event++) {
-        if (work->left > 0.0) {
-            work->h = work->left;
-            switch (self->run_mode) {
-            case estimator_written_RUN_drive_contact:
-                move_drive_contact(self, work);
-                break;
-            case estimator_written_RUN_no_contact:
-                move_no_contact(self, work);
-                break;
-            case estimator_written_RUN_coast_contact:
-                move_coast_contact(self, work);
-                break;
-            default:
-                break;
-            }
-            work->left = work->left - work->elapsed;
-            if (work->crossed) {
-                if (event < 4) {
-                    switch (self->run_mode) {
-                    case estimator_written_RUN_drive_contact:
-                        switch_drive_contact(self, work);
-                        break;
-                    case estimator_written_RUN_no_contact:
-                        switch_no_contact(self, work);
-                        break;
-                    case estimator_written_RUN_coast_contact:
-                        switch_coast_contact(self, work);
-                        break;
-                    default:
-                        break;
-                    }
-                } else {
-                    self->faults |= estimator_written_FAULT_event_limit;
-                    work->left = 0.0;
+    for (int32_t event = 0; (event < 5) && (work->left > 0.0); event++) {
+        work->h = work->left;
+        switch (self->run_mode) {
+        case estimator_written_RUN_drive_contact:
+            move_drive_contact(self, work);
+            break;
+        case estimator_written_RUN_no_contact:
+            move_no_contact(self, work);
+            break;
+        case estimator_written_RUN_coast_contact:
+            move_coast_contact(self, work);
+            break;
+        default:
+            break;
+        }
+        work->left = work->left - work->elapsed;
+        if (work->crossed) {
+            if (event < 4) {
+                switch (self->run_mode) {
+                case estimator_written_RUN_drive_contact:
+                    switch_drive_contact(self, work);
+                    break;
+                case estimator_written_RUN_no_contact:
+                    switch_no_contact(self, work);
+                    break;
+                case estimator_written_RUN_coast_contact:
+                    switch_coast_contact(self, work);
+                    break;
+                default:
+                    break;
                 }
+            } else {
+                self->faults |= estimator_written_FAULT_event_limit;
+                work->left = 0.0;
             }
         }
     }
@@ -1112,7 +1110,7 @@ static void run_gap(estimator_written_Self *self, Work *work)
     }
 }
 
-static void predict_coast(estimator_written_Self *self)
+static inline void predict_coast(estimator_written_Self *self)
 {
     const double k_hs_theta_b = constant.k_hs * self->state.theta_b; /* k_hs * theta_b */
     /* estimator_written modes.coast.observer.f.w_em */
@@ -1160,7 +1158,7 @@ static void predict_coast(estimator_written_Self *self)
     }
 }
 
-static void correct_coast(estimator_written_Self *self, const estimator_written_In *in)
+static inline void correct_coast(estimator_written_Self *self, const estimator_written_In *in)
 {
     self->innovation.y_em = in->is_new.y_em ? (self->latched.y_em - self->state.w_em) : 0.0;
     self->innovation.y_w = in->is_new.y_w ? (self->latched.y_w - self->state.w_w) : 0.0;
@@ -1191,7 +1189,7 @@ static void correct_coast(estimator_written_Self *self, const estimator_written_
     }
 }
 
-static void equations_drive(estimator_written_Self *self)
+static inline void equations_drive(estimator_written_Self *self)
 {
     /* estimator_written equations.w_d */
     self->equation.w_d = (self->state.w_em * constant.per_R) - self->state.w_w;
@@ -1201,7 +1199,7 @@ static void equations_drive(estimator_written_Self *self)
         + (constant.c_hs * (self->equation.w_d - self->equation.w_b));
 }
 
-static void jump_drive(estimator_written_Self *self)
+static inline void jump_drive(estimator_written_Self *self)
 {
     if (self->equation.T_hs <= 0.0) { /* estimator_written modes.drive.transitions.gap.when */
         if (self->timer.drive_gap < 2U) {
@@ -1218,7 +1216,7 @@ static void jump_drive(estimator_written_Self *self)
     }
 }
 
-static void equations_gap(estimator_written_Self *self)
+static inline void equations_gap(estimator_written_Self *self)
 {
     /* estimator_written equations.w_d */
     self->equation.w_d = (self->state.w_em * constant.per_R) - self->state.w_w;
@@ -1232,7 +1230,7 @@ static void equations_gap(estimator_written_Self *self)
         - self->equation.w_b));
 }
 
-static void jump_gap(estimator_written_Self *self)
+static inline void jump_gap(estimator_written_Self *self)
 {
     if (self->run_mode == estimator_written_RUN_drive_contact) { /* estimator_written modes.gap.transitions.drive.when */
         if (self->timer.gap_drive < 2U) {
@@ -1261,7 +1259,7 @@ static void jump_gap(estimator_written_Self *self)
     }
 }
 
-static void equations_coast(estimator_written_Self *self)
+static inline void equations_coast(estimator_written_Self *self)
 {
     /* estimator_written equations.w_d */
     self->equation.w_d = (self->state.w_em * constant.per_R) - self->state.w_w;
@@ -1271,7 +1269,7 @@ static void equations_coast(estimator_written_Self *self)
         + (constant.c_hs * (self->equation.w_d - self->equation.w_b));
 }
 
-static void jump_coast(estimator_written_Self *self)
+static inline void jump_coast(estimator_written_Self *self)
 {
     if (self->equation.T_hs >= 0.0) { /* estimator_written modes.coast.transitions.gap.when */
         if (self->timer.coast_gap < 2U) {
@@ -1288,14 +1286,14 @@ static void jump_coast(estimator_written_Self *self)
     }
 }
 
-static void compare_stamps(estimator_written_Self *self, const estimator_written_Cal *cal)
+static inline void compare_stamps(estimator_written_Self *self, const estimator_written_Cal *cal)
 {
     if (cal->J_em != solved_stamp_J_em) {
         self->faults |= estimator_written_FAULT_stale_calibration;
     }
 }
 
-static void latch(estimator_written_Self *self, const estimator_written_In *in)
+static inline void latch(estimator_written_Self *self, const estimator_written_In *in)
 {
     if ((in->y_em >= (-400.0)) && (in->y_em <= 2400.0)) {
         self->latched.y_em = in->y_em; /* inputs.y_em */
@@ -1323,13 +1321,13 @@ static void latch(estimator_written_Self *self, const estimator_written_In *in)
     }
 }
 
-static void remember(estimator_written_Self *self)
+static inline void remember(estimator_written_Self *self)
 {
     self->before.T_em = self->latched.T_em;
     self->before.T_br = self->latched.T_br;
 }
 
-static void start(estimator_written_Self *self, const estimator_written_In *in)
+static inline void start(estimator_written_Self *self, const estimator_written_In *in)
 {
     if ((constant.alpha >= (-0.5)) && (constant.alpha <= 0.5)) {
         self->state.theta_d = constant.alpha; /* estimator_written states.theta_d.initial */

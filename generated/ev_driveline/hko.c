@@ -290,7 +290,7 @@ typedef struct {
     double k1_T_l;
 } Work;
 
-static void rates_drive_contact(const hko_Self *self, Work *work)
+static inline void rates_drive_contact(const hko_Self *self, Work *work)
 {
     /* driveline_load equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
@@ -316,7 +316,7 @@ static void rates_drive_contact(const hko_Self *self, Work *work)
     work->rate_T_l = 0.0; /* driveline_load flow.T_l */
 }
 
-static void guards_drive_contact(Work *work)
+static inline void guards_drive_contact(Work *work)
 {
     /* driveline_load equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
@@ -325,7 +325,7 @@ static void guards_drive_contact(Work *work)
     work->guard_0 = at_w_free < 0.0; /* driveline_load modes.drive_contact.transitions.no_contact.when */
 }
 
-static void rates_no_contact(const hko_Self *self, Work *work)
+static inline void rates_no_contact(const hko_Self *self, Work *work)
 {
     /* driveline_load equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
@@ -352,7 +352,7 @@ static void rates_no_contact(const hko_Self *self, Work *work)
     work->rate_T_l = 0.0; /* driveline_load flow.T_l */
 }
 
-static void guards_no_contact(Work *work)
+static inline void guards_no_contact(Work *work)
 {
     /* driveline_load equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
@@ -364,7 +364,7 @@ static void guards_no_contact(Work *work)
     work->guard_1 = (work->at_theta_b <= (-constant.alpha)) && (at_w_free < 0.0);
 }
 
-static void rates_coast_contact(const hko_Self *self, Work *work)
+static inline void rates_coast_contact(const hko_Self *self, Work *work)
 {
     /* driveline_load equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
@@ -390,7 +390,7 @@ static void rates_coast_contact(const hko_Self *self, Work *work)
     work->rate_T_l = 0.0; /* driveline_load flow.T_l */
 }
 
-static void guards_coast_contact(Work *work)
+static inline void guards_coast_contact(Work *work)
 {
     /* driveline_load equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
@@ -399,7 +399,7 @@ static void guards_coast_contact(Work *work)
     work->guard_0 = at_w_free > 0.0; /* driveline_load modes.coast_contact.transitions.no_contact.when */
 }
 
-static void step_drive_contact(const hko_Self *self, Work *work)
+static inline void step_drive_contact(const hko_Self *self, Work *work)
 {
     work->at_w_w = self->state.w_w;
     work->at_w_em = self->state.w_em;
@@ -461,7 +461,7 @@ static void step_drive_contact(const hko_Self *self, Work *work)
         self->state.T_l + (h_per_6 * (work->k1_T_l + (2.0 * k2_T_l) + (2.0 * k3_T_l) + k4_T_l));
 }
 
-static void series_drive_contact(const hko_Self *self, Work *work)
+static inline void series_drive_contact(const hko_Self *self, Work *work)
 {
     work->at_w_w = work->end_w_w;
     work->at_w_em = work->end_w_em;
@@ -496,7 +496,7 @@ static void series_drive_contact(const hko_Self *self, Work *work)
     work->series_T_l[2] = (work->k1_T_l + work->rate_T_l - (2.0 * slope_T_l)) / h_squared;
 }
 
-static void step_no_contact(const hko_Self *self, Work *work)
+static inline void step_no_contact(const hko_Self *self, Work *work)
 {
     work->at_w_w = self->state.w_w;
     work->at_w_em = self->state.w_em;
@@ -558,7 +558,7 @@ static void step_no_contact(const hko_Self *self, Work *work)
         self->state.T_l + (h_per_6 * (work->k1_T_l + (2.0 * k2_T_l) + (2.0 * k3_T_l) + k4_T_l));
 }
 
-static void series_no_contact(const hko_Self *self, Work *work)
+static inline void series_no_contact(const hko_Self *self, Work *work)
 {
     work->at_w_w = work->end_w_w;
     work->at_w_em = work->end_w_em;
@@ -593,7 +593,7 @@ static void series_no_contact(const hko_Self *self, Work *work)
     work->series_T_l[2] = (work->k1_T_l + work->rate_T_l - (2.0 * slope_T_l)) / h_squared;
 }
 
-static void step_coast_contact(const hko_Self *self, Work *work)
+static inline void step_coast_contact(const hko_Self *self, Work *work)
 {
     work->at_w_w = self->state.w_w;
     work->at_w_em = self->state.w_em;
@@ -655,7 +655,7 @@ static void step_coast_contact(const hko_Self *self, Work *work)
         self->state.T_l + (h_per_6 * (work->k1_T_l + (2.0 * k2_T_l) + (2.0 * k3_T_l) + k4_T_l));
 }
 
-static void series_coast_contact(const hko_Self *self, Work *work)
+static inline void series_coast_contact(const hko_Self *self, Work *work)
 {
     work->at_w_w = work->end_w_w;
     work->at_w_em = work->end_w_em;
@@ -690,7 +690,7 @@ static void series_coast_contact(const hko_Self *self, Work *work)
     work->series_T_l[2] = (work->k1_T_l + work->rate_T_l - (2.0 * slope_T_l)) / h_squared;
 }
 
-static void point(const hko_Self *self, Work *work)
+static inline void point(const hko_Self *self, Work *work)
 {
     work->at_w_w = self->state.w_w + (work->s * ((((work->series_w_w[2] * work->s)
         + work->series_w_w[1]) * work->s) + work->series_w_w[0]));
@@ -704,7 +704,7 @@ static void point(const hko_Self *self, Work *work)
         + work->series_T_l[1]) * work->s) + work->series_T_l[0]));
 }
 
-static void locate_drive_contact(const hko_Self *self, Work *work)
+static inline void locate_drive_contact(const hko_Self *self, Work *work)
 {
     work->low = 0.0;
     work->high = work->h;
@@ -726,7 +726,7 @@ static void locate_drive_contact(const hko_Self *self, Work *work)
     work->elapsed = ha_min(work->high, work->h);
 }
 
-static void move_drive_contact(hko_Self *self, Work *work)
+static inline void move_drive_contact(hko_Self *self, Work *work)
 {
     step_drive_contact(self, work);
     work->elapsed = work->h;
@@ -748,7 +748,7 @@ static void move_drive_contact(hko_Self *self, Work *work)
     self->state.T_l = work->end_T_l;
 }
 
-static void locate_no_contact(const hko_Self *self, Work *work)
+static inline void locate_no_contact(const hko_Self *self, Work *work)
 {
     work->low = 0.0;
     work->high = work->h;
@@ -786,7 +786,7 @@ static void locate_no_contact(const hko_Self *self, Work *work)
     work->elapsed = ha_min(work->high, work->h);
 }
 
-static void move_no_contact(hko_Self *self, Work *work)
+static inline void move_no_contact(hko_Self *self, Work *work)
 {
     step_no_contact(self, work);
     work->elapsed = work->h;
@@ -808,7 +808,7 @@ static void move_no_contact(hko_Self *self, Work *work)
     self->state.T_l = work->end_T_l;
 }
 
-static void locate_coast_contact(const hko_Self *self, Work *work)
+static inline void locate_coast_contact(const hko_Self *self, Work *work)
 {
     work->low = 0.0;
     work->high = work->h;
@@ -830,7 +830,7 @@ static void locate_coast_contact(const hko_Self *self, Work *work)
     work->elapsed = ha_min(work->high, work->h);
 }
 
-static void move_coast_contact(hko_Self *self, Work *work)
+static inline void move_coast_contact(hko_Self *self, Work *work)
 {
     step_coast_contact(self, work);
     work->elapsed = work->h;
@@ -852,14 +852,14 @@ static void move_coast_contact(hko_Self *self, Work *work)
     self->state.T_l = work->end_T_l;
 }
 
-static void switch_drive_contact(hko_Self *self, const Work *work)
+static inline void switch_drive_contact(hko_Self *self, const Work *work)
 {
     if (work->guard_0) {
         self->run_mode = hko_RUN_no_contact;
     }
 }
 
-static void switch_no_contact(hko_Self *self, const Work *work)
+static inline void switch_no_contact(hko_Self *self, const Work *work)
 {
     if (work->guard_0) {
         /* driveline_load modes.no_contact.transitions.drive_contact.reset.theta_b */
@@ -872,14 +872,14 @@ static void switch_no_contact(hko_Self *self, const Work *work)
     }
 }
 
-static void switch_coast_contact(hko_Self *self, const Work *work)
+static inline void switch_coast_contact(hko_Self *self, const Work *work)
 {
     if (work->guard_0) {
         self->run_mode = hko_RUN_no_contact;
     }
 }
 
-static void run_drive(hko_Self *self, Work *work)
+static inline void run_drive(hko_Self *self, Work *work)
 {
     work->h = 0.001; /* hko modes.drive.runs */
     step_drive_contact(self, work);
@@ -925,7 +925,7 @@ static void run_drive(hko_Self *self, Work *work)
     }
 }
 
-static void predict_drive(hko_Self *self, Work *work)
+static inline void predict_drive(hko_Self *self, Work *work)
 {
     /* hko modes.drive.observer.process_noise.w_em */
     work->density_w_em =
@@ -1030,7 +1030,7 @@ static void predict_drive(hko_Self *self, Work *work)
     run_drive(self, work);
 }
 
-static void correct_drive(hko_Self *self, const hko_In *in, Work *work)
+static inline void correct_drive(hko_Self *self, const hko_In *in, Work *work)
 {
     if (in->is_new.y_em) {
         self->innovation.y_em = self->latched.y_em - self->state.w_em;
@@ -1140,45 +1140,43 @@ static void correct_drive(hko_Self *self, const hko_In *in, Work *work)
     }
 }
 
-static void rest_gap(hko_Self *self, Work *work)
+static inline void rest_gap(hko_Self *self, Work *work)
 {
     work->left = work->rest; /* hko modes.gap.runs */
-    for (int32_t event = 0; event < 5; event++) {
-        if (work->left > 0.0) {
-            work->h = work->left;
-            switch (self->run_mode) {
-            case hko_RUN_drive_contact:
-                move_drive_contact(self, work);
-                break;
-            case hko_RUN_no_contact:
-                move_no_contact(self, work);
-                break;
-            case hko_RUN_coast_contact:
-                move_coast_contact(self, work);
-                break;
-            default:
-                break;
-            }
-            work->left = work->left - work->elapsed;
-            if (work->crossed) {
-                if (event < 4) {
-                    switch (self->run_mode) {
-                    case hko_RUN_drive_contact:
-                        switch_drive_contact(self, work);
-                        break;
-                    case hko_RUN_no_contact:
-                        switch_no_contact(self, work);
-                        break;
-                    case hko_RUN_coast_contact:
-                        switch_coast_contact(self, work);
-                        break;
-                    default:
-                        break;
-                    }
-                } else {
-                    self->faults |= hko_FAULT_event_limit;
-                    work->left = 0.0;
+    for (int32_t event = 0; (event < 5) && (work->left > 0.0); event++) {
+        work->h = work->left;
+        switch (self->run_mode) {
+        case hko_RUN_drive_contact:
+            move_drive_contact(self, work);
+            break;
+        case hko_RUN_no_contact:
+            move_no_contact(self, work);
+            break;
+        case hko_RUN_coast_contact:
+            move_coast_contact(self, work);
+            break;
+        default:
+            break;
+        }
+        work->left = work->left - work->elapsed;
+        if (work->crossed) {
+            if (event < 4) {
+                switch (self->run_mode) {
+                case hko_RUN_drive_contact:
+                    switch_drive_contact(self, work);
+                    break;
+                case hko_RUN_no_contact:
+                    switch_no_contact(self, work);
+                    break;
+                case hko_RUN_coast_contact:
+                    switch_coast_contact(self, work);
+                    break;
+                default:
+                    break;
                 }
+            } else {
+                self->faults |= hko_FAULT_event_limit;
+                work->left = 0.0;
             }
         }
     }
@@ -1219,13 +1217,13 @@ static void rest_gap(hko_Self *self, Work *work)
     }
 }
 
-static void run_gap(hko_Self *self, Work *work)
+static inline void run_gap(hko_Self *self, Work *work)
 {
     work->rest = 0.001; /* hko modes.gap.runs */
     rest_gap(self, work);
 }
 
-static void predict_gap(hko_Self *self, Work *work)
+static inline void predict_gap(hko_Self *self, Work *work)
 {
     switch (self->run_mode) {
     case hko_RUN_drive_contact:
@@ -1495,7 +1493,7 @@ static void predict_gap(hko_Self *self, Work *work)
     run_gap(self, work);
 }
 
-static void correct_gap(hko_Self *self, const hko_In *in, Work *work)
+static inline void correct_gap(hko_Self *self, const hko_In *in, Work *work)
 {
     if (in->is_new.y_em) {
         self->innovation.y_em = self->latched.y_em - self->state.w_em;
@@ -1605,7 +1603,7 @@ static void correct_gap(hko_Self *self, const hko_In *in, Work *work)
     }
 }
 
-static void run_coast(hko_Self *self, Work *work)
+static inline void run_coast(hko_Self *self, Work *work)
 {
     work->h = 0.001; /* hko modes.coast.runs */
     step_coast_contact(self, work);
@@ -1651,7 +1649,7 @@ static void run_coast(hko_Self *self, Work *work)
     }
 }
 
-static void predict_coast(hko_Self *self, Work *work)
+static inline void predict_coast(hko_Self *self, Work *work)
 {
     /* hko modes.coast.observer.process_noise.w_em */
     work->density_w_em =
@@ -1756,7 +1754,7 @@ static void predict_coast(hko_Self *self, Work *work)
     run_coast(self, work);
 }
 
-static void correct_coast(hko_Self *self, const hko_In *in, Work *work)
+static inline void correct_coast(hko_Self *self, const hko_In *in, Work *work)
 {
     if (in->is_new.y_em) {
         self->innovation.y_em = self->latched.y_em - self->state.w_em;
@@ -1866,7 +1864,7 @@ static void correct_coast(hko_Self *self, const hko_In *in, Work *work)
     }
 }
 
-static void equations_drive(hko_Self *self, const hko_Cal *cal)
+static inline void equations_drive(hko_Self *self, const hko_Cal *cal)
 {
     self->equation.w_d = (self->state.w_em * constant.per_R) - self->state.w_w; /* hko equations.w_d */
     /* hko equations.a_em */
@@ -1882,7 +1880,7 @@ static void equations_drive(hko_Self *self, const hko_Cal *cal)
         + (constant.c_hs * (self->equation.w_d - self->equation.w_b));
 }
 
-static void until_drive_0(Work *work)
+static inline void until_drive_0(Work *work)
 {
     const double past_w_d = (work->at_w_em * constant.per_R) - work->at_w_w; /* hko equations.w_d */
     const double past_w_b = 0.0; /* hko modes.drive.equations.w_b */
@@ -1893,7 +1891,7 @@ static void until_drive_0(Work *work)
     work->until = past_T_hs <= 0.0; /* hko modes.drive.transitions.gap.rewind.until */
 }
 
-static void back_drive_0(hko_Self *self, Work *work)
+static inline void back_drive_0(hko_Self *self, Work *work)
 {
     work->at_w_w = self->state.w_w;
     work->at_w_em = self->state.w_em;
@@ -2029,7 +2027,7 @@ static void back_drive_0(hko_Self *self, Work *work)
     }
 }
 
-static void jump_drive(hko_Self *self, Work *work)
+static inline void jump_drive(hko_Self *self, Work *work)
 {
     if (self->equation.T_hs < (-constant.T_hyst)) {
         back_drive_0(self, work);
@@ -2053,7 +2051,7 @@ static void jump_drive(hko_Self *self, Work *work)
     }
 }
 
-static void equations_gap(hko_Self *self, const hko_Cal *cal)
+static inline void equations_gap(hko_Self *self, const hko_Cal *cal)
 {
     self->equation.w_d = (self->state.w_em * constant.per_R) - self->state.w_w; /* hko equations.w_d */
     /* hko equations.a_em */
@@ -2073,7 +2071,7 @@ static void equations_gap(hko_Self *self, const hko_Cal *cal)
         - self->equation.w_b));
 }
 
-static void jump_gap(hko_Self *self, Work *work)
+static inline void jump_gap(hko_Self *self, Work *work)
 {
     if (self->equation.T_acc > self->equation.T_sum) { /* hko modes.gap.transitions.watch_drive.when */
         if (self->timer.gap_watch_drive < 6U) {
@@ -2130,7 +2128,7 @@ static void jump_gap(hko_Self *self, Work *work)
     }
 }
 
-static void equations_coast(hko_Self *self, const hko_Cal *cal)
+static inline void equations_coast(hko_Self *self, const hko_Cal *cal)
 {
     self->equation.w_d = (self->state.w_em * constant.per_R) - self->state.w_w; /* hko equations.w_d */
     /* hko equations.a_em */
@@ -2146,7 +2144,7 @@ static void equations_coast(hko_Self *self, const hko_Cal *cal)
         + (constant.c_hs * (self->equation.w_d - self->equation.w_b));
 }
 
-static void until_coast_0(Work *work)
+static inline void until_coast_0(Work *work)
 {
     const double past_w_d = (work->at_w_em * constant.per_R) - work->at_w_w; /* hko equations.w_d */
     const double past_w_b = 0.0; /* hko modes.coast.equations.w_b */
@@ -2157,7 +2155,7 @@ static void until_coast_0(Work *work)
     work->until = past_T_hs >= 0.0; /* hko modes.coast.transitions.gap.rewind.until */
 }
 
-static void back_coast_0(hko_Self *self, Work *work)
+static inline void back_coast_0(hko_Self *self, Work *work)
 {
     work->at_w_w = self->state.w_w;
     work->at_w_em = self->state.w_em;
@@ -2293,7 +2291,7 @@ static void back_coast_0(hko_Self *self, Work *work)
     }
 }
 
-static void jump_coast(hko_Self *self, Work *work)
+static inline void jump_coast(hko_Self *self, Work *work)
 {
     if (self->equation.T_hs > constant.T_hyst) {
         back_coast_0(self, work);
@@ -2317,14 +2315,14 @@ static void jump_coast(hko_Self *self, Work *work)
     }
 }
 
-static void compare_stamps(hko_Self *self, const hko_Cal *cal)
+static inline void compare_stamps(hko_Self *self, const hko_Cal *cal)
 {
     if (cal->J_em != solved_stamp_J_em) {
         self->faults |= hko_FAULT_stale_calibration;
     }
 }
 
-static void latch(hko_Self *self, const hko_In *in)
+static inline void latch(hko_Self *self, const hko_In *in)
 {
     if ((in->y_em >= (-400.0)) && (in->y_em <= 2400.0)) {
         self->latched.y_em = in->y_em; /* inputs.y_em */
@@ -2364,13 +2362,13 @@ static void latch(hko_Self *self, const hko_In *in)
     }
 }
 
-static void remember(hko_Self *self)
+static inline void remember(hko_Self *self)
 {
     self->before.T_em = self->latched.T_em;
     self->before.T_br = self->latched.T_br;
 }
 
-static void keep(hko_Self *self)
+static inline void keep(hko_Self *self)
 {
     const double keep_1 = self->latched.y_em;
     const double keep_2 = self->latched.T_em;
@@ -2427,7 +2425,7 @@ static void keep(hko_Self *self)
     }
 }
 
-static void start(hko_Self *self, const hko_In *in, Work *work)
+static inline void start(hko_Self *self, const hko_In *in, Work *work)
 {
     if ((constant.alpha >= (-0.5)) && (constant.alpha <= 0.5)) {
         self->state.theta_d = constant.alpha; /* hko states.theta_d.initial */
@@ -2511,9 +2509,14 @@ void hko_Calibrate(hko_Self *self, const hko_Cal *cal)
 void hko_Step(hko_Self *self, const hko_Cal *cal, const hko_In *in,
     hko_Out *out)
 {
-    Work scratch = {0};
+    Work scratch;
     Work *const work = &scratch;
 
+    work->rest = 0.0;
+    work->guard_0 = false;
+    work->guard_1 = false;
+    work->elapsed = 0.0;
+    work->crossed = false;
     self->fired = 0U;
     latch(self, in);
     self->innovation.y_em = 0.0;

@@ -318,7 +318,7 @@ typedef struct {
     double order;
 } Work;
 
-static void rates_drive_contact(const leaf_Self *self, Work *work)
+static inline void rates_drive_contact(const leaf_Self *self, Work *work)
 {
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w; /* driveline equations.w_d */
     const double w_w_squared = work->at_w_w * work->at_w_w; /* w_w * w_w */
@@ -342,7 +342,7 @@ static void rates_drive_contact(const leaf_Self *self, Work *work)
     work->rate_theta_b = at_w_b; /* driveline flow.theta_b */
 }
 
-static void guards_drive_contact(Work *work)
+static inline void guards_drive_contact(Work *work)
 {
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w; /* driveline equations.w_d */
     /* driveline equations.w_free */
@@ -350,7 +350,7 @@ static void guards_drive_contact(Work *work)
     work->guard_0 = at_w_free < 0.0; /* driveline modes.drive_contact.transitions.no_contact.when */
 }
 
-static void rates_no_contact(const leaf_Self *self, Work *work)
+static inline void rates_no_contact(const leaf_Self *self, Work *work)
 {
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w; /* driveline equations.w_d */
     const double theta_d_minus_theta_b = work->at_theta_d - work->at_theta_b; /* theta_d - theta_b */
@@ -375,7 +375,7 @@ static void rates_no_contact(const leaf_Self *self, Work *work)
     work->rate_theta_b = at_w_b; /* driveline flow.theta_b */
 }
 
-static void guards_no_contact(Work *work)
+static inline void guards_no_contact(Work *work)
 {
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w; /* driveline equations.w_d */
     /* driveline equations.w_free */
@@ -386,7 +386,7 @@ static void guards_no_contact(Work *work)
     work->guard_1 = (work->at_theta_b <= (-constant.alpha)) && (at_w_free < 0.0);
 }
 
-static void rates_coast_contact(const leaf_Self *self, Work *work)
+static inline void rates_coast_contact(const leaf_Self *self, Work *work)
 {
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w; /* driveline equations.w_d */
     const double w_w_squared = work->at_w_w * work->at_w_w; /* w_w * w_w */
@@ -410,7 +410,7 @@ static void rates_coast_contact(const leaf_Self *self, Work *work)
     work->rate_theta_b = at_w_b; /* driveline flow.theta_b */
 }
 
-static void guards_coast_contact(Work *work)
+static inline void guards_coast_contact(Work *work)
 {
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w; /* driveline equations.w_d */
     /* driveline equations.w_free */
@@ -418,7 +418,7 @@ static void guards_coast_contact(Work *work)
     work->guard_0 = at_w_free > 0.0; /* driveline modes.coast_contact.transitions.no_contact.when */
 }
 
-static void series_drive_contact(const leaf_Self *self, Work *work)
+static inline void series_drive_contact(const leaf_Self *self, Work *work)
 {
     work->order = 1.0;
     work->series_w_w[0] = (solved_drive_contact_A_w_w_w_w * self->state.w_w)
@@ -448,7 +448,7 @@ static void series_drive_contact(const leaf_Self *self, Work *work)
     }
 }
 
-static void point(const leaf_Self *self, Work *work)
+static inline void point(const leaf_Self *self, Work *work)
 {
     work->sum_w_w = 0.0;
     work->sum_w_em = 0.0;
@@ -466,7 +466,7 @@ static void point(const leaf_Self *self, Work *work)
     work->at_theta_b = self->state.theta_b + (work->s * work->sum_theta_b);
 }
 
-static void step_drive_contact(const leaf_Self *self, Work *work)
+static inline void step_drive_contact(const leaf_Self *self, Work *work)
 {
     work->at_w_w = self->state.w_w;
     work->at_w_em = self->state.w_em;
@@ -566,7 +566,7 @@ static void step_drive_contact(const leaf_Self *self, Work *work)
     }
 }
 
-static void series_no_contact(const leaf_Self *self, Work *work)
+static inline void series_no_contact(const leaf_Self *self, Work *work)
 {
     work->order = 1.0;
     work->series_w_w[0] = (solved_no_contact_A_w_w_w_w * self->state.w_w) + work->pull_w_w;
@@ -590,7 +590,7 @@ static void series_no_contact(const leaf_Self *self, Work *work)
     }
 }
 
-static void step_no_contact(const leaf_Self *self, Work *work)
+static inline void step_no_contact(const leaf_Self *self, Work *work)
 {
     work->at_w_w = self->state.w_w;
     work->at_w_em = self->state.w_em;
@@ -668,7 +668,7 @@ static void step_no_contact(const leaf_Self *self, Work *work)
     }
 }
 
-static void series_coast_contact(const leaf_Self *self, Work *work)
+static inline void series_coast_contact(const leaf_Self *self, Work *work)
 {
     work->order = 1.0;
     work->series_w_w[0] = (solved_coast_contact_A_w_w_w_w * self->state.w_w)
@@ -698,7 +698,7 @@ static void series_coast_contact(const leaf_Self *self, Work *work)
     }
 }
 
-static void step_coast_contact(const leaf_Self *self, Work *work)
+static inline void step_coast_contact(const leaf_Self *self, Work *work)
 {
     work->at_w_w = self->state.w_w;
     work->at_w_em = self->state.w_em;
@@ -798,7 +798,7 @@ static void step_coast_contact(const leaf_Self *self, Work *work)
     }
 }
 
-static void locate_drive_contact(const leaf_Self *self, Work *work)
+static inline void locate_drive_contact(const leaf_Self *self, Work *work)
 {
     work->low = 0.0;
     work->high = work->h;
@@ -819,7 +819,7 @@ static void locate_drive_contact(const leaf_Self *self, Work *work)
     work->elapsed = ha_min(work->high, work->h);
 }
 
-static void move_drive_contact(leaf_Self *self, Work *work)
+static inline void move_drive_contact(leaf_Self *self, Work *work)
 {
     step_drive_contact(self, work);
     work->elapsed = work->h;
@@ -839,7 +839,7 @@ static void move_drive_contact(leaf_Self *self, Work *work)
     self->state.theta_b = work->end_theta_b;
 }
 
-static void locate_no_contact(const leaf_Self *self, Work *work)
+static inline void locate_no_contact(const leaf_Self *self, Work *work)
 {
     work->low = 0.0;
     work->high = work->h;
@@ -875,7 +875,7 @@ static void locate_no_contact(const leaf_Self *self, Work *work)
     work->elapsed = ha_min(work->high, work->h);
 }
 
-static void move_no_contact(leaf_Self *self, Work *work)
+static inline void move_no_contact(leaf_Self *self, Work *work)
 {
     step_no_contact(self, work);
     work->elapsed = work->h;
@@ -895,7 +895,7 @@ static void move_no_contact(leaf_Self *self, Work *work)
     self->state.theta_b = work->end_theta_b;
 }
 
-static void locate_coast_contact(const leaf_Self *self, Work *work)
+static inline void locate_coast_contact(const leaf_Self *self, Work *work)
 {
     work->low = 0.0;
     work->high = work->h;
@@ -916,7 +916,7 @@ static void locate_coast_contact(const leaf_Self *self, Work *work)
     work->elapsed = ha_min(work->high, work->h);
 }
 
-static void move_coast_contact(leaf_Self *self, Work *work)
+static inline void move_coast_contact(leaf_Self *self, Work *work)
 {
     step_coast_contact(self, work);
     work->elapsed = work->h;
@@ -936,14 +936,14 @@ static void move_coast_contact(leaf_Self *self, Work *work)
     self->state.theta_b = work->end_theta_b;
 }
 
-static void switch_drive_contact(leaf_Self *self, const Work *work)
+static inline void switch_drive_contact(leaf_Self *self, const Work *work)
 {
     if (work->guard_0) {
         self->run_mode = leaf_RUN_no_contact;
     }
 }
 
-static void switch_no_contact(leaf_Self *self, const Work *work)
+static inline void switch_no_contact(leaf_Self *self, const Work *work)
 {
     if (work->guard_0) {
         /* driveline modes.no_contact.transitions.drive_contact.reset.theta_b */
@@ -956,14 +956,14 @@ static void switch_no_contact(leaf_Self *self, const Work *work)
     }
 }
 
-static void switch_coast_contact(leaf_Self *self, const Work *work)
+static inline void switch_coast_contact(leaf_Self *self, const Work *work)
 {
     if (work->guard_0) {
         self->run_mode = leaf_RUN_no_contact;
     }
 }
 
-static void predict_drive(leaf_Self *self)
+static inline void predict_drive(leaf_Self *self)
 {
     /* leaf modes.drive.observer.f.w_em */
     const double f_w_em = self->derived.k_hs_per_R_per_J_em * self->state.theta_b;
@@ -1010,7 +1010,7 @@ static void predict_drive(leaf_Self *self)
     }
 }
 
-static void correct_drive(leaf_Self *self, const leaf_In *in)
+static inline void correct_drive(leaf_Self *self, const leaf_In *in)
 {
     self->innovation.y_em = in->is_new.y_em ? (self->latched.y_em - self->state.w_em) : 0.0;
     self->innovation.y_w = in->is_new.y_w ? (self->latched.y_w - self->state.w_w) : 0.0;
@@ -1041,45 +1041,43 @@ static void correct_drive(leaf_Self *self, const leaf_In *in)
     }
 }
 
-static void run_gap(leaf_Self *self, Work *work)
+static inline void run_gap(leaf_Self *self, Work *work)
 {
     work->left = 0.001; /* leaf modes.gap.runs */
-    for (int32_t event = 0; event < 5; event++) {
-        if (work->left > 0.0) {
-            work->h = work->left;
-            switch (self->run_mode) {
-            case leaf_RUN_drive_contact:
-                move_drive_contact(self, work);
-                break;
-            case leaf_RUN_no_contact:
-                move_no_contact(self, work);
-                break;
-            case leaf_RUN_coast_contact:
-                move_coast_contact(self, work);
-                break;
-            default:
-                break;
-            }
-            work->left = work->left - work->elapsed;
-            if (work->crossed) {
-                if (event < 4) {
-                    switch (self->run_mode) {
-                    case leaf_RUN_drive_contact:
-                        switch_drive_contact(self, work);
-                        break;
-                    case leaf_RUN_no_contact:
-                        switch_no_contact(self, work);
-                        break;
-                    case leaf_RUN_coast_contact:
-                        switch_coast_contact(self, work);
-                        break;
-                    default:
-                        break;
-                    }
-                } else {
-                    self->faults |= leaf_FAULT_event_limit;
-                    work->left = 0.0;
+    for (int32_t event = 0; (event < 5) && (work->left > 0.0); event++) {
+        work->h = work->left;
+        switch (self->run_mode) {
+        case leaf_RUN_drive_contact:
+            move_drive_contact(self, work);
+            break;
+        case leaf_RUN_no_contact:
+            move_no_contact(self, work);
+            break;
+        case leaf_RUN_coast_contact:
+            move_coast_contact(self, work);
+            break;
+        default:
+            break;
+        }
+        work->left = work->left - work->elapsed;
+        if (work->crossed) {
+            if (event < 4) {
+                switch (self->run_mode) {
+                case leaf_RUN_drive_contact:
+                    switch_drive_contact(self, work);
+                    break;
+                case leaf_RUN_no_contact:
+                    switch_no_contact(self, work);
+                    break;
+                case leaf_RUN_coast_contact:
+                    switch_coast_contact(self, work);
+                    break;
+                default:
+                    break;
                 }
+            } else {
+                self->faults |= leaf_FAULT_event_limit;
+                work->left = 0.0;
             }
         }
     }
@@ -1113,7 +1111,7 @@ static void run_gap(leaf_Self *self, Work *work)
     }
 }
 
-static void predict_coast(leaf_Self *self)
+static inline void predict_coast(leaf_Self *self)
 {
     /* leaf modes.coast.observer.f.w_em */
     const double f_w_em = self->derived.k_hs_per_R_per_J_em * self->state.theta_b;
@@ -1160,7 +1158,7 @@ static void predict_coast(leaf_Self *self)
     }
 }
 
-static void correct_coast(leaf_Self *self, const leaf_In *in)
+static inline void correct_coast(leaf_Self *self, const leaf_In *in)
 {
     self->innovation.y_em = in->is_new.y_em ? (self->latched.y_em - self->state.w_em) : 0.0;
     self->innovation.y_w = in->is_new.y_w ? (self->latched.y_w - self->state.w_w) : 0.0;
@@ -1191,7 +1189,7 @@ static void correct_coast(leaf_Self *self, const leaf_In *in)
     }
 }
 
-static void equations_drive(leaf_Self *self)
+static inline void equations_drive(leaf_Self *self)
 {
     self->equation.w_d = (self->state.w_em * constant.per_R) - self->state.w_w; /* leaf equations.w_d */
     self->equation.w_b = 0.0; /* leaf modes.drive.equations.w_b */
@@ -1200,7 +1198,7 @@ static void equations_drive(leaf_Self *self)
         + (constant.c_hs * (self->equation.w_d - self->equation.w_b));
 }
 
-static void jump_drive(leaf_Self *self)
+static inline void jump_drive(leaf_Self *self)
 {
     if (self->equation.T_hs <= 0.0) { /* leaf modes.drive.transitions.gap.when */
         if (self->timer.drive_gap < 2U) {
@@ -1217,7 +1215,7 @@ static void jump_drive(leaf_Self *self)
     }
 }
 
-static void equations_gap(leaf_Self *self)
+static inline void equations_gap(leaf_Self *self)
 {
     self->equation.w_d = (self->state.w_em * constant.per_R) - self->state.w_w; /* leaf equations.w_d */
     /* theta_d - theta_b */
@@ -1230,7 +1228,7 @@ static void equations_gap(leaf_Self *self)
         - self->equation.w_b));
 }
 
-static void jump_gap(leaf_Self *self)
+static inline void jump_gap(leaf_Self *self)
 {
     if (self->run_mode == leaf_RUN_drive_contact) { /* leaf modes.gap.transitions.drive.when */
         if (self->timer.gap_drive < 2U) {
@@ -1259,7 +1257,7 @@ static void jump_gap(leaf_Self *self)
     }
 }
 
-static void equations_coast(leaf_Self *self)
+static inline void equations_coast(leaf_Self *self)
 {
     self->equation.w_d = (self->state.w_em * constant.per_R) - self->state.w_w; /* leaf equations.w_d */
     self->equation.w_b = 0.0; /* leaf modes.coast.equations.w_b */
@@ -1268,7 +1266,7 @@ static void equations_coast(leaf_Self *self)
         + (constant.c_hs * (self->equation.w_d - self->equation.w_b));
 }
 
-static void jump_coast(leaf_Self *self)
+static inline void jump_coast(leaf_Self *self)
 {
     if (self->equation.T_hs >= 0.0) { /* leaf modes.coast.transitions.gap.when */
         if (self->timer.coast_gap < 2U) {
@@ -1285,14 +1283,14 @@ static void jump_coast(leaf_Self *self)
     }
 }
 
-static void compare_stamps(leaf_Self *self, const leaf_Cal *cal)
+static inline void compare_stamps(leaf_Self *self, const leaf_Cal *cal)
 {
     if (cal->J_em != solved_stamp_J_em) {
         self->faults |= leaf_FAULT_stale_calibration;
     }
 }
 
-static void latch(leaf_Self *self, const leaf_In *in)
+static inline void latch(leaf_Self *self, const leaf_In *in)
 {
     if ((in->y_em >= (-400.0)) && (in->y_em <= 2400.0)) {
         self->latched.y_em = in->y_em; /* inputs.y_em */
@@ -1320,13 +1318,13 @@ static void latch(leaf_Self *self, const leaf_In *in)
     }
 }
 
-static void remember(leaf_Self *self)
+static inline void remember(leaf_Self *self)
 {
     self->before.T_em = self->latched.T_em;
     self->before.T_br = self->latched.T_br;
 }
 
-static void start(leaf_Self *self, const leaf_In *in)
+static inline void start(leaf_Self *self, const leaf_In *in)
 {
     if ((constant.alpha >= (-0.5)) && (constant.alpha <= 0.5)) {
         self->state.theta_d = constant.alpha; /* leaf states.theta_d.initial */

@@ -34,13 +34,13 @@ const heater_Cal heater_default_cal = {
     .P_max = 200.0,
 };
 
-static void equations_rest(heater_Self *self)
+static inline void equations_rest(heater_Self *self)
 {
     self->equation.low = self->latched.T < constant.T_on; /* heater equations.low */
     self->equation.P = 0.0; /* heater modes.rest.equations.P */
 }
 
-static void jump_rest(heater_Self *self, const heater_In *in)
+static inline void jump_rest(heater_Self *self, const heater_In *in)
 {
     if (self->equation.low && in->request) { /* heater modes.rest.transitions.heating.when */
         if (self->timer.rest_heating < 4U) {
@@ -63,7 +63,7 @@ static void jump_rest(heater_Self *self, const heater_In *in)
     }
 }
 
-static void equations_heating(heater_Self *self, const heater_Cal *cal)
+static inline void equations_heating(heater_Self *self, const heater_Cal *cal)
 {
     self->equation.low = self->latched.T < constant.T_on; /* heater equations.low */
     /* heater modes.heating.equations.P */
@@ -71,7 +71,7 @@ static void equations_heating(heater_Self *self, const heater_Cal *cal)
         cal->P_max) * sqrt(fabs(ha_sin(self->latched.T * constant.per_T_on * 1.0)));
 }
 
-static void jump_heating(heater_Self *self, const heater_In *in)
+static inline void jump_heating(heater_Self *self, const heater_In *in)
 {
     if ((self->latched.T >= constant.T_off) || (!in->request)) {
         self->mode = heater_MODE_rest;
@@ -79,7 +79,7 @@ static void jump_heating(heater_Self *self, const heater_In *in)
     }
 }
 
-static void update_heating(heater_Self *self)
+static inline void update_heating(heater_Self *self)
 {
     /* heater modes.heating.update.heat */
     const double next_heat =
@@ -92,7 +92,7 @@ static void update_heating(heater_Self *self)
     }
 }
 
-static void latch(heater_Self *self, const heater_In *in)
+static inline void latch(heater_Self *self, const heater_In *in)
 {
     if ((in->T >= 200.0) && (in->T <= 500.0)) {
         self->latched.T = in->T; /* inputs.T */
@@ -104,11 +104,11 @@ static void latch(heater_Self *self, const heater_In *in)
     }
 }
 
-static void remember(void)
+static inline void remember(void)
 {
 }
 
-static void start(heater_Self *self)
+static inline void start(heater_Self *self)
 {
     const double new_heat = 0.3; /* heater states.heat.initial */
     if ((new_heat >= 0.0) && (new_heat <= 1000000.0)) {
