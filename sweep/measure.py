@@ -98,12 +98,13 @@ class SignalMeasure:
 
 @dataclass(frozen=True)
 class ValueMeasure:
-    """An expression of earlier measures."""
+    """An expression of earlier measures: a quantity, or whether something is the case."""
 
     name: str
     formula: Formula
     unit: str
     span: Span
+    is_truth: bool = False
 
 
 Measure = EventMeasure | DelayMeasure | MatchMeasure | SignalMeasure | ValueMeasure
@@ -117,10 +118,10 @@ MATCH_PARTS = {
 
 @dataclass(frozen=True)
 class Column:
-    """A column of the store: `type` is real, whole, a text or a list of reals; `unit` is in SI."""
+    """A column of the store; a list is one of reals, `unit` is in SI."""
 
     name: str
-    type: Literal["real", "whole", "text", "list"]
+    type: Literal["real", "whole", "truth", "text", "list"]
     unit: str
 
 
@@ -131,5 +132,7 @@ def columns_of(measure: Measure) -> tuple[Column, ...]:
             Column(f"{measure.name}.{part}", kind, "1" if kind == "whole" else "s")  # type: ignore[arg-type]
             for part, kind in MATCH_PARTS.items()
         )
+    if isinstance(measure, ValueMeasure) and measure.is_truth:
+        return (Column(measure.name, "truth", "1"),)
     is_count = isinstance(measure, EventMeasure) and measure.kind == "count"
     return (Column(measure.name, "whole" if is_count else "real", measure.unit),)

@@ -45,8 +45,10 @@ KEYS: dict[str, tuple[str, ...]] = {
     "settling": ("within",),
     "frequency": ("by",),
     "value": (),
+    "is": (),
 }
-"""What stands beside each kind of measure, and `from` and `until` but for `value`."""
+"""What stands beside each kind of measure, and `from` and `until` but for `value` and `is`."""
+VALUES = ("value", "is")
 MOST_EVENTS = 1_000_000
 
 
@@ -70,7 +72,9 @@ class MeasureReader(Reader):
                 del self.dimensions[entry.key]
                 found.append(measure)
                 for column in columns_of(measure):
-                    if column.type != "list":
+                    if column.type == "truth":
+                        self.dimensions[column.name] = "truth"
+                    elif column.type != "list":
                         self.dimensions[column.name] = self._dimension(measure, column.unit)
         if node is None or (isinstance(node, Table) and not node.entries):
             self.problems.error("missing", at, "a study has `measures`", "like `{final: plant.w}`")
@@ -97,8 +101,12 @@ class MeasureReader(Reader):
         scalar = self.scalar(own.get(kind), kind, entry.span)
         if scalar is None:
             return None
-        if kind == "value":
-            return self._value(entry, scalar)
+        if kind in VALUES:
+            for key in WINDOW:
+                if key in own.entries:
+                    label = f"`{kind}` reads measures: it has no window"
+                    self.problems.error("form", own.entries[key].span, label)
+            return self._value(entry, scalar, kind == "is")
         since, until = (self._bound(own.get(key), key) for key in WINDOW)
         if kind in SIGNAL_KINDS:
             return self._signal(entry, kind, scalar, own, since, until)
@@ -218,7 +226,7 @@ class MeasureReader(Reader):
         self.expressions[f"measured_{name}"] = formula, kind
         return f"measured_{name}", kind
 
-    def _value(self, entry: Entry, scalar: Scalar) -> Measure | None:
+    def _value(self, entry: Entry, scalar: Scalar, is_truth: bool) -> Measure | None:
         formula = self.expression(scalar, entry.key, scalar.span)
         if formula is None:
             return None
@@ -229,12 +237,15 @@ class MeasureReader(Reader):
         kind = check.kind(formula.tree)
         if len(self.problems.found) > told or kind is None:
             return None
-        if not isinstance(kind, Dimension):
-            label = f"`{entry.key}` is a quantity"
-            self.problems.error("type", scalar.span, label, "like `if late then 1 else 0`")
+        if is_truth != (kind == "truth") or not (is_truth or isinstance(kind, Dimension)):
+            label = f"`{entry.key}` is a quantity: `is` asks whether something is the case"
+            if is_truth:
+                label = f"`is` asks whether something is the case, and `{entry.key}` is a quantity"
+            hint = "like `{value: 2 * late}` or `{is: late > 2 ms}`"
+            self.problems.error("type", scalar.span, label, hint)
             return None
-        self._last = kind
-        return ValueMeasure(entry.key, formula, str(kind), entry.span)
+        self._last = kind if isinstance(kind, Dimension) else NUMBER
+        return ValueMeasure(entry.key, formula, str(self._last), entry.span, is_truth)
 
     _last: Dimension = NUMBER
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from language.evaluate import evaluate
-from language.lower import assigned
+from language.lower import assigned, expression
 from language.operation import Ref
 from sweep.measure import (
     Bound,
@@ -20,7 +20,7 @@ from sweep.measure import (
 from sweep.observation import Observation
 from sweep.waveform import signal_number
 
-Cell = float | int | str | list[float] | None
+Cell = float | int | bool | str | list[float] | None
 Window = tuple[float, float] | None
 
 
@@ -125,7 +125,9 @@ def _value(measure: ValueMeasure, found: Mapping[str, Cell]) -> Cell:
         cell = found[name]
         if cell is None or isinstance(cell, list):
             return None
-        read[name] = float(cell)
+        read[name] = cell if isinstance(cell, bool) else float(cell)
     known = {name: Ref(name) for name in read}
+    if measure.is_truth:
+        return bool(evaluate(expression(measure.formula.tree, known), read))
     value = float(evaluate(assigned(measure.formula.tree, known, False), read))
     return value if math.isfinite(value) else None

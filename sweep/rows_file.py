@@ -30,6 +30,7 @@ def parquet_of(manifest: Manifest, rows: Sequence[Row], mark: bytes) -> bytes:
     columns["message"] = arrow.array([row.message for row in rows], arrow.string())
     types = {
         "real": arrow.float64(), "whole": arrow.int64(), "text": arrow.string(),
+        "truth": arrow.bool_(),
         "list": arrow.list_(arrow.float64()),
     }  # fmt: skip
     for column in manifest.measures:

@@ -95,7 +95,7 @@ def summary_of(store: Store) -> Summary:
     lines: list[Line] = []
     rates: list[Rate] = []
     groups = list(_groups(table))
-    for column in (each for each in manifest.measures if each.type != "text"):
+    for column in (each for each in manifest.measures if each.type not in ("text", "truth")):
         pooled = table.pooled(column.name)
         for name, chosen in groups:
             values = pooled.values[chosen[pooled.rows]]
@@ -182,12 +182,13 @@ def _rates(
     groups: Sequence[tuple[dict[str, str], NDArray[np.bool_]]],
     confidence: float,
 ) -> Iterator[Rate]:
-    """Yield the rates of a match: how many of the truths, how often the first, was missed."""
+    """Yield how often something is the case; how many truths, how often the first, were missed."""
     base, _, part = column.name.rpartition(".")
-    if part not in RATES:
+    if column.type != "truth" and part not in RATES:
         return
     hits = table.reals(column.name)
-    of = table.reals(f"{base}.{RATES[part]}") if RATES[part] else (hits == hits).astype(np.float64)
+    whole = RATES.get(part, "") if column.type != "truth" else ""
+    of = table.reals(f"{base}.{whole}") if whole else (hits == hits).astype(np.float64)
     for group, chosen in groups:
         seen = int(np.nansum(hits[chosen]))
         count = int(np.nansum(of[chosen]))

@@ -52,7 +52,7 @@ def test_parameters_and_steps_are_those_of_simulate(number: int, tmp_path: Path)
     assert row.status == "done"
     assert row.measures == {
         "t_1": falls[0], "falls": len(falls), "peak": float(np.max(np.abs(x))),
-        "final": float(x[-1]), "twice": 2.0 * falls[0],
+        "final": float(x[-1]), "twice": 2.0 * falls[0], "soon": falls[0] < 0.5,
     }  # fmt: skip
 
 

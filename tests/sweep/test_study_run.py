@@ -161,7 +161,7 @@ from sweep.worker import serve
 
 def run(batch):
     mark = sys.argv[1]
-    if len(sys.argv) > 2 and batch.count == 12:
+    if batch.count == 12:
         os.kill(os.getpid(), 9)
     if not os.path.exists(mark):
         open(mark, "w").close()
@@ -172,24 +172,19 @@ serve(run)
 """
 
 
-def test_a_dead_worker_is_replaced_and_its_block_computed_by_another(tmp_path: Path) -> None:
+def test_a_dead_worker_is_replaced_and_what_ends_every_worker_is_left_out(tmp_path: Path) -> None:
+    """The first block that is computed kills its worker once, the block of 12 variants always."""
     made = study()
     command = [sys.executable, "-c", WORKER, str(tmp_path / "mark")]
-    run_study(made, tmp_path / "undisturbed", QUICK, block=15)
-    found = run_study(made, tmp_path / "workers", Processes(2, command), block=15)
-    assert found.lost == ()
+    run_study(made, tmp_path / "undisturbed", QUICK, block=16)
+    found = run_study(made, tmp_path / "workers", Processes(2, command), block=16)
     assert (tmp_path / "mark").exists()
-    assert bytes_of(tmp_path / "workers") == bytes_of(tmp_path / "undisturbed")
-
-
-def test_a_block_that_ends_every_worker_is_left_out_and_told(tmp_path: Path) -> None:
-    made = study()
-    (tmp_path / "mark").touch()
-    command = [sys.executable, "-c", WORKER, str(tmp_path / "mark"), "deadly"]
-    found = run_study(made, tmp_path / "workers", Processes(1, command), block=16)
     assert [block.start for block, _ in found.lost] == [48]
     assert f"{MOST_DEATHS} worker processes" in found.lost[0][1]
     assert found.computed == 48
+    again = run_study(made, tmp_path / "workers", QUICK)
+    assert (again.before, again.computed) == (48, 12)
+    assert bytes_of(tmp_path / "workers") == bytes_of(tmp_path / "undisturbed")
 
 
 def test_real_workers_give_the_bits_of_this_process(tmp_path: Path) -> None:
@@ -197,8 +192,8 @@ def test_real_workers_give_the_bits_of_this_process(tmp_path: Path) -> None:
 
     made = study("alone")
     alone = run_study(made, tmp_path / "alone", InProcess(run_variants), block=2)
-    run_study(made, tmp_path / "two", Processes(2, COMMAND), block=2)
-    assert bytes_of(tmp_path / "two") == bytes_of(tmp_path / "alone")
+    run_study(made, tmp_path / "worker", Processes(1, COMMAND), block=2)
+    assert bytes_of(tmp_path / "worker") == bytes_of(tmp_path / "alone")
     rows = content(alone.store)
     assert [row["status"] for row in rows] == ["done"] * 5
     assert len({json.dumps(row["final"]) for row in rows}) == 5

@@ -17,7 +17,7 @@ from sweep.picture import pictures, rank_correlation
 from sweep.store import Store
 from sweep.study_run import run_study
 from sweep.summary import Summary, summary_of
-from tests.sweep.laying import QUICK, quick, study
+from tests.sweep.laying import QUICK, content, quick, study
 
 
 def faulty(batch: Batch) -> BatchResult:
@@ -66,6 +66,17 @@ def test_rates_of_a_match_have_their_intervals(tmp_path: Path) -> None:
     assert (rates["twice.missed"].hits, rates["twice.missed"].count) == (60, 60)
     interval = rates["twice.first_missed"].interval
     assert interval == pytest.approx((0.9398, 1.0), abs=1e-4)
+
+
+def test_what_is_the_case_has_a_rate_and_no_mean(tmp_path: Path) -> None:
+    store = run_study(study(), tmp_path, QUICK).store
+    found = summary_of(store)
+    (rate,) = found.rates
+    hits = sum(row["t_1"] < 0.5 for row in content(store))  # type: ignore[operator]
+    assert (rate.measure, rate.hits, rate.count) == ("soon", hits, 60)
+    assert 0 < hits < 60 and rate.interval is not None
+    assert rate.interval[0] < hits / 60 < rate.interval[1]
+    assert [x.measure for x in found.lines] == ["t_1", "falls", "peak", "final", "twice"]
 
 
 def test_nothing_finished_is_an_empty_summary(tmp_path: Path) -> None:
