@@ -160,9 +160,14 @@ def _noise(times: Values, values: Values, usual: float) -> float:
 
 def _repeated(values: Values, quantum: float, noise: float) -> float:
     """Return the share of values equal to the one before, beyond what quantisation explains."""
-    if noise <= max(quantum, 1e-12 * float(np.abs(values).max())) or len(values) < LEAST_SAMPLES:
+    changes = np.abs(np.diff(values))
+    changes = changes[changes > 0.0]
+    if len(changes) < LEAST_SAMPLES:
         return 0.0
-    by_chance = quantum / (2.0 * math.sqrt(math.pi) * noise)
+    step = max(quantum, float(np.percentile(changes, 1.0)))  # rounding may hide the quantum
+    if noise <= step:
+        return 0.0
+    by_chance = step / (2.0 * math.sqrt(math.pi) * noise)
     runs = [last - first for first, last in _runs(np.diff(values) == 0.0)]
     share = sum(run for run in runs if run <= LONGEST_HELD) / (len(values) - 1)
     return max(0.0, (share - by_chance) / (1.0 - by_chance))

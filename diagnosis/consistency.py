@@ -92,7 +92,7 @@ def relations(
             left -= part.end - part.start
             run = free_run(automaton, part, mapping, build)
             for name, compared in run.compared.items():
-                relation = _relation(part.name, name, compared)
+                relation = relation_of(part.name, name, compared)
                 if relation:
                     found.append(relation)
     return found
@@ -152,13 +152,16 @@ def _rate(times: Values, values: Values, grid: Values, spread: float = SMOOTH) -
     return np.gradient(smooth, GRID)
 
 
-def _relation(recording: str, name: str, compared: Compared) -> Relation | None:
+def relation_of(
+    recording: str, name: str, compared: Compared, spread: float = SMOOTH
+) -> Relation | None:
+    """Return how two signals, smoothed by `spread` [s], go together; None for too short ones."""
     start, end = compared.times[0] + SETTLED, compared.times[-1]
     if end - start < 1.0 or not np.all(np.isfinite(compared.simulated)):
         return None
     grid = np.arange(start, end, GRID)
-    measured = _rate(compared.times, compared.measured, grid)
-    simulated = _rate(compared.times, compared.simulated, grid)
+    measured = _rate(compared.times, compared.measured, grid, spread)
+    simulated = _rate(compared.times, compared.simulated, grid, spread)
     most = min(round(LARGEST_LAG / GRID), len(grid) // 4)
     if len(measured) < 3 * most or not measured.std() or not simulated.std():
         return None

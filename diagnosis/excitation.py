@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.signal import welch
 
 from diagnosis.channel_check import ChannelCheck, check_channel
+from diagnosis.needs import EFFECTS, NEEDS
 from engine.recording import Channel, Recording, pieces
 from language.map import column_dimension
 from language.units import NUMBER, fits, parse_unit
@@ -26,57 +27,6 @@ REVERSED = 0.02
 ABOVE_NOISE = 10.0
 """Power over that of the noise from which a frequency is excited."""
 SPEEDS, POSITIONS = ("rad/s", "m/s"), ("rad", "m")
-EFFECTS: Mapping[str, tuple[str, ...]] = {
-    "actuator_delay": ("fast",),
-    "actuator_lag": ("fast",),
-    "added_inertia": ("fast", "sampled_fast"),
-    "backlash": ("torque_reverses",),
-    "brake_drag": ("brakes",),
-    "clock_offset": ("fast",),
-    "compliance": ("fast", "sampled_fast"),
-    "coulomb_friction": ("speed_reverses",),
-    "load_dependent_loss": ("both_signs",),
-    "mount_compliance": ("fast", "sampled_fast"),
-    "position_dependent_stiffness": ("turns", "moves"),
-    "quadratic_drag": ("speed_range",),
-    "road_grade": ("moves",),
-    "second_gap": ("torque_reverses", "sampled_fast"),
-    "sensor_delay": ("fast",),
-    "sensor_eccentricity": ("turns",),
-    "sensor_lag": ("fast",),
-    "sensor_offset": ("speed_range",),
-    "sensor_quantisation": ("moves",),
-    "sensor_scale": ("speed_range",),
-    "stiffness_hysteresis": ("two_sizes",),
-    "stiffness_nonlinear": ("two_sizes",),
-    "stribeck_friction": ("speed_reverses",),
-    "torque_derating": ("power",),
-    "torque_drift": ("long",),
-    "torque_gain": ("both_signs",),
-    "torque_offset": ("speed_reverses",),
-    "torque_rate_limit": ("two_sizes",),
-    "torque_ripple": ("turns", "sampled_fast"),
-    "tyre_slip": ("fast", "speed_range"),
-    "unequal_half_shafts": ("torque_reverses", "sampled_fast"),
-    "unknown_input": ("moves",),
-    "viscous_friction": ("speed_range",),
-}
-"""What each effect of the library has to see."""
-NEEDS: Mapping[str, str] = {
-    "fast": "steps or a sweep to 5 Hz or more",
-    "sampled_fast": "a rate of 50 Hz or more",
-    "torque_reverses": "an input that changes its sign",
-    "speed_reverses": "a speed that passes through zero",
-    "both_signs": "positive and negative input at the same speed",
-    "speed_range": "a wide range of speed",
-    "two_sizes": "steps of two sizes, one at least twice the other",
-    "turns": "five turns or more",
-    "moves": "motion for 2 s or more",
-    "long": "a recording of 8 s or more",
-    "power": "a large input at high and at low speed",
-    "brakes": "a brake that is applied and let go",
-}
-"""What each need asks for, as a manoeuvre."""
 
 
 @dataclass(frozen=True)
@@ -117,7 +67,8 @@ class Excitation:
     @property
     def is_dead(self) -> bool:
         """Tell whether no input does anything."""
-        return all(not signal.steps and signal.band == 0.0 for signal in self.inputs)
+        idle = [not signal.steps and signal.band == 0.0 for signal in self.inputs]
+        return bool(idle) and all(idle)
 
 
 def excitation(recordings: Sequence[Recording], checks: Sequence[ChannelCheck]) -> Excitation:
@@ -130,7 +81,7 @@ def excitation(recordings: Sequence[Recording], checks: Sequence[ChannelCheck]) 
         channels = [(piece, piece.channels[name]) for piece in used if name in piece.channels]
         column = channels[0][1].column
         found = _excited(name, channels, noise)
-        if _is_speed(channels[0][1]):
+        if is_speed(channels[0][1]):
             speeds.append(found)
         elif column.to is not None:
             inputs.append(found)
@@ -147,7 +98,7 @@ def excitation(recordings: Sequence[Recording], checks: Sequence[ChannelCheck]) 
 
 def _with_speeds(piece: Recording) -> Recording:
     """Return a recording with the rates of its positions as channels if it has no speed."""
-    if any(_is_speed(channel) for channel in piece.channels.values()):
+    if any(is_speed(channel) for channel in piece.channels.values()):
         return piece
     found = dict(piece.channels)
     for name, channel in piece.channels.items():
@@ -163,7 +114,8 @@ def _with_speeds(piece: Recording) -> Recording:
     return replace(piece, channels=found)
 
 
-def _is_speed(channel: Channel) -> bool:
+def is_speed(channel: Channel) -> bool:
+    """Tell whether a channel is a speed, turning or straight."""
     dimension = column_dimension(channel.column)
     return any(fits(dimension, parse_unit(text).dimension) for text in SPEEDS)
 

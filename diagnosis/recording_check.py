@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from diagnosis.alike import alike
 from diagnosis.channel_check import ChannelCheck, check_channel, findings_of
 from diagnosis.consistency import Relation, relations
 from diagnosis.disagreement import disagreements
@@ -59,6 +60,8 @@ def check_recordings(
     findings += _too_little(recordings, channels, excited)
     found: list[Relation] = []
     lacks = any(finding.kind == "no_signal" for finding in findings)
+    if automaton is None and not lacks:
+        findings += alike(recordings)
     if automaton is not None and automaton.period is None and not lacks:
         found = relations(recordings, mapping, automaton, build)
         findings += disagreements(found, automaton, mapping, recordings)

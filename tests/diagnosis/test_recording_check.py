@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from diagnosis.excitation import EFFECTS, NEEDS
 from diagnosis.finding import told
+from diagnosis.needs import EFFECTS, NEEDS
 from diagnosis.recording_check import RecordingCheck, check_recordings
 from engine.recording import Recording
 from language.project import Project
@@ -165,3 +165,19 @@ def test_what_is_excited_says_which_effects_can_be_tested() -> None:
 def test_every_effect_that_is_shipped_says_what_it_needs() -> None:
     assert set(Project(Path()).effects) <= set(EFFECTS)
     assert {need for needs in EFFECTS.values() for need in needs} <= set(NEEDS)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "expected"),
+    [
+        (None, set()),
+        (later("wheel", 0.2), {("error", "clock_offset", "wheel")}),
+        (later("motor", 0.2), {("error", "clock_offset", "motor")}),
+        (scaled("wheel", -1.0), {("warning", "sign", "wheel")}),
+        (later("torque", 0.2), set()),
+    ],
+)
+def test_without_a_model_two_speeds_of_one_motion_tell_clocks_and_signs(
+    spoil: Spoil | None, expected: set[tuple[str, str, str]]
+) -> None:
+    assert seen(check_recordings([spoiled(spoil)], bench())) == expected
