@@ -1,0 +1,84 @@
+"""Work values: only what may be read before it is set is set when a step begins."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import pytest
+
+from codegen.source import c_files
+from codegen.unassigned import unassigned
+from language.operation import (
+    Assign,
+    Block,
+    Branch,
+    Choose,
+    Compare,
+    Item,
+    Loop,
+    Ref,
+    Run,
+    Store,
+    real,
+    whole,
+)
+from language.program import Program, Variable
+from modewright.api import program as shipped
+
+A, B = Ref("work.a"), Ref("work.b")
+SET_A = Assign("work.a", real(1.0))
+USE_A = Assign("state.x", A)
+IS_HIGH = Compare(">", Ref("state.x"), real(0.0))
+
+
+def early(*step: object, **blocks: Block) -> frozenset[str]:
+    made = Program(
+        name="made",
+        number="float64",
+        period=Fraction(1),
+        major_step=Fraction(1),
+        constants=(),
+        variables=(Variable("work.list", "real", size=2),),
+        outputs=(),
+        modes=(),
+        transitions=(),
+        faults=(),
+        functions=(),
+        blocks={"step": step, **blocks},  # type: ignore[dict-item]
+    )
+    return unassigned(made, "step", frozenset({"work.a", "work.b", "work.list"}))
+
+
+@pytest.mark.parametrize(
+    ("step", "found"),
+    [
+        ((SET_A, USE_A), set()),
+        ((USE_A, SET_A), {"work.a"}),
+        ((Branch(IS_HIGH, (SET_A,)), USE_A), {"work.a"}),
+        ((Branch(IS_HIGH, (SET_A,), (SET_A,)), USE_A), set()),
+        ((Choose("memory.mode", ((0, (SET_A,)), (1, (SET_A,)))), USE_A), {"work.a"}),
+        ((Loop(3, "work.k", (SET_A,)), USE_A), set()),
+        ((Loop(3, "work.k", (Branch(IS_HIGH, (SET_A,)),)), USE_A), {"work.a"}),
+        ((Run("sets"), USE_A), set()),
+        ((Branch(IS_HIGH, (Run("sets"),)), Run("uses")), {"work.a"}),
+        ((Store("work.list", whole(0), real(1.0)), Assign("state.x", Item("work.list", whole(0)))), set()),
+        ((Store("work.list", whole(0), real(1.0)), Assign("state.x", Item("work.list", whole(1)))), {"work.list"}),
+        ((Store("work.list", whole(0), real(1.0)), Assign("state.x", Item("work.list", B))), {"work.b", "work.list"}),
+    ],
+)  # fmt: skip
+def test_what_may_be_read_before_it_is_set_is_found(step: Block, found: set[str]) -> None:
+    assert early(*step, sets=(SET_A,), uses=(USE_A,)) == found
+
+
+def test_a_driveline_sets_three_of_its_work_values_when_a_step_begins() -> None:
+    text = c_files(shipped("driveline"))["driveline.c"]
+    begin = text[text.index("    Work scratch;") : text.index("    if (self->started)")]
+    assert begin.count(" = ") == 4
+    for line in ("work->event = false;", "work->elapsed = 0.0;", "work->crossed = false;"):
+        assert line in begin
+
+
+def test_a_loop_ends_where_its_condition_does() -> None:
+    text = c_files(shipped("driveline"))["driveline.c"]
+    assert "for (int32_t piece = 0; (piece < 101) && (work->left > 0.0); piece++) {" in text
+    assert "for (int32_t halving = 0; halving < 44; halving++) {" in text
