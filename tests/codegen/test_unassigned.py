@@ -14,6 +14,7 @@ from language.operation import (
     Branch,
     Choose,
     Compare,
+    Expr,
     Item,
     Loop,
     Ref,
@@ -28,7 +29,12 @@ from modewright.api import program as shipped
 A, B = Ref("work.a"), Ref("work.b")
 SET_A = Assign("work.a", real(1.0))
 USE_A = Assign("state.x", A)
+SET_FIRST = Store("work.list", whole(0), real(1.0))
 IS_HIGH = Compare(">", Ref("state.x"), real(0.0))
+
+
+def use_item(index: Expr) -> Assign:
+    return Assign("state.x", Item("work.list", index))
 
 
 def early(*step: object, **blocks: Block) -> frozenset[str]:
@@ -61,11 +67,11 @@ def early(*step: object, **blocks: Block) -> frozenset[str]:
         ((Loop(3, "work.k", (Branch(IS_HIGH, (SET_A,)),)), USE_A), {"work.a"}),
         ((Run("sets"), USE_A), set()),
         ((Branch(IS_HIGH, (Run("sets"),)), Run("uses")), {"work.a"}),
-        ((Store("work.list", whole(0), real(1.0)), Assign("state.x", Item("work.list", whole(0)))), set()),
-        ((Store("work.list", whole(0), real(1.0)), Assign("state.x", Item("work.list", whole(1)))), {"work.list"}),
-        ((Store("work.list", whole(0), real(1.0)), Assign("state.x", Item("work.list", B))), {"work.b", "work.list"}),
+        ((SET_FIRST, use_item(whole(0))), set()),
+        ((SET_FIRST, use_item(whole(1))), {"work.list"}),
+        ((SET_FIRST, use_item(B)), {"work.b", "work.list"}),
     ],
-)  # fmt: skip
+)
 def test_what_may_be_read_before_it_is_set_is_found(step: Block, found: set[str]) -> None:
     assert early(*step, sets=(SET_A,), uses=(USE_A,)) == found
 
