@@ -28,6 +28,13 @@ def test_the_spec_in_the_readme_has_15_lines_and_no_problem(tmp_path: Path) -> N
     assert mw.check(str(spec)) == []
 
 
+def test_the_study_on_its_page_has_no_problem(tmp_path: Path) -> None:
+    text = re.findall(r"```yaml\n(.*?)```", (ROOT / "docs/studies.md").read_text(), re.DOTALL)[0]
+    spec = tmp_path / "study.yaml"
+    spec.write_text(text)
+    assert mw.check(str(spec)) == []
+
+
 def test_every_command_in_the_readme_exists() -> None:
     used = set(re.findall(r"`modewright (\w+) ", README))
     assert used == set(re.findall(r"\| `modewright (\w+)", README))

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import errno
 import itertools
 import json
 import os
 import resource
+import shutil
 import signal
+import subprocess
 import sys
 import time
 from collections.abc import Iterable, Iterator
@@ -151,6 +154,29 @@ def test_a_full_disk_ends_the_run_and_what_is_finished_is_kept(tmp_path: Path) -
     assert [path.name for path in store.folder.rglob("*.part")] == []
     assert run_study(made, tmp_path / "full", QUICK).before == 30
     assert bytes_of(tmp_path / "full") == bytes_of(tmp_path / "undisturbed")
+
+
+def test_on_a_small_disk_a_study_goes_on_when_there_is_room(tmp_path: Path) -> None:
+    """A tmpfs of 64 kB; where none may be mounted, the limit above has to do."""
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(disk)]
+    if shutil.which("mount") is None or subprocess.run(mount, capture_output=True).returncode:
+        return
+    try:
+        made = study()
+        run_study(made, tmp_path / "undisturbed", QUICK, block=2)
+        with pytest.raises(OSError) as raised:
+            run_study(made, disk / "out", QUICK, block=2)
+        assert raised.value.errno == errno.ENOSPC
+        there = read_store(disk / "out").paths()
+        assert 0 < len(there) < 30
+        assert list(disk.rglob("*.part")) == []
+        subprocess.run(["mount", "-o", "remount,size=4m", str(disk)], check=True)
+        assert run_study(made, disk / "out", QUICK).before == 2 * len(there)
+        assert bytes_of(disk / "out") == bytes_of(tmp_path / "undisturbed")
+    finally:
+        subprocess.run(["umount", str(disk)], check=True)
 
 
 WORKER = """
