@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from language.declaration import Parameter
+from language.known import unit_text
 from language.model import Automaton
 
 Reals = NDArray[np.float64]
@@ -70,7 +71,7 @@ def uncertain_of(automaton: Automaton, effects: Sequence[str] = ()) -> tuple[Unc
 def _of_base(parameter: Parameter) -> Uncertain:
     assert parameter.range and parameter.value is not None
     low, high = (float(end) for end in parameter.range)
-    value, unit = float(parameter.value), parameter.unit.text
+    value, unit = float(parameter.value), si_unit(parameter)
     if low >= 0.0 and value > 0.0:
         low = low if low > 0.0 else 1e-3 * value
         return Uncertain(parameter.name, value, low, high, PRIOR, True, unit=unit)
@@ -85,7 +86,7 @@ def _of_effect(parameter: Parameter) -> Uncertain:
     starts = _starts(parameter, value)
     each = fitting.per == "recording"
     place = (parameter.name, value, low, high)
-    unit = parameter.unit.text
+    unit = si_unit(parameter)
     if low > 0.0 and value > 0.0:
         sd = WIDE * math.log(high / low)
         return Uncertain(*place, sd, True, each, starts, unit)
@@ -104,3 +105,10 @@ def _starts(parameter: Parameter, value: float) -> tuple[float, ...]:
         far = float(neutral) + 0.1 * float(parameter.range[1] - neutral)
     assert far is not None
     return (float(neutral) + NEAR * (far - float(neutral)), far)
+
+
+def si_unit(parameter: Parameter) -> str:
+    """Return the unit of a parameter's value: as it is written where that is SI."""
+    unit = parameter.unit
+    is_si = unit.factor == 1 and unit.offset == 0
+    return unit.text if is_si else unit_text(unit.dimension)

@@ -11,12 +11,14 @@ from typing import TYPE_CHECKING, Any
 from modewright.neighbours import claim_neighbours
 
 if TYPE_CHECKING:
+    from diagnosis.dossier import Dossier
     from engine.difference import RunDifference
     from engine.plot import Picture
     from engine.trajectory import Event, Trajectory
     from language.problem import Problem, SpecError, render_all
     from lockstep.compare import Verdict
     from modewright.api import Loaded, Replayed, check, generate, load, lockstep, replay, simulate
+    from modewright.diagnoses import diagnose, save_diagnosis
     from modewright.diagram import Diagram, graph
     from modewright.recordings import CheckedRecordings, check_recordings
     from modewright.runs import compare, plot, read, save
@@ -25,6 +27,7 @@ if TYPE_CHECKING:
 __all__ = [
     "CheckedRecordings",
     "Diagram",
+    "Dossier",
     "Event",
     "Loaded",
     "Picture",
@@ -37,6 +40,7 @@ __all__ = [
     "check",
     "check_recordings",
     "compare",
+    "diagnose",
     "generate",
     "graph",
     "load",
@@ -46,6 +50,7 @@ __all__ = [
     "render_all",
     "replay",
     "save",
+    "save_diagnosis",
     "simulate",
     "study_pictures",
     "study_summary",
@@ -55,6 +60,7 @@ __all__ = [
 PLACES = {
     "CheckedRecordings": "modewright.recordings",
     "Diagram": "modewright.diagram",
+    "Dossier": "diagnosis.dossier",
     "Event": "engine.trajectory",
     "Picture": "engine.plot",
     "Problem": "language.problem",
@@ -67,9 +73,11 @@ PLACES = {
     "read": "modewright.runs",
     "check": "modewright.checking",
     "check_recordings": "modewright.recordings",
+    "diagnose": "modewright.diagnoses",
     "graph": "modewright.diagram",
     "render_all": "language.problem",
     "save": "modewright.runs",
+    "save_diagnosis": "modewright.diagnoses",
     "study_pictures": "modewright.studies",
     "study_summary": "modewright.studies",
     "sweep": "modewright.studies",

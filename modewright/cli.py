@@ -16,6 +16,7 @@ from language.inside import ALLOW_OUTSIDE
 from modewright.commands.check import check
 from modewright.commands.compare import compare
 from modewright.commands.demo import demo
+from modewright.commands.diagnose import diagnose
 from modewright.commands.doctor import doctor
 from modewright.commands.explain import explain
 from modewright.commands.generate import generate
@@ -34,8 +35,8 @@ from modewright.files import require_writable
 YOUNG_OBJECTS = 100_000
 """New objects after which garbage is looked for: trees of expressions have no circles."""
 COMMANDS = (
-    new, check, simulate, sweep, lockstep, replay, plot, compare, graph, generate, explain, demo,
-    doctor,
+    new, check, diagnose, simulate, sweep, lockstep, replay, plot, compare, graph, generate,
+    explain, demo, doctor,
 )  # fmt: skip
 
 app = typer.Typer(

@@ -52,6 +52,7 @@ def test_every_command_in_the_readme_exists() -> None:
         "docs/c_code.md",
         "docs/studies.md",
         "docs/benchmark.md",
+        "docs/diagnosis.md",
     ],
 )
 def test_every_file_that_a_page_names_exists(page: str) -> None:

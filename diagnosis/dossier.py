@@ -1,0 +1,92 @@
+"""Dossier: all that is known when a diagnosis has ended, for those who tell it on."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from diagnosis.diagnose import Case, Diagnosis
+from diagnosis.finding import Finding
+from diagnosis.recording_check import RecordingCheck
+from diagnosis.verdict import Verdict
+from language.model import Automaton
+
+
+@dataclass(frozen=True)
+class Dossier:
+    """A verdict on `case`, with the check of its recordings.
+
+    `diagnosis` is None where the recordings are not usable: then nothing was concluded from them.
+    `left_out` are recordings that were not used for what was found of them.
+    `held_out` are hashes of the files that were opened after the verdict.
+    """
+
+    case: Case
+    automaton: Automaton
+    check: RecordingCheck
+    verdict: Verdict
+    diagnosis: Diagnosis | None = field(default=None, repr=False)
+    held_out: Mapping[str, str] = field(default_factory=dict)
+    left_out: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """The name of what was diagnosed."""
+        return self.automaton.name
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What was found of the recordings, the worst first."""
+        return self.check.findings
+
+
+def verdict_json(verdict: Verdict) -> dict[str, Any]:
+    """Return a verdict as JSON has it: a number that is not finite is null."""
+    found = _finite(verdict.json())
+    assert isinstance(found, dict)
+    return found
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(one) for key, one in value.items()}
+    if isinstance(value, list):
+        return [_finite(one) for one in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def usable(check: RecordingCheck, files: tuple[Path, ...]) -> tuple[Path, ...]:
+    """Return the recordings to conclude from: none where half of them or more have an error.
+
+    A mistake in a few is one of these files, which are left out; in many it is one of the map.
+    """
+    errors = [finding for finding in check.findings if finding.severity == "error"]
+    bad = {finding.recording for finding in errors}
+    kept = tuple(file for file in files if file.name not in bad)
+    if "" in bad or 2 * len(kept) <= len(files):
+        return () if bad else files
+    return kept
+
+
+def undecided(check: RecordingCheck, train: Mapping[str, str], runtime_s: float) -> Verdict:
+    """Return the verdict on recordings that no conclusion can be drawn from."""
+    worst = [finding for finding in check.findings if finding.severity == "error"]
+    messages = ("the recordings are not usable", *(told(finding) for finding in worst))
+    return Verdict(
+        "unknown", (), (), 1.0, (), (), {"train": {}}, {}, None, runtime_s, messages, train
+    )
+
+
+def told(finding: Finding) -> str:
+    """Return a finding as one line."""
+    place = ", ".join(part for part in (finding.recording, finding.channel) if part)
+    return f"{place}: {finding.text}" if place else finding.text
+
+
+def hashes(files: tuple[Path, ...]) -> dict[str, str]:
+    """Return the first 16 hexadecimal digits of SHA-256 of each file, by name."""
+    return {path.name: hashlib.sha256(path.read_bytes()).hexdigest()[:16] for path in files}

@@ -1,0 +1,37 @@
+"""Locus picture: how much each place gains where something unknown may act there."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from matplotlib.figure import Figure
+
+from diagnosis.location import Locus
+from engine.band import PALETTE
+from engine.plot import Picture
+from language.text import visible
+
+BLUE, _, _, _, _, _, GREY = PALETTE
+
+
+def locus_picture(loci: Sequence[Locus]) -> Picture:
+    """Return a bar for each place, the largest gain [nats] on top.
+
+    An infinite one, where the model does not run at all without it, is drawn beyond the others.
+    """
+    shown = sorted(loci, key=lambda locus: locus.gain)
+    figure = Figure(figsize=(7.0, 0.9 + 0.38 * max(1, len(shown))), layout="constrained")
+    axis = figure.subplots()
+    most = max([locus.gain for locus in shown if math.isfinite(locus.gain)] + [1.0])
+    gains = [min(max(locus.gain, 0.0), 1.5 * most) for locus in shown]
+    labels = [f"{max(locus.gain, 0.0):.0f}" for locus in shown]
+    colours = [GREY] * (len(shown) - 1) + [BLUE]
+    bars = axis.barh([visible(locus.path) for locus in shown], gains, color=colours, height=0.65)
+    axis.bar_label(bars, labels=labels, padding=3, fontsize=8)
+    axis.set_xlim(0.0, 1.12 * max([*gains, 1.0]))
+    axis.set_xlabel("what an unknown torque, force or error there would explain [nats]")
+    axis.tick_params(axis="y", labelsize=9)
+    for side in ("top", "right"):
+        axis.spines[side].set_visible(False)
+    return Picture(figure)

@@ -1,0 +1,112 @@
+"""Variant: what a diagnosis has found, as a variant of the base that every command runs."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from fractions import Fraction
+
+from codegen.rendering import version
+from diagnosis.dossier import Dossier
+from diagnosis.layers import automaton as laid_automaton
+from diagnosis.naming import quantities_of
+from diagnosis.search import Tried
+from diagnosis.selection import Selection
+from diagnosis.uncertain import si_unit
+from diagnosis.verdict import Quantity
+from language.declaration import Parameter
+from language.model import Automaton
+
+ENDING = "_diagnosed"
+LONGEST_NAME = 31
+UNCHANGED = 1e-6
+"""Relative change below which a parameter is not written down."""
+
+
+def variant_name(base: str) -> str:
+    """Return the name of the variant of a base."""
+    return base[: LONGEST_NAME - len(ENDING)] + ENDING
+
+
+def variant_text(dossier: Dossier, extends: str) -> str:
+    """Return the variant as YAML: `extends` names the base, or its file.
+
+    Values are in SI; standard deviations and what was declared stand beside them as comments.
+    """
+    lines = [
+        "language: 1",
+        f"variant: {variant_name(dossier.name)}",
+        f"extends: {extends}",
+        f"about: {json.dumps(_about(dossier), ensure_ascii=False)}",
+    ]
+    if dossier.diagnosis is None:
+        return "\n".join(lines) + "\n"
+    selection = dossier.diagnosis.selection
+    fitted = quantities_of(selection.model)
+    lines += _parameters(dossier.automaton, fitted)
+    lines += _effects(dossier, selection, fitted)
+    return "\n".join(lines) + "\n"
+
+
+def _about(dossier: Dossier) -> str:
+    verdict = dossier.verdict
+    found = [f"{one.id}@{one.place}" for one in verdict.effects]
+    says = ", ".join([verdict.verdict, *found])
+    files = ", ".join(f"{name} {digest}" for name, digest in verdict.inputs.items())
+    return f"diagnosed by modewright {version()}: {says}; fitted to {files}"
+
+
+def _parameters(automaton: Automaton, fitted: Mapping[str, Quantity]) -> list[str]:
+    lines = []
+    for name, quantity in fitted.items():
+        parameter = automaton.parameters.get(name)
+        if parameter is None or parameter.value is None:
+            continue
+        was = float(parameter.value)
+        if abs(quantity.value - was) > UNCHANGED * abs(was):
+            text = _quantity(quantity.value, parameter)
+            told = f"sd {quantity.std:.2g}, declared {was:.6g}"
+            lines.append(f"  {name}: {{value: {text}}}  # {told}")
+    return ["parameters:", *lines] if lines else []
+
+
+def _effects(dossier: Dossier, selection: Selection, fitted: Mapping[str, Quantity]) -> list[str]:
+    if not selection.accepted:
+        return []
+    layers = selection.model.candidate.layers
+    whole = laid_automaton(dossier.case.document, dossier.case.project, layers)
+    lines = ["effects:"]
+    for tried in selection.accepted:
+        lines += _effect(tried, whole, selection, fitted)
+    return lines
+
+
+def _effect(
+    tried: Tried, whole: Automaton, selection: Selection, fitted: Mapping[str, Quantity]
+) -> list[str]:
+    layer = tried.layer
+    lines = [f"  {layer.id}:  # {layer.effect.about}"]
+    each = [selection.model.values(k) for k in range(len(selection.model.point.own))]
+    values = []
+    for final, quantity in fitted.items():
+        own = final.removesuffix(f"_{layer.ending}")
+        parameter = whole.parameters.get(final)
+        if own == final or layer.named(own) != final or parameter is None:
+            continue
+        text = _quantity(quantity.value, parameter)
+        note = f"sd {quantity.std:.2g}"
+        if parameter.fitting.per == "recording":
+            note = "mean of " + ", ".join(f"{one[final]:.4g}" for one in each)
+        values.append(f"      {own}: {text}  # {note}")
+    return [*lines, "    values:", *values] if values else [f"  {layer.id}: {{}}"]
+
+
+def _quantity(value: float, parameter: Parameter) -> str:
+    """Return a value in SI with its unit, rounded, but not out of its range."""
+    text = f"{value:.6g}"
+    if parameter.range:
+        low, high = parameter.range
+        if not low <= Fraction(text) <= high:
+            text = repr(min(max(value, float(low)), float(high)))
+    unit = si_unit(parameter)
+    return text if unit == "1" else f"{text} {unit}"

@@ -1,0 +1,173 @@
+"""Wording: a diagnosis in plain words, for the console and the report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from diagnosis.dossier import Dossier
+from diagnosis.layers import Layer, drift
+from diagnosis.location import Locus
+from diagnosis.naming import place_path, verdict_id
+from diagnosis.search import FULL_FITS, WORTH, Tried
+from diagnosis.selection import CLOSE, Selection
+from diagnosis.verdict import Misfit as FitMisfit, Named, Quantity
+from language.place import Misfit, place_of
+
+PLACES = {
+    "flow": "in the balance of",
+    "inputs": "at the input",
+    "outputs": "in the signal",
+    "elements": "in the element",
+}
+MOST_NAMED = 4
+"""Most rivals, windows or findings told in a sentence."""
+
+
+def headline(dossier: Dossier) -> str:
+    """Return the verdict in one sentence."""
+    verdict = dossier.verdict
+    if dossier.diagnosis is None:
+        return "Nothing is concluded about the physics: these recordings are not usable."
+    if verdict.verdict == "effect":
+        named = " and ".join(_with_values(one) for one in verdict.effects)
+        return f"`{dossier.name}` lacks {named}."
+    if verdict.verdict == "ambiguous":
+        names = [effect_at(one) for one in verdict.ambiguous_with]
+        return (
+            f"`{dossier.name}` lacks something, and these recordings cannot tell which of these "
+            f"it is: {'; '.join(names)}."
+        )
+    if verdict.verdict == "unknown":
+        return f"`{dossier.name}` lacks something that none of the effects tried explains."
+    return (
+        f"`{dossier.name}` lacks nothing that these recordings show: with its parameters "
+        f"recalibrated no effect gains the {dossier.case.threshold:g} nats asked for."
+    )
+
+
+def effect_at(one: Named) -> str:
+    """Return an effect with its place in words."""
+    section, _, name = one.place.partition(".")
+    return f"{one.id.replace('_', ' ')} {PLACES[section]} {name}"
+
+
+def _with_values(one: Named) -> str:
+    values = ", ".join(f"{name} = {quantity(q)}" for name, q in one.parameters.items())
+    return f"{effect_at(one)} ({values})" if values else effect_at(one)
+
+
+def quantity(one: Quantity) -> str:
+    """Return a value with its standard deviation and unit."""
+    unit = "" if one.unit == "1" else f" {one.unit}"
+    return f"{one.value:.4g} ± {one.std:.2g}{unit}"
+
+
+def improvement(dossier: Dossier) -> str:
+    """Return what the model gains in free simulation, in one sentence; empty without a fit."""
+    fit = dossier.verdict.fit
+    parts = [
+        f"{name.replace('_', ' ')}: {_misfits(signals)}" for name, signals in fit.items() if signals
+    ]
+    if not parts:
+        return ""
+    confirmed = {True: " - confirmed", False: " - not confirmed", None: ""}
+    return f"misfit of free simulation, {'; '.join(parts)}{confirmed[dossier.verdict.confirmed]}"
+
+
+def _misfits(signals: Mapping[str, FitMisfit]) -> str:
+    found = []
+    for name, one in signals.items():
+        before, after = f"{100 * one.nrmse_before:.3g} %", f"{100 * one.nrmse_after:.3g} %"
+        found.append(f"{name} {before}" if before == after else f"{name} {before} to {after}")
+    return ", ".join(found)
+
+
+def location(dossier: Dossier) -> str:
+    """Return where something is missing, before any effect was tried, in one sentence."""
+    best = next((locus for locus in dossier.verdict.location if locus.gain > 0.0), None)
+    if best is None:
+        return ""
+    unit = _unit(dossier, best)
+    kind = {"flow": "an unknown torque or force", "elements": "an unknown torque or force"}
+    mode = max(best.modes, key=lambda name: best.modes[name], default="")
+    share = f", {100 * best.modes[mode]:.0f} % of it in mode {mode}" if mode else ""
+    along = f", along with {best.along[0][0]} (r = {best.along[0][1]:.2f})" if best.along else ""
+    return (
+        f"before any effect was tried, {kind.get(best.section, 'an error')} "
+        f"{PLACES[best.section]} {best.place} explained most: "
+        f"{best.rms:.3g} {unit} rms{share}{along}"
+    )
+
+
+def _unit(dossier: Dossier, locus: Locus) -> str:
+    """Return the unit of what is unknown at a place."""
+    root = dossier.case.document.root
+    kinds = {"flow": "balance", "elements": "element", "outputs": "output"}
+    kind = kinds[locus.section]
+    place = place_of(root, drift(kind, locus.place).effect, locus.place)
+    if isinstance(place, Misfit):
+        return ""
+    return str(place.holes.get("unit" if kind == "output" else "force", ""))
+
+
+def separation(dossier: Dossier) -> list[str]:
+    """Return what would separate what was found from what it is confused with."""
+    if dossier.diagnosis is None:
+        return []
+    selection = dossier.diagnosis.selection
+    lines = []
+    for tried in (*selection.accepted, *selection.rivals):
+        effect = tried.layer.effect
+        if effect.separated_by and effect.confused_with:
+            name = verdict_id(tried.layer, dossier.automaton)
+            others = ", ".join(effect.confused_with)
+            lines.append(f"{name} from {others}: {'; '.join(effect.separated_by)}")
+    return lines
+
+
+def reason(tried: Tried, place: int, selection: Selection, threshold: float) -> str:
+    """Return why a candidate was accepted or not; `place` is its rank."""
+    ids = {one.layer.id for one in selection.accepted}
+    if tried.layer.id in ids:
+        return "accepted"
+    if tried.layer.id in {one.layer.id for one in selection.rivals}:
+        return f"cannot be told from the accepted one: within {CLOSE:g} nats of it"
+    known = tried.evidence
+    if known is None:
+        if tried.promised < WORTH:
+            return f"not fitted: promises {max(tried.promised, 0.0):.0f} nats at most"
+        return f"not fitted: {FULL_FITS} others promise more"
+    if known.train <= threshold:
+        return f"gains less than {threshold:g} nats in training"
+    if known.left_out <= threshold:
+        return f"gains less than {threshold:g} nats on recordings that were left out"
+    return "explains less than what was accepted" if place else "not needed beside the others"
+
+
+def title(layer: Layer, dossier: Dossier) -> str:
+    """Return the name of a candidate as verdicts have it."""
+    return f"{verdict_id(layer, dossier.automaton)}@{place_path(layer)}"
+
+
+def summary(dossier: Dossier) -> list[str]:
+    """Return at most four lines: the verdict, where, how much better, what is to be known."""
+    lines = [headline(dossier), location(dossier), improvement(dossier), _doubt(dossier)]
+    return [line for line in lines if line]
+
+
+def _doubt(dossier: Dossier) -> str:
+    """Return what a reader has to know before believing the verdict."""
+    worst = [f for f in dossier.findings if f.severity != "note"]
+    if worst:
+        places = (p for p in (worst[0].recording, worst[0].channel) if p)
+        more = f" (and {len(worst) - 1} more)" if len(worst) > 1 else ""
+        return f"recordings: {', '.join(places)}: {worst[0].text}{more}"
+    verdict = dossier.verdict
+    if verdict.verdict == "effect" and verdict.ambiguous_with:
+        return f"nearly as good: {_first([effect_at(one) for one in verdict.ambiguous_with])}"
+    return ""
+
+
+def _first(names: Sequence[str]) -> str:
+    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+    return ", ".join(names[:MOST_NAMED]) + more

@@ -1,0 +1,100 @@
+"""Command diagnose: which physics a spec lacks to show what was recorded."""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from modewright.commands.options import Json, usage_errors
+from modewright.console import announce, console
+from modewright.exits import PROBLEMS
+from modewright.files import make_folder
+
+SPAN = re.compile(r"(\d+(?:\.\d*)?) ?(s|min|h)")
+SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
+
+Train = Annotated[
+    list[Path], typer.Option("--train", help="a recording to learn from (repeatable)")
+]
+Map = Annotated[
+    str | None, typer.Option("--map", "-m", help="a map of columns, if not that of the spec")
+]
+
+
+def diagnose(
+    spec: Annotated[str, typer.Argument(help="an automaton: name or file")],
+    train: Train,
+    out: Annotated[Path, typer.Option("--out", "-o", help="the folder of the results")],
+    held_out: Annotated[
+        list[Path] | None,
+        typer.Option("--held-out", help="a recording opened after the verdict (repeatable)"),
+    ] = None,
+    mapping: Map = None,
+    effects: Annotated[
+        Path | None, typer.Option("--effects", help="a folder of effects in place of those shipped")
+    ] = None,
+    budget: Annotated[
+        str, typer.Option("--budget", help="the longest time it may take: '90 s', '10min'")
+    ] = "10min",
+    anyway: Annotated[
+        bool, typer.Option("--anyway", help="conclude from recordings with errors too")
+    ] = False,
+    fail_on: Annotated[
+        str | None, typer.Option("--fail-on", help="a verdict that gives exit code 1: effect")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Say which physics a model lacks to show what was recorded, and write a model that has it.
+
+    Into the folder go report.html, verdict.json, variant.yaml and figures. Exit code 0 whenever
+    a verdict was written.
+
+    \b
+    modewright diagnose blind_driveline --train a.csv --train b.csv --held-out c.csv --out found
+    modewright diagnose emps --train run.csv --map my_columns --effects my_effects --out found
+    modewright diagnose plant.yaml --train night.csv --out found --fail-on effect --json
+    """
+    from diagnosis.dossier import verdict_json
+    from modewright import show, show_diagnosis
+    from modewright.diagnoses import BudgetSpent, diagnose as diagnosed, save_diagnosis
+
+    verdicts = ("effect", "nothing_missing", "unknown", "ambiguous")
+    if fail_on is not None and fail_on not in verdicts:
+        raise typer.BadParameter(f"one of {', '.join(verdicts)}", param_hint="--fail-on")
+    seconds = seconds_of(budget)
+    make_folder(out)
+    try:
+        with usage_errors():
+            found = diagnosed(
+                spec, train, held_out or (), mapping, effects,
+                budget=seconds, anyway=anyway, tell=tell,
+            )  # fmt: skip
+    except BudgetSpent as error:
+        print(f"error: no verdict within --budget: {error}", file=sys.stderr)
+        raise typer.Exit(PROBLEMS) from None
+    files = save_diagnosis(found, out, spec)
+    if as_json:
+        show.print_json(verdict_json(found.verdict))
+    else:
+        show_diagnosis.print_dossier(console(), found)
+        announce([file for file in files if file.name == "report.html"])
+    if found.verdict.verdict == fail_on:
+        raise typer.Exit(PROBLEMS)
+
+
+def tell(text: str) -> None:
+    """Tell on stderr what a stage has found."""
+    if not console().quiet:
+        print(text, file=sys.stderr, flush=True)
+
+
+def seconds_of(text: str) -> float:
+    """Return a time [s] written as `90 s` or `10min`."""
+    match = SPAN.fullmatch(text.strip())
+    if not match:
+        raise typer.BadParameter(f"`{text}` is not a time like `90 s`", param_hint="--budget")
+    return float(match[1]) * SECONDS[match[2]]

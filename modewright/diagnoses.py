@@ -1,0 +1,129 @@
+"""Diagnoses: recordings against a spec, as functions of the public API."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from diagnosis.diagnose import Case, diagnose as diagnosed
+from diagnosis.dossier import Dossier, hashes, undecided, usable
+from diagnosis.layers import effects_in, shipped_effects
+from diagnosis.variant import variant_text
+from language.effect import Effect
+from language.load import automaton_of
+from language.model import Automaton
+from language.project import Project, expanded, read_document
+from modewright.files import make_folder, write_files
+from modewright.recordings import CheckedRecordings, check_recordings
+
+Tell = Callable[[str], None]
+
+
+class BudgetSpent(Exception):
+    """The time that a diagnosis may take has passed before it came to a verdict."""
+
+
+def diagnose(
+    spec: str,
+    train: Sequence[str | Path],
+    held_out: Sequence[str | Path] = (),
+    map: str | None = None,
+    effects: str | Path | None = None,
+    root: Path | None = None,
+    *,
+    out: str | Path | None = None,
+    budget: float | None = None,
+    anyway: bool = False,
+    tell: Tell = lambda text: None,
+) -> Dossier:
+    """Say which physics an automaton lacks to show what was recorded; write it into a folder.
+
+    Recordings with faults that make a verdict worthless give the verdict `unknown`, unless it is
+    wanted `anyway`. `effects` is a folder of effects in place of those shipped, `budget` a time
+    [s]. Raises SpecError, ValueError, ToolMissing, OutputError, BudgetSpent.
+    """
+    begun = time.monotonic()
+    tell = _within(budget, begun, tell)
+    checked = check_recordings(train, map, spec, root=root)
+    case, automaton = _case(spec, train, held_out, checked, effects, root)
+    tell(f"looked at {len(case.train)} recordings: {len(checked.check.findings)} findings")
+    kept = case.train if anyway else usable(checked.check, case.train)
+    left_out = tuple(file.name for file in case.train if file not in kept)
+    if kept:
+        if left_out:
+            tell(f"not used: {', '.join(left_out)}")
+        case = dataclasses.replace(case, train=kept)
+        found = diagnosed(case, tell)
+        verdict, after = found.verdict, hashes(case.held_out)
+        dossier = Dossier(case, automaton, checked.check, verdict, found, after, left_out)
+    else:
+        verdict = undecided(checked.check, hashes(case.train), time.monotonic() - begun)
+        dossier = Dossier(case, automaton, checked.check, verdict)
+    if out is not None:
+        save_diagnosis(dossier, out, spec)
+    return dossier
+
+
+def save_diagnosis(dossier: Dossier, out: str | Path, spec: str) -> list[Path]:
+    """Write verdict, variant, report and figures into a folder; return the files.
+
+    Raises OutputError.
+    """
+    from diagnosis.report import report_files
+
+    folder = Path(out)
+    make_folder(folder)
+    variant = variant_text(dossier, base_of(dossier, spec, folder))
+    files = {folder / name: data for name, data in report_files(dossier, variant).items()}
+    write_files(files)
+    return list(files)
+
+
+def base_of(dossier: Dossier, spec: str, folder: Path) -> str:
+    """Return how a variant in a folder names its base: by name, or by file if need be."""
+    project = dossier.case.project
+    path = project.path_of(spec)
+    if [file.resolve() for file in project.index.get(dossier.name, [])] == [path.resolve()]:
+        return dossier.name
+    return os.path.relpath(path.resolve(), folder.resolve())
+
+
+def _within(budget: float | None, begun: float, tell: Tell) -> Tell:
+    """Return a teller that ends the diagnosis when its time [s] has passed."""
+
+    def checking(text: str) -> None:
+        tell(text)
+        if budget is not None and time.monotonic() - begun > budget:
+            raise BudgetSpent(f"{budget:g} s have passed after: {text}")
+
+    return checking
+
+
+def _case(
+    spec: str,
+    train: Sequence[str | Path],
+    held_out: Sequence[str | Path],
+    checked: CheckedRecordings,
+    effects: str | Path | None,
+    root: Path | None,
+) -> tuple[Case, Automaton]:
+    project = Project(root or Path())
+    document = read_document(project.path_of(spec))
+    automaton = automaton_of(document, project)
+    whole = expanded(document, project)
+    files = tuple(Path(file) for file in train), tuple(Path(file) for file in held_out)
+    library = _library(effects)
+    return Case(whole, project, checked.mapping, *files, library), automaton
+
+
+def _library(folder: str | Path | None) -> tuple[Effect, ...]:
+    """Return the effects of a folder, those shipped without one. Raises ValueError."""
+    if folder is None:
+        return shipped_effects()
+    found = effects_in(Path(folder))
+    if not found:
+        raise ValueError(f"there is no effect in {folder}")
+    return found

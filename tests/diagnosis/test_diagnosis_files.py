@@ -1,0 +1,271 @@
+"""What a user gets of a diagnosis: verdict, variant, report; of the rotor in spinning.py."""
+
+from __future__ import annotations
+
+import copy
+import json
+import re
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+
+import modewright as mw
+from modewright.cli import app
+from modewright.exits import exit_code
+from tests.diagnosis.spinning import T_C, B, J, bench
+from tests.language.making import ROOT
+
+SCHEMA = json.loads((ROOT / "spec" / "verdict.schema.json").read_text("utf-8"))
+COMMAND = (
+    *("diagnose", "spinner", "--train", "run_0.csv", "--train", "run_1.csv"),
+    *("--held-out", "run_2.csv", "--effects", "library"),
+)
+RIDER = """language: 1
+automaton: rider
+period: 5 ms
+numbers: float64
+model: spinner_diagnosed
+inputs: {T: {unit: N*m, range: [-50, 50]}}
+states: {w: {initial: 0 rad/s, range: [-300, 300]}}
+modes: {run: {runs: {of: spinner_diagnosed.turning, method: rk4, substeps: 2, events: 4}}}
+outputs: [w]
+"""
+RIG = """language: 1
+system: rig
+inputs: {T: {unit: N*m}}
+instances: {plant: {of: spinner_diagnosed}, rider: {of: rider}}
+connections: {plant.T: T, rider.T: T}
+"""
+RUN = """language: 1
+scenario: run
+of: rig
+horizon: 2 s
+inputs: {T: {start: 10 N*m, steps: {0.5 s: -4 N*m}}}
+"""
+
+
+@dataclass(frozen=True)
+class Found:
+    """What one run of the command left: its folder, exit code, texts, and the files it opened."""
+
+    folder: Path
+    code: int
+    out: str
+    error: str
+    opened: list[str]
+
+    @property
+    def verdict(self) -> dict[str, Any]:
+        return dict(json.loads((self.folder / "found" / "verdict.json").read_text("utf-8")))
+
+
+def run(folder: Path, *arguments: str) -> int:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        return exit_code(lambda: app(list(arguments), standalone_mode=False))
+
+
+def _killed(folder: Path) -> None:
+    """Kill a run when it has recalibrated the base: it leaves no file."""
+    words = [sys.executable, "-m", "modewright", *COMMAND, "--out", "found"]
+    with subprocess.Popen(words, cwd=folder, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr
+        next(line for line in process.stderr if line.startswith("recalibrated"))
+        process.send_signal(signal.SIGKILL)
+    assert not list((folder / "found").glob("*"))
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory: pytest.TempPathFactory) -> Found:
+    folder = bench(tmp_path_factory.mktemp("bench") / "project")
+    _killed(folder)
+    code = "import sys\n"
+    code += "def hook(event, about):\n"
+    code += "    if event == 'open' and str(about[0]).endswith('.csv'):\n"
+    code += "        print('opened', about[0], file=sys.stderr, flush=True)\n"
+    code += "sys.addaudithook(hook)\n"
+    code += "from modewright.cli import main; main()"
+    words = [*COMMAND, "--out", "found", "--fail-on", "effect"]
+    told = subprocess.run(
+        [sys.executable, "-c", code, *words],
+        cwd=folder, capture_output=True, text=True, check=False, timeout=300,
+    )  # fmt: skip
+    opened = [line for line in told.stderr.splitlines() if line]
+    return Found(folder, told.returncode, told.stdout, told.stderr, opened)
+
+
+def test_it_names_the_effect_with_its_value_and_tells_so_in_five_lines(found: Found) -> None:
+    assert found.code == 1, found.error  # --fail-on effect
+    assert found.verdict["verdict"] == "effect"
+    (effect,) = found.verdict["effects"]
+    assert (effect["id"], effect["place"]) == ("coulomb_friction", "flow.w")
+    assert effect["parameters"]["T_c"]["value"] == pytest.approx(T_C, rel=0.02)
+    assert effect["parameters"]["T_c"]["unit"] == "N*m"
+    assert found.verdict["confirmed"] is True
+    lines = found.out.splitlines()
+    assert len(lines) <= 5
+    assert lines[0].startswith("spinner lacks coulomb friction in the balance of w (T_c = ")
+
+
+def test_what_is_held_out_is_opened_when_all_stages_are_told(found: Found) -> None:
+    lines = [line.removeprefix("opened ") for line in found.opened]
+    first = next(k for k, line in enumerate(lines) if "run_2.csv" in line)
+    last = max(k for k, line in enumerate(lines) if "nats" in line)
+    assert first > last
+    assert any(line.startswith("opened") and "run_0.csv" in line for line in found.opened[:last])
+
+
+def test_a_real_verdict_has_the_form_that_the_schema_says(found: Found) -> None:
+    jsonschema.Draft7Validator.check_schema(SCHEMA)
+    jsonschema.validate(found.verdict, SCHEMA)
+    shares = [one["probability"] for one in found.verdict["candidates"]]
+    assert sum(shares) + found.verdict["other"] == pytest.approx(1.0)
+    assert shares == sorted(shares, reverse=True)
+
+
+def _with_place(verdict: dict[str, Any]) -> None:
+    verdict["effects"][0]["place"] = "w"
+
+
+def _without_effect(verdict: dict[str, Any]) -> None:
+    verdict["effects"] = []
+
+
+def _clean(verdict: dict[str, Any]) -> None:
+    verdict["verdict"] = "nothing_missing"
+
+
+def _with_more(verdict: dict[str, Any]) -> None:
+    verdict["mood"] = "sure"
+
+
+@pytest.mark.parametrize("change", [_with_place, _without_effect, _clean, _with_more])
+def test_the_schema_refuses_what_is_no_verdict(
+    found: Found, change: Callable[[dict[str, Any]], None]
+) -> None:
+    verdict = copy.deepcopy(found.verdict)
+    change(verdict)
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(verdict, SCHEMA)
+
+
+def test_the_variant_is_a_spec_like_any_other(found: Found, tmp_path: Path) -> None:
+    (tmp_path / "spec").mkdir()
+    shutil.copy(found.folder / "spec" / "spinner.yaml", tmp_path / "spec")
+    shutil.copy(found.folder / "spec" / "bench_columns.yaml", tmp_path / "spec")
+    shutil.copy(found.folder / "found" / "variant.yaml", tmp_path / "spec")
+    for name, text in {"rider": RIDER, "rig": RIG, "run": RUN}.items():
+        (tmp_path / "spec" / f"{name}.yaml").write_text(text, "utf-8")
+    assert mw.check("spinner_diagnosed", root=tmp_path) == []
+    assert "T_c_w" in mw.generate("spinner_diagnosed", root=tmp_path)["spinner_diagnosed.c"]
+    trajectory, verdicts = mw.lockstep("rig", "run", root=tmp_path)
+    assert all(verdict.is_equal and verdict.ticks > 1 for verdict in verdicts)
+    slope = (10.0 - T_C) / J
+    early = trajectory.signals["plant.w"][trajectory.times <= 0.1][-1]
+    assert early == pytest.approx(0.1 * slope * (1 - 0.05 * B / J), rel=0.02)
+
+
+def test_the_variant_is_run_where_it_was_written(found: Found) -> None:
+    assert run(found.folder, "check", "found/variant.yaml") == 0
+
+
+class Page(HTMLParser):
+    """The tags that are open, and what the page refers to."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.references: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        if tag not in ("meta", "br", "link", "img"):
+            self.open.append(tag)
+        given = [v or "" for k, v in attrs if k in ("href", "src")]
+        self.references += [value for value in given if not value.startswith("#")]
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+
+def test_the_report_is_one_page_that_needs_nothing_but_what_lies_beside_it(found: Found) -> None:
+    text = (found.folder / "found" / "report.html").read_text("utf-8")
+    page = Page()
+    page.feed(text)
+    assert page.open == []
+    assert page.references
+    assert [name for name in page.references if not (found.folder / "found" / name).exists()] == []
+    assert text.count("<svg") == 3
+    for digest in found.verdict["inputs"].values():
+        assert digest in text
+    told = re.sub(r"<[^>]+>", " ", text)
+    for sentence in (
+        "lacks coulomb friction in the balance of w",
+        "confirmed on recordings that were held out",
+        "passage through zero speed",
+        "coulomb_friction@w",
+        "Nothing odd was found",
+    ):
+        assert sentence in told, sentence
+
+
+def test_killed_and_run_again_it_says_the_same(found: Found, tmp_path: Path) -> None:
+    """The fixture's first run was killed; this one finds everything compiled."""
+    assert run(found.folder, *COMMAND, "--out", str(tmp_path / "again")) == 0
+    again = json.loads((tmp_path / "again" / "verdict.json").read_text("utf-8"))
+    assert {**again, "runtime_s": 0} == {**found.verdict, "runtime_s": 0}
+
+
+def test_a_model_that_lacks_nothing_is_told_so(tmp_path: Path) -> None:
+    folder = bench(tmp_path / "clean", T_c=0.0)
+    assert run(folder, *COMMAND, "--out", "found", "--fail-on", "effect") == 0
+    verdict = json.loads((folder / "found" / "verdict.json").read_text("utf-8"))
+    jsonschema.validate(verdict, SCHEMA)
+    assert verdict["verdict"] == "nothing_missing"
+    assert verdict["confirmed"] is None
+    assert "effects:" not in (folder / "found" / "variant.yaml").read_text("utf-8")
+    assert "lacks nothing" in (folder / "found" / "report.html").read_text("utf-8")
+
+
+def test_no_physics_is_blamed_for_a_wrong_unit(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = bench(tmp_path / "wrong")
+    path = folder / "spec" / "bench_columns.yaml"
+    path.write_text(path.read_text("utf-8").replace("unit: rad/s", "unit: rpm"), "utf-8")
+    assert run(folder, *COMMAND, "--out", "found") == 0
+    verdict = json.loads((folder / "found" / "verdict.json").read_text("utf-8"))
+    jsonschema.validate(verdict, SCHEMA)
+    assert (verdict["verdict"], verdict["effects"], verdict["candidates"]) == ("unknown", [], [])
+    assert any("taken for rpm" in message for message in verdict["messages"])
+    assert "not usable" in capsys.readouterr().out
+    page = (folder / "found" / "report.html").read_text("utf-8")
+    assert "not usable" in page and "taken for rpm" in page
+    assert run(folder, "check", "found/variant.yaml") == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "told"),
+    [
+        (["--budget", "0 s"], 1, "no verdict within --budget"),
+        (["--budget", "soon"], 2, "is not a time"),
+        (["--fail-on", "doubt"], 2, "one of effect"),
+        (["--effects", "spec/none"], 2, "there is no effect in"),
+    ],
+)
+def test_what_is_asked_for_wrongly_is_told(
+    words: list[str], code: int, told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = bench(tmp_path / "project")
+    (folder / "spec" / "none").mkdir()
+    assert run(folder, *COMMAND, "--out", "found", *words) == code
+    assert told in capsys.readouterr().err
+    assert not list((folder / "found").glob("*"))
