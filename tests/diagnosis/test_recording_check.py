@@ -171,8 +171,8 @@ def test_every_effect_that_is_shipped_says_what_it_needs() -> None:
     ("spoil", "expected"),
     [
         (None, set()),
-        (later("wheel", 0.2), {("error", "clock_offset", "wheel")}),
-        (later("motor", 0.2), {("error", "clock_offset", "motor")}),
+        (later("wheel", 0.2), {("warning", "clock_offset", "wheel")}),
+        (later("motor", 0.2), {("warning", "clock_offset", "motor")}),
         (scaled("wheel", -1.0), {("warning", "sign", "wheel")}),
         (later("torque", 0.2), set()),
     ],
@@ -180,4 +180,7 @@ def test_every_effect_that_is_shipped_says_what_it_needs() -> None:
 def test_without_a_model_two_speeds_of_one_motion_tell_clocks_and_signs(
     spoil: Spoil | None, expected: set[tuple[str, str, str]]
 ) -> None:
-    assert seen(check_recordings([spoiled(spoil)], bench())) == expected
+    one, two = spoiled(spoil, "a"), spoiled(spoil, "b")
+    assert seen(check_recordings([one], bench())) == expected
+    surer = {("error", kind, channel) for _, kind, channel in expected}
+    assert seen(check_recordings([one, two], bench())) == surer
