@@ -25,7 +25,7 @@ from diagnosis.naming import named, place_path, quantities_of, verdict_id
 from diagnosis.prediction import noises_of
 from diagnosis.search import Tell, Tried
 from diagnosis.selection import THRESHOLD, Selection, selected
-from diagnosis.series import Series, series_of
+from diagnosis.series import Series, series_of, thinned
 from diagnosis.simulation import misfits
 from diagnosis.verdict import Misfit, Named, Ranked, Says, Verdict
 from engine.recording import read_recording
@@ -132,7 +132,8 @@ def _series(path: Path, case: Case, automaton: Automaton, seen: Sequence[str]) -
         for name, thing in automaton.inputs.items()
         if thing.default is not None
     }
-    return series_of(recording, list(automaton.inputs), seen, {**declared, **constants})
+    found = series_of(recording, list(automaton.inputs), seen, {**declared, **constants})
+    return thinned(found)
 
 
 def _recalibrated(

@@ -19,7 +19,9 @@ from diagnosis.prediction import SMALL, Noises, noises_of, points_of
 from diagnosis.series import Series
 
 REACH = 0.2
-LEVELS = (0.0, 0.3, 1.0, 3.0)
+LEVELS = (0.0, 0.1, 0.3, 1.0, 3.0)
+FIRST_LEVELS = (0.1, 0.3, 1.0)
+"""Those from which a base is fitted: a fit with much drift does not find its way to less."""
 """Standard deviations that a drift may have, in its unit; the last is the most while naming."""
 FREE_LEVELS = (*LEVELS, 10.0, 30.0, 100.0)
 """Those for locating."""
@@ -108,8 +110,12 @@ def recalibrated(
     noises = noises_of(series, units)
     first = settled(candidate, series, noises, {}, units, turns=1)
     limits = FAR * first.outcome.robust()
-    noises = dataclasses.replace(first.noises, limits=limits)
-    return settled(candidate, series, noises, first.point, units)
+    found = []
+    for level in FIRST_LEVELS:
+        drifts = {name: level * unit for name, unit in units.items()}
+        known = dataclasses.replace(first.noises, limits=limits, drifts=drifts)
+        found.append(settled(candidate, series, known, first.point, units))
+    return min(found, key=lambda one: one.cost)
 
 
 def _place(value: float, unit: float, levels: Sequence[float]) -> int:

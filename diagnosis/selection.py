@@ -20,6 +20,8 @@ PART = 0.05
 never described so well that nothing small is left beside it."""
 NEXT = 9
 """Candidates that are looked at again beside an accepted one: the best of the round before."""
+BETTER = 10.0
+"""Nats by which a model must fit better for its candidates to be looked at again."""
 MOST_EFFECTS = 3
 CLOSE = 20.0
 """Candidates whose totals differ by less [nats] cannot be told apart by these recordings."""
@@ -65,6 +67,12 @@ def selected(
     needed = threshold
     while len(accepted) < MOST_EFFECTS:
         tried = searched(bench, model, units, layers, tell)
+        better = _better_base(bench, model, units, tried)
+        if better is not None:
+            tell(f"the model itself fits better: {better.cost:.0f} nats; candidates again")
+            model = better
+            base = base if accepted else better
+            tried = searched(bench, model, units, layers, tell)
         rounds.append(tried)
         layers = [other.layer for other in tried[1:NEXT] if other.promised > 0.0]
         best = next(iter(tried), None)
@@ -79,6 +87,21 @@ def selected(
     kept, model = _still_needed(bench, base, model, accepted, units, threshold, tell)
     first = tuple(rounds[0]) if rounds else ()
     return Selection(base, model, kept, first, _rivals(first, kept))
+
+
+def _better_base(
+    bench: Bench, model: Estimate, units: Mapping[str, float], tried: list[Tried]
+) -> Estimate | None:
+    """Return the model from where the best candidate left its parameters, if that is better.
+
+    A model in a local minimum makes every candidate look good.
+    """
+    best = next(iter(tried), None)
+    if best is None or best.estimate is None:
+        return None
+    start = best.estimate.values(0)
+    again = settled(model.candidate, bench.series, best.estimate.noises, start, units, turns=2)
+    return again if again.cost < model.cost - BETTER else None
 
 
 def _still_needed(
