@@ -6,8 +6,9 @@ import math
 from collections import deque
 from collections.abc import Callable, Sequence
 from fractions import Fraction
-from typing import Protocol
+from typing import NamedTuple
 
+from engine.around import Alone, Around
 from engine.cruise import Cruise
 from engine.firing import event, fired
 from engine.interpreter import Stepper
@@ -22,42 +23,10 @@ Flow = tuple[Fraction, Fraction, Sequence[float], float]
 """Where a flow began and was to end, and the states and age of the records at its start."""
 
 
-class Around(Protocol):
-    """What surrounds a continuous automaton: who sets its inputs and who watches it."""
+class Begun(NamedTuple):
+    """A step whose first segment is done; `flow` where someone looks inside it."""
 
-    is_watching: bool
-    is_still: bool
-
-    def aim(self, start: Fraction, stop: Fraction) -> None:
-        """Set the inputs for a flow from `start` to `stop`."""
-
-    def place(self, time: Fraction) -> None:
-        """Set the inputs to what they are at a time of that flow."""
-
-    def watch(self, time: Fraction) -> None:
-        """See the outputs at the start of a flow, and at its end before anything jumps."""
-
-    def look(self, time: Fraction) -> None:
-        """See the outputs at a time that was asked for."""
-
-
-class Alone:
-    """Surroundings in which nothing changes and nobody watches."""
-
-    is_watching = False
-    is_still = True
-
-    def aim(self, start: Fraction, stop: Fraction) -> None:
-        """Leave the inputs as they are."""
-
-    def place(self, time: Fraction) -> None:
-        """Leave the inputs as they are."""
-
-    def watch(self, time: Fraction) -> None:
-        """See nothing."""
-
-    def look(self, time: Fraction) -> None:
-        """See nothing."""
+    flow: Flow | None
 
 
 class Stopped(Exception):
@@ -122,10 +91,10 @@ class ContinuousRun:
         self._looks = deque(looks)
         step = self.program.major_step
         while self.time < time:
-            is_begun = self._cruise_to(time)
+            begun = self._cruise_to(time)
             if self.time < time:
                 boundary = (self.time // step + 1) * step
-                self._major_step(min(boundary, time), time, is_begun)
+                self._major_step(min(boundary, time), time, begun)
                 if self.time < time:
                     self.end_step()
         if time % step and self.off_step is None:
@@ -160,42 +129,50 @@ class ContinuousRun:
         self._around.watch(self.time)
         self.is_settled = True
 
-    def _cruise_to(self, horizon: Fraction) -> bool:
-        """Take whole steps before the horizon; tell whether one is begun where something happens.
-
-        A step inside which someone looks is not taken.
-        """
-        cruise = self._cruise
+    def _cruise_to(self, horizon: Fraction) -> Begun | None:
+        """Take whole steps before the horizon; one in which something happens is begun."""
+        cruise, step = self._cruise, self.program.major_step
         if cruise is None or cruise.place(self.time)[1]:
-            return False
+            return None
         (now, _), (last, is_beyond) = cruise.place(self.time), cruise.place(horizon)
-        is_begun = False
         self.stepper.run("latch")
-        while now < last and not is_begun:
-            look, is_inside = cruise.place(self._looks[0]) if self._looks else (last, True)
-            if look == now:
-                break
-            stop = now + 1 if self.stepped else min(look, last)
+        look = self._next_look(cruise, last)
+        while now < last:
+            is_seen = look == (now, True)
+            states = self._read_states() if is_seen else None
+            stop = now + 1 if is_seen or self.stepped else min(look[0], last)
             now, is_begun = cruise.go(now, stop)
-            if is_begun or (now == last and not is_beyond):
+            if is_begun:
+                self.time = now * step
+                return Begun((self.time, self.time + step, states, 0.0) if states else None)
+            if states:
+                self.time = now * step
+                self._look_inside((now - 1) * step, self.time, states, 0.0)
+                look = self._next_look(cruise, last)
+            if now == last and not is_beyond:
                 break
             self.stepper.run("equations")
-            if now == look and not is_inside:
+            if look == (now, False):
                 self._around.look(self._looks.popleft())
+                look = self._next_look(cruise, last)
             if self.stepped:
                 self.stepped()
-        self.time = now * self.program.major_step
-        return is_begun
+        self.time = now * step
+        return None
 
-    def _major_step(self, end: Fraction, horizon: Fraction, is_begun: bool) -> None:
+    def _next_look(self, cruise: Cruise, last: int) -> tuple[int, bool]:
+        return cruise.place(self._looks[0]) if self._looks else (last + 1, False)
+
+    def _major_step(self, end: Fraction, horizon: Fraction, begun: Begun | None) -> None:
         """Flow to the end of a step, through all events in it; its first segment may be done."""
         self._in_step = []
-        if not is_begun:
+        if begun is None:
             self.stepper.set("work.left", float(end - self.time))
         for piece in range(EVENTS_PER_STEP + 1):
             if self.time >= end:
                 return
-            is_event = self._arrive(end) if is_begun and piece == 0 else self._segment(end)
+            is_done = begun is not None and piece == 0
+            is_event = self._arrive(end, begun and begun.flow) if is_done else self._segment(end)
             if is_event and self.time < horizon:
                 self.settle()
             self.is_settled = self.is_settled and not (is_event and self.time == horizon)
@@ -237,8 +214,9 @@ class ContinuousRun:
         return bool(stepper.get("work.event"))
 
     def _place(self, time: Fraction) -> None:
-        self._around.place(time)
-        self.stepper.run("latch")
+        if not self._around.is_still:
+            self._around.place(time)
+            self.stepper.run("latch")
 
     def _look_inside(
         self, start: Fraction, stop: Fraction, states: Sequence[float], age: float

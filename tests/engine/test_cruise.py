@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import modewright as mw
-from engine.continuous import ContinuousRun
+from engine.continuous import Begun, ContinuousRun
 from engine.trajectory import Trajectory
 
 PLANT = """
@@ -30,34 +31,37 @@ of: plant_alone
 horizon: 0.3013 s
 initial: {plant.theta_d: 0.074 rad}
 inputs: {T_req: {start: 30 N*m, steps: {0.1013 s: -20 N*m}}}
-record: {every: 5 ms}
+record: {every: ROWS}
 """
-"""Rows on and inside steps, an input that steps inside one, contact lost and found again, and
-a range that is left for a while."""
+"""Rows on and inside steps, or inside nearly all of them; an input that steps inside one, contact
+lost and found again, and a range that is left for a while."""
 
 
-def run(folder: Path) -> Trajectory:
+def run(folder: Path, rows: str) -> Trajectory:
     (folder / "spec").mkdir(exist_ok=True)
     for number, text in enumerate(PLANT.split("---")):
-        (folder / "spec" / f"{number}.yaml").write_text(text)
+        (folder / "spec" / f"{number}.yaml").write_text(text.replace("ROWS", rows))
     return mw.simulate("plant_alone", "pull", root=folder)
 
 
-def test_it_changes_no_bit_and_no_event(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("rows", ["5 ms", "0.8 ms"])
+def test_it_changes_no_bit_and_no_event(
+    rows: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     taken: list[int] = []
     cruise_to = ContinuousRun._cruise_to
 
-    def counted(flow: ContinuousRun, horizon: object) -> bool:
+    def counted(flow: ContinuousRun, horizon: Fraction) -> Begun | None:
         before = flow.time
-        found = cruise_to(flow, horizon)  # type: ignore[arg-type]
+        found = cruise_to(flow, horizon)
         taken.append(int((flow.time - before) / flow.program.major_step))
         return found
 
     monkeypatch.setattr(ContinuousRun, "_cruise_to", counted)
-    cruised = run(tmp_path)
+    cruised = run(tmp_path, rows)
     assert sum(taken) > 20
-    monkeypatch.setattr(ContinuousRun, "_cruise_to", lambda flow, horizon: False)
-    walked = run(tmp_path)
+    monkeypatch.setattr(ContinuousRun, "_cruise_to", lambda flow, horizon: None)
+    walked = run(tmp_path, rows)
     assert [event.kind for event in cruised.events].count("transition") >= 3
     assert [event.kind for event in cruised.events].count("range") >= 2
     assert cruised.events == walked.events
