@@ -110,7 +110,7 @@ def open_recorded(path: Path, mapping: RecordingMap, problems: Problems) -> Reco
         from engine.recorded_parquet import read_parquet
 
         return read_parquet(path)
-    if ending in (".mf4", ".mdf", ".dat"):
+    if ending in (".mf4", ".mdf") or (ending == ".dat" and _is_mdf(path)):
         from engine.recorded_mdf import read_mdf
 
         return read_mdf(path)
@@ -119,6 +119,15 @@ def open_recorded(path: Path, mapping: RecordingMap, problems: Problems) -> Reco
 
         return read_can(path, mapping)
     return read_csv(path, problems)
+
+
+def _is_mdf(path: Path) -> bool:
+    """Tell whether a file starts as MDF does; `.dat` may be anything."""
+    try:
+        with path.open("rb") as file:
+            return file.read(3) == b"MDF"
+    except OSError:
+        return False
 
 
 def within(recording: Recording, mapping: RecordingMap) -> Recording:

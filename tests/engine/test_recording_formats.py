@@ -151,6 +151,14 @@ class TestMf4:
         write_mf4(tmp_path / "drive.mf4")
         expect_the_drive(read(tmp_path / "drive.mf4", COLUMNS))
 
+    def test_a_dat_file_is_mdf_or_csv_as_it_starts(self, tmp_path: Path) -> None:
+        write_mf4(tmp_path / "drive.mf4")
+        (tmp_path / "drive.mf4").rename(tmp_path / "mdf.dat")
+        expect_the_drive(read(tmp_path / "mdf.dat", COLUMNS))
+        (tmp_path / "text.dat").write_text("t_s,T_em\n0.01,5\n", "utf-8")
+        text = "time: {column: t_s, unit: s}\n" + COLUMNS
+        assert read(tmp_path / "text.dat", text, "T_em").channels["T_em"].values == (5.0,)
+
     def test_an_unknown_channel_gets_the_nearest_name(self, tmp_path: Path) -> None:
         write_mf4(tmp_path / "drive.mf4")
         text = told(tmp_path / "drive.mf4", "columns: {T_am: {to: T_em, unit: N*m}}\n")
