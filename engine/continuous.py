@@ -234,9 +234,10 @@ class ContinuousRun:
         while self._looks and self._looks[0] < self.time:
             time = self._looks.popleft()
             self._put(states)
-            self.stepper.set("work.s", float(time - start))
+            since = float(time - start)
+            self.stepper.set("work.s", since)
             self.stepper.run("peek")
-            self._records.put_age(age + float(time - start))
+            self._records.put_age(age + since)
             self._look(time)
         self._put(ends)
         self._records.put_age(end_age)
