@@ -1,0 +1,105 @@
+"""A fit finds the parameters that a simulation was made with, and what a left-out effect is."""
+
+from __future__ import annotations
+
+import dataclasses
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from diagnosis.bench import Bench, balance_drifts
+from diagnosis.candidate import Candidate
+from diagnosis.evidence import evidence
+from diagnosis.layers import fitting, shipped_effects
+from diagnosis.level import recalibrated, settled, units_of
+from diagnosis.prediction import noises_of
+from diagnosis.series import Series, thinned
+from language.load import automaton_of
+from language.project import Project, expanded, read_document
+from tests.language.making import ROOT
+
+PERIOD = Fraction(1, 200)
+COUNT = 500
+TRUTH = {"J_em": 0.056, "k": 6600.0, "c": 54.0, "alpha": 0.022, "J_v": 120.0}
+FRICTION = {"T_c_w_em": 2.0}
+SEEN = ("w_em", "w_s")
+
+
+def torque(kind: int) -> np.ndarray:
+    time = np.arange(COUNT) * float(PERIOD)
+    if kind == 0:
+        return np.where(time < 0.8, 30.0, np.where(time < 1.6, -20.0, 60.0))
+    if kind == 1:
+        return np.asarray(40.0 + 30.0 * np.sin(2 * np.pi * (0.5 + time) * time))
+    return np.asarray(25.0 * np.sign(np.sin(2 * np.pi * 0.6 * time)))
+
+
+def recorded(candidate: Candidate, values: dict[str, float]) -> tuple[Series, ...]:
+    """Return simulations without correction, with noise on what is seen."""
+    rng = np.random.default_rng(11)
+    found = []
+    states, seen = len(candidate.predictor.states), len(SEEN)
+    no_gain = np.zeros((len(candidate.predictor.modes), states, seen))
+    for kind, speed in ((0, 60.0), (1, 120.0), (2, 5.0)):
+        inputs = np.zeros((COUNT, len(candidate.predictor.inputs)))
+        inputs[:, candidate.predictor.inputs.index("T_em")] = torque(kind)
+        measured = np.zeros((COUNT, seen))
+        measured[0] = speed, speed / 9.0
+        blank = Series(f"{kind}", PERIOD, Fraction(0), inputs, measured)
+        page = candidate.page(values, blank)
+        substeps = candidate.recipe.substeps
+        run = candidate.predictor.predict(
+            page, inputs, measured, no_gain[:0], no_gain, substeps, linear=False
+        )
+        assert run.done == COUNT
+        noisy = run.seen + rng.normal(0.0, [0.05, 0.01], run.seen.shape)
+        found.append(dataclasses.replace(blank, measured=np.ascontiguousarray(noisy)))
+    return tuple(found)
+
+
+@pytest.fixture(scope="module")
+def bench() -> Bench:
+    project = Project(ROOT)
+    document = expanded(read_document(project.path_of("blind_driveline")), project)
+    automaton = automaton_of(document, project)
+    effects = tuple(e for e in shipped_effects() if e.name in ("coulomb_friction", "sensor_lag"))
+    blank = Series("blank", PERIOD, Fraction(0), np.zeros((2, 2)), np.zeros((2, 2)))
+    drifts = balance_drifts(document, automaton)
+    return Bench(document, project, automaton, effects, (blank,), SEEN, drifts)
+
+
+def test_a_clean_recording_gives_the_parameters_that_made_it(bench: Bench) -> None:
+    candidate = bench.candidate(())
+    series = recorded(candidate, TRUTH)
+    units = units_of(candidate, series, noises_of(series, {}), {})
+    found = recalibrated(candidate, series, units).values(0)
+    for name, value in TRUTH.items():
+        assert found[name] == pytest.approx(value, rel=0.02), name
+
+
+def test_a_left_out_friction_gains_where_it_is_and_a_lag_does_not(bench: Bench) -> None:
+    base = bench.candidate(())
+    layers = {layer.id: layer for e in bench.effects for layer in fitting(bench.document, e)}
+    friction = bench.candidate((layers["coulomb_friction@w_em"],))
+    series = recorded(friction, {**TRUTH, **FRICTION})
+    units = units_of(base, series, noises_of(series, {}), {})
+    known = recalibrated(base, series, units)
+    start = {**known.values(0), "T_c_w_em": 0.5}
+    better = settled(friction, series, known.noises, start, units, turns=1)
+    assert evidence(better, known, series).least > 100.0
+    assert better.values(0)["T_c_w_em"] == pytest.approx(2.0, rel=0.1)
+    lag = bench.candidate((layers["sensor_lag@w_s"],))
+    start = {**known.values(0), "tau_w_s": 0.002}
+    worse = settled(lag, series, known.noises, start, units, turns=1)
+    assert evidence(worse, known, series).least < evidence(better, known, series).least / 4
+
+
+def test_a_fast_recording_is_thinned_to_means_of_its_inputs() -> None:
+    inputs = np.arange(20.0).reshape(20, 1)
+    fast = Series("fast", Fraction(1, 1000), Fraction(0), inputs, inputs * 2.0)
+    slow = thinned(fast)
+    assert slow.period == Fraction(1, 200)
+    assert list(slow.inputs[:, 0]) == [2.0, 7.0, 12.0, 17.0]
+    assert list(slow.measured[:, 0]) == [0.0, 10.0, 20.0, 30.0]
+    assert thinned(slow) is slow
