@@ -133,6 +133,8 @@ def require_known(batch: Batch) -> None:
     for name, values in arrays.items():
         if len(values) != batch.count or not np.all(np.isfinite(values)):
             raise ValueError(f"`{name}` needs {batch.count} finite values")
+    if len(batch.courses) not in (0, batch.count):
+        raise ValueError(f"{len(batch.courses)} courses are not those of {batch.count} variants")
     for name, table in batch.inputs.items():
         if name not in batch.system.inputs:
             raise ValueError(f"`{name}` is no input of {batch.system.name}")

@@ -7,7 +7,7 @@ measures, the events and the outputs that were asked for are kept. Who carries a
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Literal, Protocol
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from language.experiment import Scenario, System
 from language.model import CHART
+from language.signal import Stimulus
 
 Reals = NDArray[np.float64]
 MeasureKind = Literal["first", "final", "max", "min", "peak", "mean", "rms"]
@@ -53,6 +54,8 @@ class Batch:
 
     `parameters` are values [SI] (count,) by `instance.parameter`, `initial` start values by
     `instance.state`, `inputs` those of the system that differ, `seeds` (count,) those of noise.
+    `courses` are inputs of each variant that step at other times than those of the others: in C
+    each of them has a plan of its own, all have one Program.
     `outputs` are recorded signals to keep whole; `most_events` is how many events are kept of each
     variant: all are counted.
     """
@@ -64,6 +67,7 @@ class Batch:
     initial: Mapping[str, Reals] = field(default_factory=dict)
     inputs: Mapping[str, InputTable] = field(default_factory=dict)
     seeds: NDArray[np.int64] | None = None
+    courses: Sequence[Mapping[str, Stimulus]] = ()
     measures: tuple[Measure, ...] = ()
     outputs: tuple[str, ...] = ()
     most_events: int = 0

@@ -51,9 +51,9 @@ class PlannedBatch:
         self.batch = batch
         self.reason: str | None = None
         self._parts: list[_Planned] = []
-        for group in groups(batch):
+        for group in _of_one_plan(batch, groups(batch)):
             adjustment = group.adjustment
-            scenario = variant_scenario(batch, adjustment.scenario, 0)
+            scenario = variant_scenario(batch, adjustment.scenario, int(group.variants[0]))
             reason = why_not_planned(adjustment.system, scenario, adjustment.programs)
             self.reason = reason or _why_not_tuned(group)
             if self.reason:
@@ -71,6 +71,14 @@ class PlannedBatch:
         for part in self._parts:
             part.run(result, threads or os.cpu_count() or 1)
         return result
+
+
+def _of_one_plan(batch: Batch, found: Sequence[Group]) -> list[Group]:
+    """Return the groups; where inputs step at other times, each variant is one."""
+    if not batch.courses:
+        return list(found)
+    pairs = ((group.adjustment, variant) for group in found for variant in group.variants)
+    return [Group(np.array([variant]), adjustment) for adjustment, variant in pairs]
 
 
 def _why_not_tuned(group: Group) -> str | None:
@@ -93,7 +101,7 @@ class _Planned:
         self.batch, self.group = batch, group
         adjustment = group.adjustment
         self.system, self.programs = adjustment.system, adjustment.programs
-        scenario = variant_scenario(batch, adjustment.scenario, 0)
+        scenario = variant_scenario(batch, adjustment.scenario, int(group.variants[0]))
         self.assembly = assembly_of(self.system, scenario, self.programs)
         self.plan = plan_of(self.system, scenario, self.assembly)
         self.library = build(self.assembly)

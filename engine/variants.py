@@ -111,6 +111,8 @@ def measured(measure: Measure, values: Reals) -> float:
 def variant_scenario(batch: Batch, scenario: Scenario, variant: int) -> Scenario:
     """Return the scenario of a variant: its inputs and its seed."""
     inputs = dict(scenario.inputs)
+    if batch.courses:
+        inputs.update(batch.courses[variant])
     for name, table in batch.inputs.items():
         inputs[name] = _stimulus(batch.system, name, table, variant)
     seed = scenario.seed if batch.seeds is None else int(batch.seeds[variant])

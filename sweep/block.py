@@ -25,6 +25,8 @@ MOST_EVENTS = 64
 """Events that are kept of a variant at first; one with more is run again."""
 MOST_VALUES = 4_000_000
 """Rows times signals times variants of one batch: 32 MB."""
+MOST_PLANS = 50
+"""Variants of one batch whose inputs step at times of their own: each has all its instants."""
 
 Status = str
 DONE, FAULT, STOPPED, REFUSED = "done", "fault", "stopped", "refused"
@@ -101,14 +103,9 @@ def _groups(study: Study, cases: Sequence[Case], rows: dict[int, Row]) -> Iterab
 
 
 def _shape(scenario: Scenario) -> object:
-    """Return what scenarios of one batch have in common: their inputs step at the same times."""
-    shape = []
-    for name, stimulus in scenario.inputs.items():
-        if stimulus.varies or stimulus.column:
-            shape.append((name, stimulus))
-        else:
-            shape.append((name, tuple(piece.start for piece in stimulus.pieces)))  # type: ignore[arg-type]
-    return tuple(repr(part) for part in shape)
+    """Return what scenarios of one batch have in common: inputs that vary inside steps."""
+    inputs = scenario.inputs.items()
+    return repr([(name, stimulus) for name, stimulus in inputs if stimulus.varies])
 
 
 def _parts(study: Study, group: _Group) -> Iterable[_Group]:
@@ -117,6 +114,8 @@ def _parts(study: Study, group: _Group) -> Iterable[_Group]:
     rows = int((group.scenario.horizon or 0) / every) + 1
     each = max(1, rows * len(signals_of(study.measures)))
     size = max(1, MOST_VALUES // each)
+    if not _step_together(group):
+        size = min(size, MOST_PLANS)
     for first in range(0, len(group.cases), size):
         last = first + size
         yield dataclasses.replace(
@@ -151,13 +150,15 @@ def _batch(study: Study, group: _Group) -> Batch:
         for target in shared
     }
     kept = signals or group.system.signals[:1]
+    together = _step_together(group)
     return Batch(
         system=group.system,
         scenario=dataclasses.replace(group.scenario, signals=kept),
         count=len(cases),
         parameters={".".join(t.path): a for t, a in arrays.items() if t.kind == "parameter"},
         initial={".".join(t.path): a for t, a in arrays.items() if t.kind == "initial"},
-        inputs=_tables(group),
+        inputs=_tables(group) if together else {},
+        courses=() if together else tuple(scenario.inputs for scenario in group.steps),
         seeds=np.array([case.seed for case in cases], dtype=np.int64),
         outputs=signals,
         most_events=MOST_EVENTS,
@@ -174,6 +175,16 @@ def _tables(group: _Group) -> dict[str, InputTable]:
             values = np.array([[_real(piece.value) for piece in each] for each in pieces])
             found[name] = InputTable(starts, values)
     return found
+
+
+def _step_together(group: _Group) -> bool:
+    """Tell whether the inputs of all cases step at the same times."""
+    return all(
+        [piece.start for piece in scenario.inputs[name].pieces]
+        == [piece.start for piece in stimulus.pieces]
+        for scenario in group.steps
+        for name, stimulus in group.scenario.inputs.items()
+    )
 
 
 def _real(value: Fraction) -> float:

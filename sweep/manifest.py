@@ -64,10 +64,7 @@ def block_size(study: Study) -> int:
     """
     places = [target for varied in study.varied for target in varied.targets]
     places += [target for setting in study.settings for target in setting.targets]
-    is_batch = all(
-        place.kind in ("parameter", "initial", "input") and not place.is_input_time
-        for place in places
-    )
+    is_batch = all(place.kind in ("parameter", "initial", "input") for place in places)
     least = min(LEAST_IN_BATCH, -(-study.count // FEWEST_BLOCKS)) if is_batch else 1
     return min(MOST_IN_BLOCK, max(least, -(-study.count // MOST_BLOCKS)))
 

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 import modewright as mw
+from engine.batch import Batch, BatchResult
 from engine.variants import run_variants
+from modewright.compiled import run_batch
 from sweep.block import Block, Row, block_rows
 from sweep.structure import decimal
 from tests.sweep.laying import STUDIES, study
@@ -84,8 +86,9 @@ def test_times_noise_periods_and_starts_are_those_of_simulate(tmp_path: Path) ->
 
 def test_a_block_has_the_rows_of_its_variants_alone() -> None:
     made = study("seen")
-    together = block_rows(made, Block(4, 10), run_variants)
-    assert together == [block_rows(made, Block(k, k + 1), run_variants)[0] for k in range(4, 10)]
+    together = block_rows(made, Block(2, 10), run_variants)
+    assert together == [block_rows(made, Block(k, k + 1), run_variants)[0] for k in range(2, 10)]
+    assert {row.values["inputs.push.times.1"] for row in together} == {1.0, 0.7003}
     assert together[0].measures["error"] != together[1].measures["error"]  # other noise
 
 
@@ -112,3 +115,15 @@ def test_variants_are_systems_or_automata_in_place_of_others() -> None:
     assert made.kinds[1].system.instances["plant"].automaton.parameters["w"].value == 4
     last = block_rows(made, Block(made.count - 1, made.count), run_variants)[0]
     assert (last.variant, last.status) == ("hard", "done")
+
+
+def test_compiled_blocks_have_the_rows_of_the_interpreter_at_other_times_of_steps_too() -> None:
+    made, notes = study("seen"), []
+
+    def run(batch: Batch) -> BatchResult:
+        result = run_batch(batch, threads=1)
+        notes.append((batch.count, len(batch.courses), result.note))
+        return result
+
+    assert block_rows(made, Block(2, 8), run) == block_rows(made, Block(2, 8), run_variants)
+    assert notes == [(6, 6, "compiled")]
