@@ -67,7 +67,7 @@ def _channels(
     for row, name in enumerate(names):
         axis = figure.add_subplot(rows[row], sharex=axes[0] if axes else None)
         axes.append(axis)
-        shift = 0.0
+        shift = float(recordings[0].start) if len(recordings) == 1 else 0.0
         for recording in recordings:
             channel = recording.channels.get(name)
             start = float(recording.start)
