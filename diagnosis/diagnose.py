@@ -74,8 +74,8 @@ def diagnose(case: Case, tell: Tell = lambda text: None) -> Diagnosis:
     seen = compared(case.mapping, automaton)
     if not seen:
         raise ValueError(f"map `{case.mapping.name}` compares no output of `{automaton.name}`")
-    series = [_series(path, case, automaton, seen) for path in case.train]
-    bench, base = _recalibrated(case, automaton, series, seen, tell)
+    series = [read_series(path, case, automaton, seen) for path in case.train]
+    bench, base = recalibrated_base(case, automaton, series, seen, tell)
     units = units_of(base.candidate, bench.series, base.noises, base.values(0))
     loci = located(bench, base)
     tell(sentence(loci, automaton))
@@ -87,7 +87,7 @@ def diagnose(case: Case, tell: Tell = lambda text: None) -> Diagnosis:
     verdict = dataclasses.replace(verdict, inputs=hashes, messages=(sentence(loci, automaton),))
     held = tuple(
         dataclasses.replace(
-            _series(path, case, automaton, seen), is_linear=bench.series[0].is_linear
+            read_series(path, case, automaton, seen), is_linear=bench.series[0].is_linear
         )
         for path in case.held_out
     )
@@ -119,7 +119,8 @@ def sentence(loci: Sequence[Locus], automaton: Automaton) -> str:
     )
 
 
-def _series(path: Path, case: Case, automaton: Automaton, seen: Sequence[str]) -> Series:
+def read_series(path: Path, case: Case, automaton: Automaton, seen: Sequence[str]) -> Series:
+    """Return a recording of a case on its grid. Raises SpecError, ValueError, ToolMissing."""
     used = [
         column.name
         for column in case.mapping.columns.values()
@@ -136,7 +137,7 @@ def _series(path: Path, case: Case, automaton: Automaton, seen: Sequence[str]) -
     return thinned(found)
 
 
-def _recalibrated(
+def recalibrated_base(
     case: Case, automaton: Automaton, series: Sequence[Series], seen: tuple[str, ...], tell: Tell
 ) -> tuple[Bench, Estimate]:
     """Fit the base with inputs held, and straight between samples: the better one stays."""

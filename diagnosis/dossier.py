@@ -46,16 +46,17 @@ class Dossier:
 
 def verdict_json(verdict: Verdict) -> dict[str, Any]:
     """Return a verdict as JSON has it: a number that is not finite is null."""
-    found = _finite(verdict.json())
+    found = finite(verdict.json())
     assert isinstance(found, dict)
     return found
 
 
-def _finite(value: Any) -> Any:
+def finite(value: Any) -> Any:
+    """Return plain data in which numbers that are not finite are None."""
     if isinstance(value, dict):
-        return {key: _finite(one) for key, one in value.items()}
+        return {key: finite(one) for key, one in value.items()}
     if isinstance(value, list):
-        return [_finite(one) for one in value]
+        return [finite(one) for one in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 

@@ -15,22 +15,17 @@ from codegen.rendering import version
 from diagnosis import wording
 from diagnosis.dossier import Dossier, told, verdict_json
 from diagnosis.estimation import adapted
+from diagnosis.fit import note_of
 from diagnosis.locus_picture import locus_picture
 from diagnosis.naming import quantities_of
 from diagnosis.search import Tried
 from diagnosis.selection import Selection
-from diagnosis.uncertain import Uncertain
-from diagnosis.verdict import Quantity
 from diagnosis.worst_window import WorstWindow, window_picture, worst_window
 from engine.plot import Picture
 from language.known import unit_text
 from language.map import column_dimension
 
 LINES_OF_SVG = re.compile(r"^.*?(?=<svg)", re.DOTALL)
-AT_THE_END = 1e-3
-"""Part of its range from an end within which a parameter is at it."""
-UNDETERMINED = 0.8
-"""Part of the prior's standard deviation that is left where data say next to nothing."""
 
 
 @dataclass(frozen=True)
@@ -197,22 +192,6 @@ def _parameters(dossier: Dossier, selection: Selection) -> list[tuple[str, ...]]
         note = note_of(now, coordinates[name])
         rows.append((name, value, old, wording.quantity(now), note))
     return rows
-
-
-def note_of(now: Quantity, coordinate: Uncertain) -> str:
-    """Return what is to be said of a fitted parameter; empty where there is nothing."""
-    width = AT_THE_END * (coordinate.high - coordinate.low)
-    if min(now.value - coordinate.low, coordinate.high - now.value) < width:
-        return "at the end of its range"
-    if spread_of(now, coordinate) > UNDETERMINED:
-        return "these data do not determine it"
-    return ""
-
-
-def spread_of(now: Quantity, coordinate: Uncertain) -> float:
-    """Return the standard deviation of a fitted parameter as a part of its prior's."""
-    slope = coordinate.sd * (now.value if coordinate.is_log else 1.0)
-    return now.std / abs(slope) if slope else 1.0
 
 
 def _fixed(dossier: Dossier) -> list[str]:

@@ -64,7 +64,7 @@ def _parameters(automaton: Automaton, fitted: Mapping[str, Quantity]) -> list[st
             continue
         was = float(parameter.value)
         if abs(quantity.value - was) > UNCHANGED * abs(was):
-            text = _quantity(quantity.value, parameter)
+            text = value_text(quantity.value, parameter)
             told = f"sd {quantity.std:.2g}, declared {was:.6g}"
             lines.append(f"  {name}: {{value: {text}}}  # {told}")
     return ["parameters:", *lines] if lines else []
@@ -93,7 +93,7 @@ def _effect(
         parameter = whole.parameters.get(final)
         if own == final or layer.named(own) != final or parameter is None:
             continue
-        text = _quantity(quantity.value, parameter)
+        text = value_text(quantity.value, parameter)
         note = f"sd {quantity.std:.2g}"
         if parameter.fitting.per == "recording":
             note = "mean of " + ", ".join(f"{one[final]:.4g}" for one in each)
@@ -101,7 +101,7 @@ def _effect(
     return [*lines, "    values:", *values] if values else [f"  {layer.id}: {{}}"]
 
 
-def _quantity(value: float, parameter: Parameter) -> str:
+def value_text(value: float, parameter: Parameter) -> str:
     """Return a value in SI with its unit, rounded, but not out of its range."""
     text = f"{value:.6g}"
     if parameter.range:

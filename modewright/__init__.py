@@ -12,13 +12,14 @@ from modewright.neighbours import claim_neighbours
 
 if TYPE_CHECKING:
     from diagnosis.dossier import Dossier
+    from diagnosis.fit import Fit
     from engine.difference import RunDifference
     from engine.plot import Picture
     from engine.trajectory import Event, Trajectory
     from language.problem import Problem, SpecError, render_all
     from lockstep.compare import Verdict
     from modewright.api import Loaded, Replayed, check, generate, load, lockstep, replay, simulate
-    from modewright.diagnoses import diagnose, save_diagnosis
+    from modewright.diagnoses import diagnose, fit, save_diagnosis
     from modewright.diagram import Diagram, graph
     from modewright.recordings import CheckedRecordings, check_recordings
     from modewright.runs import compare, plot, read, save
@@ -29,6 +30,7 @@ __all__ = [
     "Diagram",
     "Dossier",
     "Event",
+    "Fit",
     "Loaded",
     "Picture",
     "Problem",
@@ -41,6 +43,7 @@ __all__ = [
     "check_recordings",
     "compare",
     "diagnose",
+    "fit",
     "generate",
     "graph",
     "load",
@@ -62,6 +65,7 @@ PLACES = {
     "Diagram": "modewright.diagram",
     "Dossier": "diagnosis.dossier",
     "Event": "engine.trajectory",
+    "Fit": "diagnosis.fit",
     "Picture": "engine.plot",
     "Problem": "language.problem",
     "RunDifference": "engine.difference",
@@ -74,6 +78,7 @@ PLACES = {
     "check": "modewright.checking",
     "check_recordings": "modewright.recordings",
     "diagnose": "modewright.diagnoses",
+    "fit": "modewright.diagnoses",
     "graph": "modewright.diagram",
     "render_all": "language.problem",
     "save": "modewright.runs",

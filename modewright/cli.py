@@ -19,6 +19,7 @@ from modewright.commands.demo import demo
 from modewright.commands.diagnose import diagnose
 from modewright.commands.doctor import doctor
 from modewright.commands.explain import explain
+from modewright.commands.fit import fit
 from modewright.commands.generate import generate
 from modewright.commands.graph import graph
 from modewright.commands.lockstep import lockstep
@@ -35,8 +36,8 @@ from modewright.files import require_writable
 YOUNG_OBJECTS = 100_000
 """New objects after which garbage is looked for: trees of expressions have no circles."""
 COMMANDS = (
-    new, check, diagnose, simulate, sweep, lockstep, replay, plot, compare, graph, generate,
-    explain, demo, doctor,
+    new, check, diagnose, fit, simulate, sweep, lockstep, replay, plot, compare, graph,
+    generate, explain, demo, doctor,
 )  # fmt: skip
 
 app = typer.Typer(

@@ -9,7 +9,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from diagnosis.diagnose import Case, diagnose as diagnosed
-from diagnosis.dossier import Dossier, hashes, undecided, usable
+from diagnosis.dossier import Dossier, hashes, told, undecided, usable
+from diagnosis.fit import Fit, fit as fitted
 from diagnosis.layers import effects_in, shipped_effects
 from diagnosis.variant import variant_text
 from language.effect import Effect
@@ -127,3 +128,25 @@ def _library(folder: str | Path | None) -> tuple[Effect, ...]:
     if not found:
         raise ValueError(f"there is no effect in {folder}")
     return found
+
+
+def fit(
+    spec: str,
+    train: Sequence[str | Path],
+    parameters: Sequence[str] | None = None,
+    map: str | None = None,
+    root: Path | None = None,
+    *,
+    tell: Tell = lambda text: None,
+) -> Fit:
+    """Fit parameters of an automaton within their ranges to what was recorded.
+
+    `parameters` are those that may move: all that have a range, if none are named. What is odd
+    about the recordings is told. Raises SpecError, ValueError, ToolMissing.
+    """
+    checked = check_recordings(train, map, spec, root=root)
+    for finding in checked.check.findings:
+        if finding.severity != "note":
+            tell(f"{finding.severity}: {told(finding)}")
+    case, _ = _case(spec, train, (), checked, None, root)
+    return fitted(case, parameters, tell)

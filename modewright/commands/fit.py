@@ -1,0 +1,58 @@
+"""Command fit: parameters of a spec from recordings."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from modewright.commands.diagnose import Map, Train, tell
+from modewright.commands.options import Json, usage_errors
+from modewright.console import announce, console
+from modewright.files import require_writable, write_files
+
+
+def fit(
+    spec: Annotated[str, typer.Argument(help="an automaton: name or file")],
+    train: Train,
+    parameters: Annotated[
+        str | None, typer.Option("--parameters", help="those that may move: 'k_hs,c_hs'")
+    ] = None,
+    mapping: Map = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="write a calibration: .yaml")
+    ] = None,
+    name: Annotated[
+        str | None, typer.Option("--name", help="of the calibration; that of its file if absent")
+    ] = None,
+    date: Annotated[str, typer.Option("--date", help="of the recordings: '2026-11-21'")] = "",
+    as_json: Json = False,
+) -> None:
+    """Fit parameters within their ranges to recordings; tell what these cannot determine.
+
+    \b
+    modewright fit blind_driveline --train a.csv --train b.csv --parameters k,c --out rig_7.yaml
+    modewright fit emps --train run.csv --map my_columns --json
+    """
+    from language.calibration import DATE
+    from language.names import NAME
+    from modewright import show, show_diagnosis
+    from modewright.diagnoses import fit as fitted
+
+    require_writable(out)
+    title = name or (out.stem if out else "fitted")
+    if not NAME.fullmatch(title):
+        raise typer.BadParameter(f"`{title}` is not a name", param_hint="--name")
+    if date and not DATE.fullmatch(date):
+        raise typer.BadParameter("a date is written as `2026-11-21`", param_hint="--date")
+    chosen = [part.strip() for part in parameters.split(",")] if parameters else None
+    with usage_errors():
+        found = fitted(spec, train, chosen, mapping, tell=tell)
+    if out:
+        write_files({out: found.calibration(title, date).encode()})
+    if as_json:
+        show.print_json(show_diagnosis.fit_json(found))
+    else:
+        show_diagnosis.print_fit(console(), found)
+        announce([out] if out else [])

@@ -1,0 +1,81 @@
+"""Parameters are fitted within their ranges, and it is told what data cannot determine."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import modewright as mw
+from modewright.cli import app
+from modewright.exits import exit_code
+from tests.diagnosis.spinning import B, J, bench
+
+MORE = "b: {value: 0.1 N*m*s/rad, range: [0.01, 0.5]}\n  T_0: {value: 1 N*m, range: [0.5, 2]}"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A rotor without dry friction; its spec has a torque `T_0` that is as good as absent."""
+    made = bench(tmp_path_factory.mktemp("fit") / "project", T_c=0.0)
+    path = made / "spec" / "spinner.yaml"
+    text = path.read_text("utf-8").replace("b: {value: 0.1 N*m*s/rad, range: [0.01, 0.5]}", MORE)
+    path.write_text(text.replace("T - b * w", "T - b * w - 0.000001 * T_0"), "utf-8")
+    return made
+
+
+@pytest.fixture(autouse=True)
+def _there(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(folder)
+
+
+def test_values_are_found_within_their_deviation_and_what_is_not_known_is_told() -> None:
+    found = mw.fit("spinner", ["run_0.csv", "run_1.csv"])
+    by_name = {one.name: one for one in found.parameters}
+    for name, true in (("J", J), ("b", B)):
+        one = by_name[name]
+        assert abs(one.quantity.value - true) < 4.0 * one.quantity.std, one
+        assert one.quantity.std < 0.02 * true
+    assert found.undetermined == ("T_0",)
+    assert by_name["T_0"].left == pytest.approx(1.0, abs=0.01)
+    assert by_name["T_0"].quantity.value == pytest.approx(1.0, rel=0.01)
+    assert found.misfits["w"].nrmse_after < 0.1 * found.misfits["w"].nrmse_before
+
+
+def test_only_those_named_move_and_the_calibration_is_a_spec(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["fit", "spinner", "--train", "run_0.csv", "--parameters", "J"]
+    words += ["--out", "rig_7.yaml", "--date", "2026-11-21"]
+    assert exit_code(lambda: app(words, standalone_mode=False)) == 0
+    text = (folder / "rig_7.yaml").read_text("utf-8")
+    assert "calibration: rig_7\nof: spinner\n" in text
+    assert 'from: "run_0.csv"\ndate: 2026-11-21\n' in text
+    assert "  b:" not in text and "  J: {value: 0.5" in text and "std: 0.0" in text
+    assert mw.check("rig_7.yaml") == []
+    assert "as fitted" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["--parameters", "J,bb"], "`spinner` has no parameter `bb`"),
+        (["--name", "rig 7"], "`rig 7` is not a name"),
+        (["--date", "21.11.2026"], "a date is written as"),
+    ],
+)
+def test_what_cannot_be_fitted_is_told(
+    words: list[str], told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = ["fit", "spinner", "--train", "run_0.csv", *words]
+    assert exit_code(lambda: app(command, standalone_mode=False)) in (1, 2)
+    assert told in capsys.readouterr().err
+
+
+def test_a_parameter_without_a_range_is_not_fitted(folder: Path) -> None:
+    path = folder / "spec" / "spinner.yaml"
+    fixed = path.read_text("utf-8").replace("automaton: spinner", "automaton: stiff")
+    (folder / "stiff.yaml").write_text(fixed.replace(", range: [0.3, 0.8]", ""), "utf-8")
+    with pytest.raises(mw.SpecError) as refused:
+        mw.fit("stiff.yaml", ["run_0.csv"], ["J"])
+    assert [p.label for p in refused.value.problems] == ["`J` has no range to be fitted in"]
