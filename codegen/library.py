@@ -51,6 +51,10 @@ class PlanStruct(ctypes.Structure):
                 "flows",
                 "noise",
                 "early",
+                "row_high",
+                "row_low",
+                "pieces",
+                "courses",
             )
         ),
     ]
@@ -136,7 +140,7 @@ class Library:
         early = (Whole * max(1, len(sensors)))(*(plan.early[name] for name in sensors))
         struct = PlanStruct(
             instants=len(plan.instants.high),
-            rows=len(plan.rows),
+            rows=len(plan.rows.high),
             high=plan.instants.high.ctypes.data,
             low=plan.instants.low.ctypes.data,
             inputs=plan.inputs.ctypes.data,
@@ -146,6 +150,10 @@ class Library:
             flows=ctypes.addressof(flows),
             noise=_member(noise, kept),
             early=ctypes.addressof(early),
+            row_high=plan.rows.high.ctypes.data,
+            row_low=plan.rows.low.ctypes.data,
+            pieces=plan.pieces.ctypes.data,
+            courses=_member([plan.courses[c.name] for c in self.assembly.courses], kept),
         )
         return struct, [*kept, flows, early, plan]
 

@@ -10,15 +10,16 @@ import dataclasses
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any
 
-from codegen.expression import c_expression, literal
+from codegen.expression import Place, c_expression, literal
 from codegen.mathematics import math_files
 from codegen.names import REAL, CNames, c_member, c_type
 from codegen.rendering import render, version
 from codegen.source import module_context
 from codegen.usage import locals_of, usages
-from language.assembly import RANGE_SLACK, Assembly, Feed, ranged, short_input, wires_of
+from language.assembly import RANGE_SLACK, Assembly, Course, Feed, ranged, short_input, wires_of
 from language.continuous import PARTS
 from language.number import NumberType
 from language.operation import Assign
@@ -85,6 +86,7 @@ class _Places:
     assembly: Assembly
     programs: Mapping[str, Program]
     is_row: bool = False
+    is_timed: bool = False
     number: NumberType = "float64"
 
     def __call__(self, name: str) -> str:
@@ -100,6 +102,9 @@ class _Places:
 
     def signal(self, name: str) -> str:
         """Return the C text of a signal."""
+        courses = [course.name for course in self.assembly.courses]
+        if self.is_timed and name in courses:
+            return f"course_{courses.index(name)}(run, time)"
         if name in self.assembly.inputs:
             return f"run->inputs[{self.assembly.inputs.index(name)}]"
         if name in self.assembly.sensors:
@@ -111,9 +116,14 @@ class _Places:
 
     def formula(self, block: str) -> str:
         """Return the C text of a block of the wires."""
-        (op,) = self.assembly.wires.blocks[block]
-        assert isinstance(op, Assign)
-        return f"(double)({c_expression(op.value, self)})"
+        return _formula(self.assembly, block, self)
+
+
+def _formula(assembly: Assembly, block: str, place: Place) -> str:
+    """Return the C text of a block of the wires, whose signals are at a place."""
+    (op,) = assembly.wires.blocks[block]
+    assert isinstance(op, Assign)
+    return f"(double)({c_expression(op.value, place)})"
 
 
 def _module(
@@ -148,6 +158,7 @@ def _module(
             if s.lag and s.source.partition(".")[0] == name
         ],
         "most_pieces": EVENTS_PER_STEP,
+        "varying": _varying(assembly, name, program, places),
         "zero": literal(0.0, program.number),
         "states": [place(v.name) for v in program.variables if v.name.startswith("state.")],
         "has_faults": any(v.name == "memory.faults" for v in program.variables),
@@ -208,8 +219,12 @@ def _driver(assembly: Assembly, programs: Mapping[str, Program], places: _Places
         "inputs": len(assembly.inputs),
         "has_lag": has_lag,
         "uses_math": has_lag or bool(called),
+        "courses": [_course(assembly, course) for course in assembly.courses],
         "slots": [
-            {"value": places.signal(s), "is_flow": s.partition(".")[0] in assembly.flows}
+            {
+                "value": _slot(assembly, s, places),
+                "is_flow": s.partition(".")[0] in assembly.flows,
+            }
             for s in assembly.slots
         ],
         "formulas": [
@@ -227,6 +242,43 @@ def _driver(assembly: Assembly, programs: Mapping[str, Program], places: _Places
             for owner, c in assembly.tunables()
         ],
     }
+
+
+def _slot(assembly: Assembly, signal: str, places: _Places) -> str:
+    """Return what fills a slot of a row; an input may change between the instants."""
+    courses = [course.name for course in assembly.courses]
+    value = places.signal(signal)
+    if signal in courses:
+        return f"is_instant ? {value} : course_{courses.index(signal)}(run, at)"
+    return value
+
+
+def _course(assembly: Assembly, course: Course) -> dict[str, object]:
+    high = float(course.delay)
+    return {
+        "delay": course.delay,
+        "high": repr(high),
+        "low": repr(float(course.delay - Fraction(high))),
+        "column": assembly.inputs.index(course.name),
+        "formulas": [
+            (number, _formula(assembly, block, _Clock())) for number, block in course.formulas
+        ],
+    }
+
+
+@dataclass(frozen=True)
+class _Clock:
+    """Where a formula of time reads it, whatever it is called there."""
+
+    number: NumberType = "float64"
+
+    def __call__(self, name: str) -> str:
+        """Return the C text of the time."""
+        return "now"
+
+    def whole(self, name: str, number: int) -> str:
+        """Return a whole number beside it."""
+        return repr(number)
 
 
 def _happenings(assembly: Assembly) -> list[tuple[int, str]]:
@@ -263,12 +315,27 @@ def _instance(assembly: Assembly, name: str, program: Program, places: _Places) 
         "ranges": ranged(program) if is_flow else (),
         "feeds": [_fed(feed, program, places) for feed in assembly.feeds[name]],
         "flags": flags,
+        "varying": _varying(assembly, name, program, places),
         "fixed_tunables": [
             f"{c_member(c.name)} = {literal(c.value, program.number)}"
             for c in program.constants
             if c.kind == "tunable" and c.name not in varied and not c.items
         ],
     }
+
+
+def _varying(
+    assembly: Assembly, name: str, program: Program, places: _Places
+) -> list[dict[str, str]]:
+    """Return the inputs of an instance that change inside its steps, and what they are then."""
+    timed = dataclasses.replace(places, is_timed=True)
+    known = {variable.name for variable in program.variables}
+    found = []
+    for feed in assembly.feeds[name]:
+        if f"work.rise_{short_input(feed)}" in known:
+            signal = timed.formula(feed.block) if feed.block else timed.signal(str(feed.source))
+            found.append({"name": short_input(feed), "at": signal})
+    return found
 
 
 def _fed(feed: Feed, program: Program, places: _Places) -> dict[str, object]:

@@ -9,8 +9,8 @@ from __future__ import annotations
 import dataclasses
 import math
 from bisect import bisect_right
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from fractions import Fraction
 from itertools import islice
 
@@ -22,13 +22,13 @@ from engine.schedule import Grid, Schedule
 from engine.sensing import noise_numbers
 from engine.signals import LineRun
 from engine.stimulus import Course
-from language.assembly import Assembly, Column, Feed
+from language.assembly import Assembly, Column, Course as Varying, Feed
 from language.declaration import Formula
 from language.experiment import Connection, Scenario, System
 from language.operation import Block
 from language.program import Program
 from language.traversal import block_reads
-from language.wires import block_of, wire_formulas, wires_program
+from language.wires import block_of, piece_block, wire_formulas, wires_program
 
 Reals = NDArray[np.float64]
 Wholes = NDArray[np.int64]
@@ -70,21 +70,24 @@ class Plan:
     the row of each or NEVER, `rows` [s] (rows,) with the instant that each is at or before.
 
     `noise` are normal numbers of each sensor that has noise, `early` how many samples of each are
-    taken before the first delayed one arrives.
+    taken before the first delayed one arrives. Of inputs that change between instants: `pieces`
+    (instants, courses), `courses` (pieces, 6) with start, value and slope of each.
     """
 
     instants: Times
     inputs: Reals
     happens: NDArray[np.uint32]
     row_at: Wholes
-    rows: Reals
+    rows: Times
     row_gaps: Wholes
     flows: Mapping[str, FlowPlan]
     noise: Mapping[str, Reals]
     early: Mapping[str, int]
     exact: tuple[Fraction, ...] = ()
+    pieces: Wholes = field(default_factory=lambda: np.zeros(1, dtype=np.int64))
+    courses: Mapping[str, Reals] = field(default_factory=dict)
 
-    def pieces(self, starts: Sequence[Fraction]) -> Wholes:
+    def pieces_at(self, starts: Sequence[Fraction]) -> Wholes:
         """Return the piece that holds at each instant (instants,); before the first, the first."""
         at = [bisect_right(starts, time) - 1 for time in self.exact]
         return np.maximum(np.array(at, dtype=np.int64), 0)
@@ -96,9 +99,6 @@ def why_not_planned(
     """Return why a run cannot be planned before it begins; None where it can."""
     if scenario.pages:
         return "a page of the calibration turns during the run"
-    for name, stimulus in scenario.inputs.items():
-        if stimulus.varies:
-            return f"input `{name}` changes inside the steps"
     for name, line in system.lines.items():
         if line.source not in system.inputs:
             return f"`{name}` is a delayed output"
@@ -111,8 +111,8 @@ def why_not_planned(
     for name, program in programs.items():
         if program.invariants:
             return f"`{name}` has invariants"
-        if program.period is None and ("record" in program.blocks or "step" not in program.blocks):
-            return f"`{name}` has delays or inputs that change inside its steps"
+        if program.period is None and "record" in program.blocks:
+            return f"`{name}` has delays"
     if len(assembly_of(system, scenario, programs).happenings) > MOST_HAPPENINGS:
         return f"more than {MOST_HAPPENINGS} things tick, sample or arrive"
     if _tick(Schedule(system, scenario, dict(programs)), programs) is None:
@@ -151,6 +151,7 @@ def assembly_of(system: System, scenario: Scenario, programs: Mapping[str, Progr
         slots=tuple(slots),
         columns=tuple(columns),
         controlled=frozenset(controlled),
+        courses=tuple(_courses(system, scenario)),
     )
 
 
@@ -185,7 +186,7 @@ def plan_of(system: System, scenario: Scenario, assembly: Assembly) -> Plan:
         inputs=input_values(system, scenario, assembly, instants, tick),
         happens=happens,
         row_at=row_at,
-        rows=_times(rows, tick).high,
+        rows=_times(rows, tick),
         row_gaps=np.searchsorted(instants, rows),
         flows={
             name: _flow_plan(int(programs[name].major_step / tick), instants, rows, tick)
@@ -193,6 +194,8 @@ def plan_of(system: System, scenario: Scenario, assembly: Assembly) -> Plan:
         },
         noise=noise,
         early=early,
+        pieces=_course_pieces(system, scenario, assembly, instants, tick),
+        courses={c.name: _course_table(system, scenario, c) for c in assembly.courses},
         exact=tuple(int(instant) * tick for instant in instants),
     )
 
@@ -214,6 +217,8 @@ def input_values(
     for place, name in enumerate(assembly.inputs):
         line = system.lines.get(name)
         source, delay = (line.source, line.delay) if line else (name, Fraction(0))
+        if scenario.inputs[source].varies:
+            continue
         course = Course(source, scenario.inputs[source], _no_formula)
         starts = [math.ceil((piece.start + delay) / tick) for piece in course.pieces]
         values = [float(course.at(piece.start)) for piece in course.pieces]
@@ -222,6 +227,49 @@ def input_values(
         pieces = np.maximum(np.searchsorted(np.array(starts), instants, side="right") - 1, 0)
         found[:, place] = np.array(values)[pieces]
     return found
+
+
+def _courses(system: System, scenario: Scenario) -> Iterator[Varying]:
+    """Yield the inputs that change between instants."""
+    for name in (*system.inputs, *system.lines):
+        line = system.lines.get(name)
+        source = line.source if line else name
+        stimulus = scenario.inputs[source]
+        if stimulus.varies:
+            pieces = enumerate(stimulus.pieces)
+            blocks = tuple((k, piece_block(source, k)) for k, piece in pieces if piece.formula)
+            yield Varying(name, line.delay if line else Fraction(0), blocks)
+
+
+def _course_pieces(
+    system: System, scenario: Scenario, assembly: Assembly, instants: Wholes, tick: Fraction
+) -> Wholes:
+    """Return the piece of each course that holds from each instant on (instants, courses)."""
+    found = np.zeros((len(instants), max(1, len(assembly.courses))), dtype=np.int64)
+    for place, course in enumerate(assembly.courses):
+        line = system.lines.get(course.name)
+        stimulus = scenario.inputs[line.source if line else course.name]
+        starts = [math.ceil((piece.start + course.delay) / tick) for piece in stimulus.pieces]
+        at = np.searchsorted(np.array(starts), instants, side="right") - 1
+        found[:, place] = np.maximum(at, 0)
+    return found
+
+
+def _course_table(system: System, scenario: Scenario, course: Varying) -> Reals:
+    """Return start, value and slope of each piece, each as two doubles (pieces, 6)."""
+    line = system.lines.get(course.name)
+    stimulus = scenario.inputs[line.source if line else course.name]
+    rows = [
+        [part for exact in (piece.start, piece.value, piece.slope) for part in _two(exact)]
+        for piece in stimulus.pieces
+    ]
+    return np.array(rows, dtype=np.float64)
+
+
+def _two(exact: Fraction) -> tuple[float, float]:
+    high = exact.numerator / exact.denominator
+    rest = exact - Fraction(high)
+    return high, rest.numerator / rest.denominator
 
 
 def _no_formula(block: str, time: float) -> float:

@@ -69,7 +69,7 @@ class PlannedRun:
         self._values = np.array(
             [rounded(c.value) for _, c in self.assembly.tunables()], dtype=np.float64
         )
-        self._rows = np.empty((len(self.plan.rows), self.library.width))
+        self._rows = np.empty((len(self.plan.rows.high), self.library.width))
         self._events = np.empty(FIRST_EVENTS, dtype=EVENT)
         self._count = np.zeros(1, dtype=np.int64)
         self._is_left = np.zeros(1, dtype=np.uint8)
@@ -93,7 +93,7 @@ class PlannedRun:
         columns = zip(self.recorded, self.library.columns, strict=True)
         return Trajectory(
             name=self.scenario.name,
-            times=self.plan.rows.copy(),
+            times=self.plan.rows.high.copy(),
             signals={
                 column.name: column_array(column.type, self._rows[:, place].tolist())
                 if column.type != "real"

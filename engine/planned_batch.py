@@ -107,7 +107,7 @@ class _Planned:
         self.library = build(self.assembly)
         names = [column.name for column in self.assembly.columns]
         places = dict(zip(names, self.library.columns, strict=True))
-        count = len(self.plan.rows)
+        count = len(self.plan.rows.high)
         spans = [first_and_last_row(m, scenario.every, count) for m in batch.measures]
         self.fixed: dict[str, Any] = {
             "measures": len(batch.measures),
@@ -137,7 +137,7 @@ class _Planned:
     def _chunk(self, result: BatchResult, variants: NDArray[np.int64]) -> list[int]:
         """Carry some variants out; return those that are left to the interpreter."""
         batch, count = self.batch, len(variants)
-        rows, most = len(self.plan.rows), batch.most_events
+        rows, most = len(self.plan.rows.high), batch.most_events
         measured = np.empty((count, len(batch.measures)))
         kept = np.empty((count, len(batch.outputs), rows))
         events = np.empty((count, most), dtype=EVENT)
@@ -209,7 +209,7 @@ class _Planned:
                 delay = line.delay if line else 0
                 inputs.append(place)
                 widths.append(len(table.starts))
-                pieces.append(self.plan.pieces([start + delay for start in table.starts]))
+                pieces.append(self.plan.pieces_at([start + delay for start in table.starts]))
         return {
             "tables": len(inputs),
             "table_inputs": _wholes(inputs),

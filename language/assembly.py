@@ -8,6 +8,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from fractions import Fraction
 
 from language.printing import digest
 from language.program import Constant, Program, Variable, short
@@ -42,6 +43,18 @@ class Column:
 
 
 @dataclass(frozen=True)
+class Course:
+    """An input that changes between the instants, `delay` [s] late where it is a delayed one.
+
+    `formulas` are the pieces that are formulas of time, by number, with their block of the wires.
+    """
+
+    name: str
+    delay: Fraction
+    formulas: tuple[tuple[int, str], ...]
+
+
+@dataclass(frozen=True)
 class Assembly:
     """Instances with their Programs, `order` of all that ticks or samples, and what they read.
 
@@ -58,6 +71,7 @@ class Assembly:
     slots: tuple[str, ...]
     columns: tuple[Column, ...]
     controlled: frozenset[str]
+    courses: tuple[Course, ...] = ()
 
     @property
     def flows(self) -> tuple[str, ...]:
@@ -76,7 +90,8 @@ class Assembly:
         programs = [(name, digest(program)) for name, program in self.programs.items()]
         rest = (self.order, self.inputs, self.feeds, self.slots, self.columns)
         more = (sorted(self.controlled), list(self.sensors.items()), digest(self.wires))
-        return hashlib.sha256(repr((programs, rest, more)).encode()).hexdigest()
+        text = repr((programs, rest, more, self.courses))
+        return hashlib.sha256(text.encode()).hexdigest()
 
     def tunables(self) -> Iterator[tuple[str, Constant]]:
         """Yield the numbers that a variant may change, in the order of its values."""

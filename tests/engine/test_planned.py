@@ -20,7 +20,7 @@ from engine.planned_batch import planned_batch
 from engine.simulate import simulate
 from engine.starting import programs_of
 from engine.variants import run_variants
-from language.experiment import Scenario, System
+from language.experiment import Page, Scenario, System
 from language.signal import Piece
 from modewright.api import load
 from modewright.compiled import run, run_batch
@@ -78,11 +78,41 @@ def with_rows(loaded: Loaded, every: Fraction) -> Loaded:
     return loaded[0], dataclasses.replace(loaded[1], every=every)
 
 
-def test_rows_at_and_inside_steps_and_events_are_those_of_the_interpreter() -> None:
-    loaded = drive("light_damping", "coasting_down", Fraction(5, 10), root=DRIVELINES)
-    loaded = with_rows(loaded, Fraction(3, 16_000))
+@pytest.mark.parametrize(
+    ("name", "scenario", "horizon"),
+    [
+        ("light_damping", "coasting_down", Fraction(5, 10)),
+        ("two_gaps", "tip_out_in", Fraction(6, 10)),
+        ("clutch", "launch", Fraction(13, 10)),
+    ],
+)
+def test_rows_at_and_inside_steps_and_events_are_those_of_the_interpreter(
+    name: str, scenario: str, horizon: Fraction
+) -> None:
+    """Of the last two an input changes inside the steps: on lines, and by a formula of time."""
+    loaded = with_rows(drive(name, scenario, horizon, root=DRIVELINES), Fraction(3, 16_000))
     theirs = simulate(*loaded)
-    assert len(theirs.events) >= 4
+    assert len(theirs.events) >= 1
+    assert_same(compiled(*loaded), theirs)
+
+
+def test_a_ramp_that_arrives_late_has_the_bits_of_the_interpreter() -> None:
+    system, scenario = drive("ev_driveline_sensed", "tip_out_sensed", Fraction(15, 100))
+    starts = (Fraction(0), Fraction(20, 1000), Fraction(61, 1000))
+    ends = (
+        (Fraction(30), Fraction(0)),
+        (Fraction(30), Fraction(-5000, 3)),
+        (Fraction(-20), Fraction(0)),
+    )
+    pieces = tuple(Piece(at, *line) for at, line in zip(starts, ends, strict=True))
+    stimulus = dataclasses.replace(scenario.inputs["T_req"], pieces=pieces)
+    inputs = {**scenario.inputs, "T_req": stimulus}
+    ramped = dataclasses.replace(
+        scenario, inputs=inputs, signals=("T_req", "plant.T_hs", "est.T_hs")
+    )
+    loaded = with_rows((system, ramped), Fraction(3, 16_000))
+    theirs = simulate(*loaded)
+    assert theirs.events
     assert_same(compiled(*loaded), theirs)
 
 
@@ -140,15 +170,13 @@ def test_a_variant_that_leaves_a_range_or_stops_is_told_by_the_interpreter() -> 
 
 def test_what_cannot_be_planned_is_run_block_by_block_and_says_why() -> None:
     system, scenario = drive("ev_driveline_ideal", "tip_out", Fraction(1, 100))
-    (name, stimulus), *_ = scenario.inputs.items()
-    ramp = (Piece(Fraction(0), Fraction(30), Fraction(-1)),)
-    inputs = {**scenario.inputs, name: dataclasses.replace(stimulus, pieces=ramp)}
-    ramped = dataclasses.replace(scenario, inputs=inputs)
-    trajectory, means = run(system, ramped, compiled=True)
-    why = "input `T_req` changes inside the steps"
+    page = Page(Fraction(1, 200), {("plant", "J_em"): Fraction(6, 100)})
+    paged = dataclasses.replace(scenario, pages=(page,))
+    trajectory, means = run(system, paged, compiled=True)
+    why = "a page of the calibration turns during the run"
     assert means == f"compiled, block by block: {why}"
-    assert_same(trajectory, simulate(system, ramped))
-    batch = Batch(system, ramped, 1, measures=(Measure("m", "plant.w_w", "final"),))
+    assert_same(trajectory, simulate(system, paged))
+    batch = Batch(system, paged, 1, measures=(Measure("m", "plant.w_w", "final"),))
     assert run_batch(batch).note == f"interpreter: {why}"
 
 
