@@ -25,6 +25,8 @@ MUCH_REPEATED = 0.08
 """Share of repeated values, beyond what quantisation explains, from which it is told."""
 LONGEST_HELD = 4
 """Repetitions in a row that count: more are a signal at rest."""
+STUCK_SAMPLES, STUCK_TIME = 25, 0.2
+"""Samples and seconds for which a noisy signal has to keep one value to be stuck."""
 CLIPPED = 0.01
 """Share of samples exactly at the largest or smallest value from which it may be a limit."""
 LEAST_SAMPLES = 10
@@ -189,7 +191,8 @@ def _stuck(
     if not runs:
         return None
     first, last = max(runs, key=lambda run: run[1] - run[0])
-    return (float(times[first]), float(times[last])) if last - first >= 25 else None
+    is_long = last - first >= STUCK_SAMPLES and times[last] - times[first] >= STUCK_TIME
+    return (float(times[first]), float(times[last])) if is_long else None
 
 
 def _clipped(values: Values, quantum: float, noise: float) -> float:

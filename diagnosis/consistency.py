@@ -67,10 +67,14 @@ class Relation:
         return abs(self.correlation) >= ALIKE
 
     @property
+    def improvement(self) -> float:
+        """How much better the correlation is with the lag."""
+        return abs(self.correlation) - abs(self.correlation_without_lag)
+
+    @property
     def believed_lag(self) -> float:
         """The lag [s], 0 where no lag would do as well."""
-        better = abs(self.correlation) - abs(self.correlation_without_lag)
-        return self.lag if self.is_clear and better > CLEARER else 0.0
+        return self.lag if self.is_clear and self.improvement > CLEARER else 0.0
 
 
 def relations(

@@ -17,6 +17,8 @@ from language.units import Dimension, fits, parse_unit
 
 OFFSET_ERROR, OFFSET_WARNING = 0.1, 0.08
 """Offsets of clocks [s] that are an error and a warning; actuators and sensors lag up to 0.05."""
+MUCH_CLEARER = 0.1
+"""How much better the correlation has to be, to believe that one recording of several is late."""
 SAME_CLOCK = 0.04
 """Lags nearer than this are one offset [s]."""
 MOST = 0.6
@@ -62,12 +64,28 @@ def disagreements(
     shared = [
         finding
         for finding in _found("", found, automaton, mapping, recordings)
-        if sum(_has(findings, finding) for findings in own.values()) > MOST * len(clear)
+        if _is_shared(finding, own, found)
     ]
-    rest = [f for findings in own.values() for f in findings if not _has(shared, f)]
+    outputs = {relation.channel for relation in found}
+    told = {kind for f in shared if f.channel not in outputs for kind in _alike(f.kind)}
+    rest = [f for fs in own.values() for f in fs if not _has(shared, f) and f.kind not in told]
     if any(finding.kind != "clock_offset" for finding in shared):
         return shared  # what else is odd follows from that
-    return [*shared, *[_weaker(finding) for finding in rest]]
+    sure = {r.recording for r in found if r.is_clear and r.improvement > MUCH_CLEARER}
+    return [*shared, *[_weaker(f) for f in rest if f.kind != "clock_offset" or f.recording in sure]]
+
+
+def _is_shared(
+    finding: Finding, own: Mapping[str, Sequence[Finding]], relations: Sequence[Relation]
+) -> bool:
+    """Tell whether most recordings say the same, of those in which the channel is clear."""
+    clear = {r.recording for r in relations if r.is_clear and r.channel == finding.channel}
+    count = sum(_has(findings, finding) for findings in own.values())
+    if not clear:  # an input: where one output alone is clear, that one is blamed
+        clear = {r.recording for r in relations if r.is_clear}
+        kinds = _alike(finding.kind)
+        count = sum(any(f.kind in kinds for f in findings) for findings in own.values())
+    return count >= 2 and count > MOST * len(clear)
 
 
 def _weaker(finding: Finding) -> Finding:
