@@ -35,9 +35,14 @@ CHUNK = 2000
 """Variants of one call: their events and values are a few megabytes."""
 
 
-def planned_batch(batch: Batch, build: Build, threads: int | None = None) -> BatchResult:
-    """Return what is kept of each variant, by compiled C on several threads."""
-    return PlannedBatch(batch, build).carry_out(threads)
+def planned_batch(
+    batch: Batch, build: Build, threads: int | None = None, least: int = 0
+) -> BatchResult:
+    """Return what is kept of each variant, by compiled C on several threads.
+
+    Variants that share a Program and have fewer than `least` steps in all are not compiled for.
+    """
+    return PlannedBatch(batch, build, least).carry_out(threads)
 
 
 class PlannedBatch:
@@ -46,12 +51,14 @@ class PlannedBatch:
     Variants with Programs of their own are compiled group by group.
     """
 
-    def __init__(self, batch: Batch, build: Build) -> None:
+    def __init__(self, batch: Batch, build: Build, least: int = 0) -> None:
         """Compile what the batch needs; `reason` says why it is left to the interpreter."""
         self.batch = batch
         self.reason: str | None = None
         self._parts: list[_Planned] = []
-        for group in _of_one_plan(batch, groups(batch)):
+        found = groups(batch)
+        self._few = [group for group in found if _steps(group) < least]
+        for group in _of_one_plan(batch, [g for g in found if _steps(g) >= least]):
             adjustment = group.adjustment
             scenario = variant_scenario(batch, adjustment.scenario, int(group.variants[0]))
             reason = why_not_planned(adjustment.system, scenario, adjustment.programs)
@@ -59,7 +66,7 @@ class PlannedBatch:
             if self.reason:
                 return
             self._parts.append(_Planned(batch, group, build))
-        if not self._parts:
+        if not found:
             raise ValueError("a batch has at least one variant")
 
     def carry_out(self, threads: int | None = None) -> BatchResult:
@@ -67,10 +74,23 @@ class PlannedBatch:
         if self.reason:
             note = f"interpreter: {self.reason}"
             return BatchResult(**{**vars(run_variants(self.batch)), "note": note})
-        result = empty_result(self.batch, self._parts[0].group.adjustment, "compiled")
+        first = self._parts[0].group if self._parts else self._few[0]
+        note = "compiled" if self._parts else "interpreter: too few steps to compile for"
+        result = empty_result(self.batch, first.adjustment, note)
         for part in self._parts:
             part.run(result, threads or os.cpu_count() or 1)
+        for group in self._few:
+            for variant in group.variants.tolist():
+                keep_variant(self.batch, result, variant, group.adjustment)
         return result
+
+
+def _steps(group: Group) -> int:
+    """Return how many steps and ticks the variants of a group have in all."""
+    horizon = group.adjustment.scenario.horizon
+    assert horizon is not None
+    programs = group.adjustment.programs.values()
+    return len(group.variants) * sum(int(horizon / program.major_step) for program in programs)
 
 
 def _of_one_plan(batch: Batch, found: Sequence[Group]) -> list[Group]:

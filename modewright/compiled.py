@@ -60,13 +60,21 @@ def _in_c(
     return run, "compiled" if run else "it has to tell what happened"
 
 
-def run_batch(batch: Batch, threads: int | None = None) -> BatchResult:
-    """Return what is kept of each variant of a batch: by C on all cores, or on so many threads."""
+def run_batch(batch: Batch, threads: int | None = None, least: int = 0) -> BatchResult:
+    """Return what is kept of each variant of a batch: by C on all cores, or on so many threads.
+
+    Variants that share a Program and have fewer than `least` steps in all are not compiled for.
+    """
     try:
-        return planned_batch(batch, library_of, threads)
+        return planned_batch(batch, library_of, threads, least)
     except (ToolMissing, BuildError, OSError) as error:
         note = f"interpreter: {str(error).splitlines()[0]}"
         return BatchResult(**{**vars(run_variants(batch)), "note": note})
+
+
+def run_block(batch: Batch) -> BatchResult:
+    """Return what is kept of each variant of a part of a study, which has one core."""
+    return run_batch(batch, threads=1, least=LONG)
 
 
 def _count(scenario: Scenario, programs: dict[str, Program]) -> int:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from language.document import Scalar
 from language.load import command_line_value
 from language.project import Project, read_document
-from modewright.compiled import run_batch
+from modewright.compiled import run_block
 from modewright.files import OutputError
 from sweep.executor import Executor, InProcess
 from sweep.preparation import prepared, resampled
@@ -54,7 +54,7 @@ def sweep(
     }
     ready = prepared(resampled(read_study(document, project, scalars), samples, seed))
     count = workers or os.cpu_count() or 1
-    local: Executor = Processes(count, WORKER) if count > 1 else InProcess(run_batch)
+    local: Executor = Processes(count, WORKER) if count > 1 else InProcess(run_block)
     try:
         return run_study(ready, Path(out), executor or local, block, progress)
     except OSError as error:

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 from modewright.neighbours import claim_neighbours
 
 
 def main() -> None:
     """Answer blocks until who started us is gone."""
     claim_neighbours()
-    from modewright.compiled import run_batch
+    from modewright.compiled import run_block
     from sweep.worker import serve
 
-    serve(partial(run_batch, threads=1))
+    serve(run_block)
 
 
 if __name__ == "__main__":

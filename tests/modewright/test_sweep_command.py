@@ -21,7 +21,7 @@ from tests.sweep.laying import STUDIES, quick
 @pytest.fixture(autouse=True)
 def _quick_in_the_project(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(STUDIES)
-    monkeypatch.setattr(studies, "run_batch", quick)
+    monkeypatch.setattr(studies, "run_block", quick)
 
 
 def run(*arguments: str) -> int:
@@ -57,7 +57,7 @@ def test_what_was_interrupted_is_kept_and_gone_on_with(
             raise KeyboardInterrupt
         return quick(batch)
 
-    monkeypatch.setattr(studies, "run_batch", interrupted)
+    monkeypatch.setattr(studies, "run_block", interrupted)
     assert run("grid", "--out", out, "--block", "4") == 130
     assert "20 of 60 variants are kept" in capsys.readouterr().err
     monkeypatch.setattr(studies, "study_pictures", lambda folder: {})

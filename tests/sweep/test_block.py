@@ -10,7 +10,7 @@ import pytest
 import modewright as mw
 from engine.batch import Batch, BatchResult
 from engine.variants import run_variants
-from modewright.compiled import run_batch
+from modewright.compiled import run_batch, run_block
 from sweep.block import Block, Row, block_rows
 from sweep.structure import decimal
 from tests.sweep.laying import STUDIES, study
@@ -127,3 +127,15 @@ def test_compiled_blocks_have_the_rows_of_the_interpreter_at_other_times_of_step
 
     assert block_rows(made, Block(2, 8), run) == block_rows(made, Block(2, 8), run_variants)
     assert notes == [(6, 6, "compiled")]
+
+
+def test_few_steps_are_not_compiled_for() -> None:
+    made, notes = study("seen"), set()
+
+    def run(batch: Batch) -> BatchResult:
+        result = run_block(batch)
+        notes.add(result.note)
+        return result
+
+    assert block_rows(made, Block(2, 8), run) == block_rows(made, Block(2, 8), run_variants)
+    assert notes == {"interpreter: too few steps to compile for"}
