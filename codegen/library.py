@@ -29,7 +29,17 @@ class FlowStruct(ctypes.Structure):
 
     _fields_ = [
         (name, Address)
-        for name in ("first", "left", "high", "low", "row_steps", "row_high", "row_low", "row_ends")
+        for name in (
+            "first",
+            "left",
+            "high",
+            "low",
+            "row_steps",
+            "row_high",
+            "row_low",
+            "row_ends",
+            "boundaries",
+        )
     ]
 
 
@@ -133,6 +143,7 @@ class Library:
                 ("row_high", flow.row_times.high),
                 ("row_low", flow.row_times.low),
                 ("row_ends", flow.row_ends),
+                ("boundaries", flow.boundaries),
             ):
                 setattr(struct, member, array.ctypes.data)
         sensors = list(self.assembly.sensors)

@@ -21,6 +21,7 @@ from codegen.source import module_context
 from codegen.usage import locals_of, usages
 from language.assembly import RANGE_SLACK, Assembly, Course, Feed, ranged, short_input, wires_of
 from language.continuous import PARTS
+from language.history import AGE
 from language.number import NumberType
 from language.operation import Assign
 from language.program import Program, short
@@ -146,6 +147,17 @@ def _module(
         "calls": {block: f"{block}({', '.join(used[block].parameters)})" for block in used},
         "defaults": _defaults(program),
         "ranges": _ranges(program, number) if is_flow else [],
+        "invariants": [
+            {
+                "mode": place(program.mode_variables()[info.region]),
+                "number": info.mode,
+                "holds": place(info.variable),
+                "event": number + len(program.transitions) + len(ranged(program)) + k,
+            }
+            for k, info in enumerate(program.invariants)
+        ],
+        "has_record": "record" in program.blocks,
+        "age": place(AGE.name),
         "fired": [place(v) for v in program.fired_variables()],
         "bound": sum(len(program.modes_of(region)) for region in program.mode_variables()),
         "number": number,
@@ -313,6 +325,7 @@ def _instance(assembly: Assembly, name: str, program: Program, places: _Places) 
         "flow": list(assembly.flows).index(name) if is_flow else -1,
         "is_controlled": name in assembly.controlled,
         "ranges": ranged(program) if is_flow else (),
+        "invariants": len(program.invariants),
         "feeds": [_fed(feed, program, places) for feed in assembly.feeds[name]],
         "flags": flags,
         "varying": _varying(assembly, name, program, places),

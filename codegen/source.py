@@ -37,7 +37,7 @@ from language.program import (
 from language.traversal import reads, walk
 from language.wiring import finished
 
-GROUPS = ("state", "discrete", "latched", "equation", "before", "innovation", "timer")
+GROUPS = ("state", "discrete", "latched", "equation", "before", "innovation", "timer", "check")
 """Nested structs of the instance, in order."""
 ENTRIES = ("init", "derive", "step")
 INLINE = ("min", "max", "clip", "sign", "pow2", "whole", "lookup", "lookup2")

@@ -27,6 +27,7 @@ GROUP_OF = {
     "equation": "self",
     "before": "self",
     "innovation": "self",
+    "check": "self",
     "timer": "self",
     "memory": "self",
     "derived": "self",

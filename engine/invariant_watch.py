@@ -7,7 +7,7 @@ from fractions import Fraction
 
 from engine.interpreter import Stepper
 from engine.trajectory import Event
-from language.program import Program
+from language.program import InvariantInfo, Program
 
 BLOCK = "invariants"
 
@@ -34,6 +34,11 @@ class InvariantWatch:
                 self._broken.discard(info.variable)
             elif info.variable not in self._broken:
                 self._broken.add(info.variable)
-                mode = self._program.mode_name(info.mode, info.region)
-                place = (self._name, f"invariant {info.name}", mode, mode, info.region)
-                self._log(Event(float(time), 0, *place, kind="invariant", message=info.message))
+                self._log(broken(self._name, self._program, info, float(time)))
+
+
+def broken(name: str, program: Program, info: InvariantInfo, time: float) -> Event:
+    """Return the event of an invariant that ceases to hold at a time [s]."""
+    mode = program.mode_name(info.mode, info.region)
+    place = (name, f"invariant {info.name}", mode, mode, info.region)
+    return Event(time, 0, *place, kind="invariant", message=info.message)

@@ -53,7 +53,7 @@ class FlowPlan:
 
     `left` (steps,) are their lengths [s], `starts` (steps + 1,). Of each row (rows,) the step that
     it is in (NEVER where it is at an instant), the time since the step's start, and whether it is
-    at the step's end.
+    at the step's end; `boundaries` (steps + 1,) are the starts that are whole major steps.
     """
 
     first: Wholes
@@ -62,6 +62,7 @@ class FlowPlan:
     row_steps: Wholes
     row_times: Times
     row_ends: NDArray[np.uint8]
+    boundaries: NDArray[np.uint8]
 
 
 @dataclass(frozen=True)
@@ -108,11 +109,6 @@ def why_not_planned(
             return f"sensor `{name}` has no `sample`"
         if sensor.lag and sensor.source.partition(".")[0] not in flows:
             return f"sensor `{name}` has a lag on a sampled output"
-    for name, program in programs.items():
-        if program.invariants:
-            return f"`{name}` has invariants"
-        if program.period is None and "record" in program.blocks:
-            return f"`{name}` has delays"
     if len(assembly_of(system, scenario, programs).happenings) > MOST_HAPPENINGS:
         return f"more than {MOST_HAPPENINGS} things tick, sample or arrive"
     if _tick(Schedule(system, scenario, dict(programs)), programs) is None:
@@ -323,6 +319,7 @@ def _flow_plan(step: int, instants: Wholes, rows: Wholes, tick: Fraction) -> Flo
         row_steps=np.where(inside, of, NEVER).astype(np.int64),
         row_times=_times(since, tick),
         row_ends=at_end.astype(np.uint8),
+        boundaries=(ends % step == 0).astype(np.uint8),
     )
 
 

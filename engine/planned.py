@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.firing import event, mode_names
+from engine.invariant_watch import broken
 from engine.plan import assembly_of, plan_of
 from engine.range_watch import left_range, outside_text
 from engine.rows import recorded
@@ -19,7 +20,7 @@ from engine.trajectory import Event, Trajectory, column_array
 from language.assembly import Assembly, ranged
 from language.experiment import Scenario, System
 from language.number import rounded
-from language.program import Program, short
+from language.program import InvariantInfo, Program, short
 
 EVENT = np.dtype(
     [
@@ -130,12 +131,15 @@ def _events(found: NDArray[np.void], assembly: Assembly) -> list[Event]:
     for name, program in assembly.programs.items():
         known += [(name, program, info) for info in program.transitions]
         known += [(name, program, variable) for variable in ranged(program)]
+        known += [(name, program, info) for info in program.invariants]
     events = []
     for one in found.tolist():
         time, value, number, micro_step, mode, _ = one
         name, program, what = known[number]
         if hasattr(what, "slot"):
             events.append(event(name, program, what, time, micro_step))
+        elif isinstance(what, InvariantInfo):
+            events.append(broken(name, program, what, time))
         else:
             text = outside_text(what.name, value, *what.range)
             signal = short(what.name)

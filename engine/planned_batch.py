@@ -252,4 +252,7 @@ def _kind_places(assembly: Assembly, kinds: Sequence[EventKind]) -> NDArray[np.i
             found.append(EventKind(name, info.name, source, target, info.region))
         for variable in ranged(program):
             found.append(EventKind(name, f"range {short(variable.name)}", kind="range"))
+        for invariant in program.invariants:
+            text, region = f"invariant {invariant.name}", invariant.region
+            found.append(EventKind(name, text, region=region, kind="invariant"))
     return np.array([kinds.index(kind) for kind in found] or [0], dtype=np.int32)

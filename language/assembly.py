@@ -101,16 +101,17 @@ class Assembly:
                     yield name, constant
 
     def numbers(self) -> dict[str, int]:
-        """Return where the events of each instance begin: its transitions, then its ranges."""
+        """Return where the events of each instance begin: its transitions, then its ranges,
+        then its invariants."""
         found, count = {}, 0
         for name, program in self.programs.items():
             found[name] = count
-            count += len(program.transitions) + len(ranged(program))
+            count += len(program.transitions) + len(ranged(program)) + len(program.invariants)
         return found
 
 
 def ranged(program: Program) -> tuple[Variable, ...]:
-    """Return the variables of a continuous Program whose leaving of a range is an event."""
+    """Return the variables whose leaving of a range is an event: those of a continuous Program."""
     return tuple(v for v in program.variables if v.range is not None)
 
 

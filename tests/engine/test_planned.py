@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
@@ -114,6 +115,29 @@ def test_a_ramp_that_arrives_late_has_the_bits_of_the_interpreter() -> None:
     theirs = simulate(*loaded)
     assert theirs.events
     assert_same(compiled(*loaded), theirs)
+
+
+@pytest.mark.parametrize(
+    "rule",
+    [
+        "an_invariant_is_checked_and_never_forces_anything",
+        "a_delay_of_a_continuous_automaton_is_read_from_its_major_steps",
+        "edges_of_a_continuous_automaton_are_events_of_their_argument",
+        "parallel_regions_of_a_continuous_automaton_swap_at_one_instant",
+    ],
+)
+def test_rules_hold_in_c_as_well(rule: str) -> None:
+    """Of all cases of the rule book those with what is between the blocks of a Program."""
+    root = ROOT / "tests/rules" / rule
+    texts = [path.read_text() for path in sorted((root / "spec").glob("*.yaml"))]
+    scenarios = [text for text in texts if re.search("^scenario:", text, re.MULTILINE)]
+    assert scenarios
+    for text in scenarios:
+        name, of = (re.search(f"^{key}: *(\\w+)", text, re.MULTILINE) for key in ("scenario", "of"))
+        assert name and of
+        loaded = load(of[1], name[1], root=root)
+        theirs = simulate(loaded.system, loaded.scenario)
+        assert_same(compiled(loaded.system, loaded.scenario), theirs)
 
 
 def batch_of(count: int, **changes: object) -> Batch:
