@@ -18,6 +18,7 @@ from modewright.commands.compare import compare
 from modewright.commands.demo import demo
 from modewright.commands.diagnose import diagnose
 from modewright.commands.doctor import doctor
+from modewright.commands.effects import effects
 from modewright.commands.explain import explain
 from modewright.commands.fit import fit
 from modewright.commands.generate import generate
@@ -36,7 +37,7 @@ from modewright.files import require_writable
 YOUNG_OBJECTS = 100_000
 """New objects after which garbage is looked for: trees of expressions have no circles."""
 COMMANDS = (
-    new, check, diagnose, fit, simulate, sweep, lockstep, replay, plot, compare, graph,
+    new, check, diagnose, fit, effects, simulate, sweep, lockstep, replay, plot, compare, graph,
     generate, explain, demo, doctor,
 )  # fmt: skip
 

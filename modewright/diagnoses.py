@@ -11,7 +11,8 @@ from pathlib import Path
 from diagnosis.diagnose import Case, diagnose as diagnosed
 from diagnosis.dossier import Dossier, hashes, told, undecided, usable
 from diagnosis.fit import Fit, fit as fitted
-from diagnosis.layers import effects_in, shipped_effects
+from diagnosis.layers import effects_in
+from diagnosis.library import library
 from diagnosis.variant import variant_text
 from language.effect import Effect
 from language.load import automaton_of
@@ -116,14 +117,17 @@ def _case(
     automaton = automaton_of(document, project)
     whole = expanded(document, project)
     files = tuple(Path(file) for file in train), tuple(Path(file) for file in held_out)
-    library = _library(effects)
-    return Case(whole, project, checked.mapping, *files, library), automaton
+    candidates = _candidates(effects, project)
+    return Case(whole, project, checked.mapping, *files, candidates), automaton
 
 
-def _library(folder: str | Path | None) -> tuple[Effect, ...]:
-    """Return the effects of a folder, those shipped without one. Raises ValueError."""
+def _candidates(folder: str | Path | None, project: Project) -> tuple[Effect, ...]:
+    """Return the effects of a folder; without one those of the project and those shipped.
+
+    Raises SpecError, ValueError.
+    """
     if folder is None:
-        return shipped_effects()
+        return library(project)
     found = effects_in(Path(folder))
     if not found:
         raise ValueError(f"there is no effect in {folder}")

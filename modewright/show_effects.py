@@ -1,0 +1,60 @@
+"""Show effects: the library for people and as plain data."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from diagnosis.library import Described, place_kinds
+from diagnosis.naming import place_path
+
+
+def print_effects(screen: Console, found: Sequence[Described], at: str | None) -> None:
+    """Print a line for each effect; with a spec those that fit it, and where."""
+    table = Table(
+        "effect", f"places of {at}" if at else "fits", "what it is",
+        box=None, pad_edge=False, header_style="bold",
+    )  # fmt: skip
+    for one in found:
+        where = ", ".join(one.places) if at else place_kinds(one.effect)
+        if where:
+            table.add_row(one.effect.name, escape(where), escape(one.effect.about))
+    screen.print(table)
+
+
+def print_effect(screen: Console, one: Described, at: str | None) -> None:
+    """Print all that is known of an effect."""
+    effect = one.effect
+    lines = [f"{effect.name}: {effect.about}", f"fits {place_kinds(effect)}"]
+    if at:
+        lines.append(f"in {at}: {', '.join(one.places) or 'nowhere'}")
+    lines += ["", *(f"  {line}" for line in one.lines), ""]
+    parts = {
+        "signature": effect.signature,
+        "confused with": ", ".join(effect.confused_with),
+        "separated by": "; ".join(effect.separated_by),
+        "references": "; ".join(effect.references),
+    }
+    lines += [f"{name}: {text}" for name, text in parts.items() if text]
+    for line in lines:
+        screen.print(line, highlight=False, markup=False, soft_wrap=True)
+
+
+def effect_json(one: Described) -> dict[str, Any]:
+    """Return an effect as plain data."""
+    effect = one.effect
+    return {
+        "id": effect.name,
+        "about": effect.about,
+        "fits": place_kinds(effect),
+        "lines": list(one.lines),
+        "signature": effect.signature,
+        "confused_with": list(effect.confused_with),
+        "separated_by": list(effect.separated_by),
+        "references": list(effect.references),
+        "places": [place_path(layer) for layer in one.layers],
+    }
