@@ -28,7 +28,6 @@ MOST_VALUES = 4_000_000
 MOST_PLANS = 50
 """Variants of one batch whose inputs step at times of their own: each has all its instants."""
 
-Status = str
 DONE, FAULT, STOPPED, REFUSED = "done", "fault", "stopped", "refused"
 """What became of a variant: fine; a fault bit is set; the run stopped; it cannot be simulated."""
 
@@ -44,7 +43,7 @@ class Row:
     replicate: int
     seed: int
     values: Mapping[str, float]
-    status: Status
+    status: str
     message: str
     measures: Mapping[str, Cell]
 
@@ -204,7 +203,7 @@ def _result_row(study: Study, group: _Group, result: BatchResult, place: int) ->
 
 
 def _row(
-    study: Study, case: Case, status: Status, message: str, found: Mapping[str, Cell] | None = None
+    study: Study, case: Case, status: str, message: str, found: Mapping[str, Cell] | None = None
 ) -> Row:
     point = case.point
     return Row(

@@ -133,8 +133,8 @@ class Presentation:
 class Study:
     """A checked study: everything that a worker needs, without its files.
 
-    `recorded` are the signals that measures read, by measure; `identity` says what the results
-    depend on, by part.
+    `every` [s] is the distance of rows, None for that of the scenarios; `identity` are digests of
+    what the results depend on, by part.
     """
 
     name: str

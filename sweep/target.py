@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from language.document import Document, Scalar, Table
 from language.experiment import System
 from language.kind import Type
-from language.units import SECOND, Unit, parse_unit
+from language.units import Unit, parse_unit
 from sweep.study import Target
 
 TIME = parse_unit("s")
@@ -131,6 +131,3 @@ def _parts(node: object, unit: Unit) -> Iterator[tuple[tuple[str, ...], Unit]]:
         table = node.get(form)
         for key in keys if isinstance(table, Table) else ():
             yield (form, key), TIME if key in ("from", "to") else unit
-
-
-assert TIME.dimension == SECOND

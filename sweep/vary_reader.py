@@ -65,6 +65,8 @@ class VaryReader(Reader):
             self.problems.error("type", entry.span, label)
         self.kinds[entry.key] = unit.dimension
         words = place.values if place else ()
+        if place and place.type == "bool":
+            words = ("false", "true")
         targets = place.targets if place else ()
         return Varied(entry.key, course, targets, str(unit.dimension), entry.span, words)
 

@@ -139,3 +139,18 @@ def test_few_steps_are_not_compiled_for() -> None:
 
     assert block_rows(made, Block(2, 8), run) == block_rows(made, Block(2, 8), run_variants)
     assert notes == {"interpreter: too few steps to compile for"}
+
+
+def test_whole_numbers_words_and_truths_vary_too() -> None:
+    """x(1 s) = (10 or 1) * gear * count, exactly: the flow is constant."""
+    made = study("typed_more")  # a variant of `typed_study`: every point twice
+    rows = block_rows(made, Block(0, made.count), run_block)
+    assert (made.count, {row.status for row in rows}) == (36, {"done"})
+    for row in rows:
+        fast, gear, count = (row.values[name] for name in ("is_fast", "gear", "count"))
+        product = (10.0 if fast else 1.0) * (gear + 1.0) * count
+        assert row.measures["last"] == pytest.approx(product, rel=1e-12)
+    assert {row.values["gear"] for row in rows} == {0.0, 2.0}
+    assert [varied.words for varied in made.varied] == [
+        ("false", "true"), ("first", "second", "third"), (),
+    ]  # fmt: skip
