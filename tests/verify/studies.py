@@ -21,7 +21,7 @@ STUDIES = ROOT / "tests" / "data" / "studies"
 STUDY = "killed"
 WORKERS = 2
 SEED = 20
-SECONDS = (0.05, 1.5)
+SECONDS = (0.05, 1.0)
 """Between these a process is killed: after its start, or after its first block."""
 MOST_MEGABYTES = 500.0
 MILLION = 1_000_000
