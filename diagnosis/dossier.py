@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from diagnosis.diagnose import Case, Diagnosis
-from diagnosis.finding import Finding
+from diagnosis.finding import Finding, told
 from diagnosis.recording_check import RecordingCheck
 from diagnosis.verdict import Verdict
 from language.model import Automaton
@@ -76,16 +76,10 @@ def usable(check: RecordingCheck, files: tuple[Path, ...]) -> tuple[Path, ...]:
 def undecided(check: RecordingCheck, train: Mapping[str, str], runtime_s: float) -> Verdict:
     """Return the verdict on recordings that no conclusion can be drawn from."""
     worst = [finding for finding in check.findings if finding.severity == "error"]
-    messages = ("the recordings are not usable", *(told(finding) for finding in worst))
+    messages = ("the recordings are not usable", *(text for _, text in told(worst)))
     return Verdict(
         "unknown", (), (), 1.0, (), (), {"train": {}}, {}, None, runtime_s, messages, train
     )
-
-
-def told(finding: Finding) -> str:
-    """Return a finding as one line."""
-    place = ", ".join(part for part in (finding.recording, finding.channel) if part)
-    return f"{place}: {finding.text}" if place else finding.text
 
 
 def hashes(files: tuple[Path, ...]) -> dict[str, str]:

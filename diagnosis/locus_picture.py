@@ -18,9 +18,11 @@ BLUE, _, _, _, _, _, GREY = PALETTE
 def locus_picture(loci: Sequence[Locus]) -> Picture:
     """Return a bar for each place, the largest gain [nats] on top.
 
-    An infinite one, where the model does not run at all without it, is drawn beyond the others.
+    An infinite one, where the model does not run at all without it, is drawn beyond the others;
+    a place where it does not run in any case is left out.
     """
-    shown = sorted(loci, key=lambda locus: locus.gain)
+    known = [locus for locus in loci if not math.isnan(locus.gain)]
+    shown = sorted(known, key=lambda locus: locus.gain)
     figure = Figure(figsize=(7.0, 0.9 + 0.38 * max(1, len(shown))), layout="constrained")
     axis = figure.subplots()
     most = max([locus.gain for locus in shown if math.isfinite(locus.gain)] + [1.0])

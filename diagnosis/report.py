@@ -13,8 +13,9 @@ import jinja2
 
 from codegen.rendering import version
 from diagnosis import wording
-from diagnosis.dossier import Dossier, told, verdict_json
+from diagnosis.dossier import Dossier, verdict_json
 from diagnosis.estimation import adapted
+from diagnosis.finding import told
 from diagnosis.fit import note_of
 from diagnosis.locus_picture import locus_picture
 from diagnosis.naming import quantities_of
@@ -99,11 +100,12 @@ def context_of(dossier: Dossier) -> dict[str, Any]:
         "fixed": _fixed(dossier),
         "separation": wording.separation(dossier),
         "rivals": [wording.effect_at(one) for one in verdict.ambiguous_with],
-        "findings": [(one.severity, told(one)) for one in dossier.findings],
+        "findings": told(dossier.findings),
         "left_out": dossier.left_out,
         "untestable": _untestable(dossier),
         "inputs": verdict.inputs,
         "held_out": dossier.held_out,
+        "has_model": bool(found and found.selection.accepted),
         "threshold": dossier.case.threshold,
         "version": version(),
     }

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from diagnosis.dossier import Dossier
+from diagnosis.finding import told
 from diagnosis.layers import Layer, drift
 from diagnosis.location import Locus
 from diagnosis.naming import place_path, verdict_id
@@ -141,6 +142,8 @@ def reason(tried: Tried, place: int, selection: Selection, threshold: float) -> 
         return f"gains less than {threshold:g} nats in training"
     if known.left_out <= threshold:
         return f"gains less than {threshold:g} nats on recordings that were left out"
+    if not selection.accepted:
+        return "ranked behind one that was not accepted"
     return "explains less than what was accepted" if place else "not needed beside the others"
 
 
@@ -157,11 +160,10 @@ def summary(dossier: Dossier) -> list[str]:
 
 def _doubt(dossier: Dossier) -> str:
     """Return what a reader has to know before believing the verdict."""
-    worst = [f for f in dossier.findings if f.severity != "note"]
+    worst = told([finding for finding in dossier.findings if finding.severity != "note"])
     if worst:
-        places = (p for p in (worst[0].recording, worst[0].channel) if p)
         more = f" (and {len(worst) - 1} more)" if len(worst) > 1 else ""
-        return f"recordings: {', '.join(places)}: {worst[0].text}{more}"
+        return f"recordings: {worst[0][1]}{more}"
     verdict = dossier.verdict
     if verdict.verdict == "effect" and verdict.ambiguous_with:
         return f"nearly as good: {_first([effect_at(one) for one in verdict.ambiguous_with])}"

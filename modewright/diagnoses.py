@@ -9,7 +9,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from diagnosis.diagnose import Case, diagnose as diagnosed
-from diagnosis.dossier import Dossier, hashes, told, undecided, usable
+from diagnosis.dossier import Dossier, hashes, undecided, usable
+from diagnosis.finding import told
 from diagnosis.fit import Fit, fit as fitted
 from diagnosis.layers import effects_in
 from diagnosis.library import library
@@ -149,8 +150,8 @@ def fit(
     about the recordings is told. Raises SpecError, ValueError, ToolMissing.
     """
     checked = check_recordings(train, map, spec, root=root)
-    for finding in checked.check.findings:
-        if finding.severity != "note":
-            tell(f"{finding.severity}: {told(finding)}")
+    for severity, text in told(checked.check.findings):
+        if severity != "note":
+            tell(f"{severity}: {text}")
     case, _ = _case(spec, train, (), checked, None, root)
     return fitted(case, parameters, tell)

@@ -77,6 +77,9 @@ def test_the_wheel_holds_specs_templates_and_the_skeleton_but_no_tests(wheel: Pa
         "codegen/templates/module.c.jinja",
         "language/expression.lark",
         "modewright/skeleton_files/room.yaml",
+        "diagnosis/drifts/drift_of_balance.yaml",
+        "diagnosis/templates/report.html.jinja",
+        "spec/verdict.schema.json",
         "engine/py.typed",
     ):
         assert name in names
@@ -90,6 +93,7 @@ def test_the_wheel_holds_specs_templates_and_the_skeleton_but_no_tests(wheel: Pa
         ["generate", "estimator", "--out", "c"],
         ["replay", "estimator", TRACE, "--map", "reference_trace"],
         ["new", "warm_room"],
+        ["effects", "road_grade", "--at", "blind_driveline"],
     ],
     ids=lambda arguments: str(arguments[0]),
 )

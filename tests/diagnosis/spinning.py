@@ -31,7 +31,7 @@ map: bench_columns
 time: {column: t_s, unit: s}
 columns: {torque: {to: T, unit: N*m}, speed: {compare: w, unit: rad/s}}
 """
-EFFECTS = ("coulomb_friction", "torque_offset", "torque_gain", "viscous_friction")
+EFFECTS = ("coulomb_friction", "torque_gain", "viscous_friction")
 J, B, T_C = 0.55, 0.12, 2.0
 """What the rotor really has: inertia [kg*m^2], viscous [N*m*s/rad] and dry friction [N*m]."""
 RATE, SECONDS, FINE = 100, 10, 20

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import dataclasses
 import json
 import re
 import shutil
@@ -19,6 +20,9 @@ import jsonschema
 import pytest
 
 import modewright as mw
+from diagnosis.dossier import usable, verdict_json
+from diagnosis.finding import Finding
+from diagnosis.wording import headline, separation
 from modewright.cli import app
 from modewright.exits import exit_code
 from tests.diagnosis.spinning import T_C, B, J, bench
@@ -55,13 +59,12 @@ inputs: {T: {start: 10 N*m, steps: {0.5 s: -4 N*m}}}
 
 @dataclass(frozen=True)
 class Found:
-    """What one run of the command left: its folder, exit code, texts, and the files it opened."""
+    """What one run of the command left: its folder, exit code, and texts."""
 
     folder: Path
     code: int
     out: str
     error: str
-    opened: list[str]
 
     @property
     def verdict(self) -> dict[str, Any]:
@@ -99,8 +102,7 @@ def found(tmp_path_factory: pytest.TempPathFactory) -> Found:
         [sys.executable, "-c", code, *words],
         cwd=folder, capture_output=True, text=True, check=False, timeout=300,
     )  # fmt: skip
-    opened = [line for line in told.stderr.splitlines() if line]
-    return Found(folder, told.returncode, told.stdout, told.stderr, opened)
+    return Found(folder, told.returncode, told.stdout, told.stderr)
 
 
 def test_it_names_the_effect_with_its_value_and_tells_so_in_five_lines(found: Found) -> None:
@@ -117,11 +119,11 @@ def test_it_names_the_effect_with_its_value_and_tells_so_in_five_lines(found: Fo
 
 
 def test_what_is_held_out_is_opened_when_all_stages_are_told(found: Found) -> None:
-    lines = [line.removeprefix("opened ") for line in found.opened]
+    lines = found.error.splitlines()
     first = next(k for k, line in enumerate(lines) if "run_2.csv" in line)
     last = max(k for k, line in enumerate(lines) if "nats" in line)
-    assert first > last
-    assert any(line.startswith("opened") and "run_0.csv" in line for line in found.opened[:last])
+    assert lines[first].startswith("opened ") and first > last
+    assert any(line.startswith("opened ") and "run_0.csv" in line for line in lines[:last])
 
 
 def test_a_real_verdict_has_the_form_that_the_schema_says(found: Found) -> None:
@@ -217,11 +219,49 @@ def test_the_report_is_one_page_that_needs_nothing_but_what_lies_beside_it(found
         assert sentence in told, sentence
 
 
-def test_killed_and_run_again_it_says_the_same(found: Found, tmp_path: Path) -> None:
-    """The fixture's first run was killed; this one finds everything compiled."""
-    assert run(found.folder, *COMMAND, "--out", str(tmp_path / "again")) == 0
-    again = json.loads((tmp_path / "again" / "verdict.json").read_text("utf-8"))
+@pytest.fixture(scope="module")
+def dossier(found: Found) -> mw.Dossier:
+    """The same diagnosis in Python, with everything compiled."""
+    train = [found.folder / f"run_{k}.csv" for k in (0, 1)]
+    held_out = [found.folder / "run_2.csv"]
+    library = found.folder / "library"
+    return mw.diagnose("spinner", train, held_out, effects=library, root=found.folder)
+
+
+def test_killed_and_run_again_it_says_the_same(found: Found, dossier: mw.Dossier) -> None:
+    """The fixture's first run was killed."""
+    again = verdict_json(dossier.verdict)
     assert {**again, "runtime_s": 0} == {**found.verdict, "runtime_s": 0}
+
+
+def test_what_cannot_be_told_apart_is_told_with_what_would_separate_it(dossier: mw.Dossier) -> None:
+    assert dossier.diagnosis
+    effects = dossier.verdict.effects
+    rival = dataclasses.replace(effects[0], id="road_grade")
+    doubt = dataclasses.replace(
+        dossier.verdict, verdict="ambiguous", effects=(), ambiguous_with=(*effects, rival)
+    )
+    jsonschema.validate(verdict_json(doubt), SCHEMA)
+    doubtful = dataclasses.replace(dossier, verdict=doubt)
+    told = headline(doubtful)
+    assert "cannot tell which" in told
+    assert "coulomb friction in the balance of w; road grade in the balance of w" in told
+    named = "coulomb_friction from road_grade, torque_offset, viscous_friction"
+    assert separation(doubtful) == [f"{named}: passage through zero speed"]
+
+
+@pytest.mark.parametrize(
+    ("bad", "kept"),
+    [((), "abc"), (("b",), "ac"), (("b", "c"), ""), (("",), "")],
+    ids=["none", "a few", "most", "all"],
+)
+def test_recordings_with_errors_are_left_out_unless_they_are_most(
+    bad: tuple[str, ...], kept: str, dossier: mw.Dossier
+) -> None:
+    errors = tuple(Finding("sign", name, "w", "is upside down", "error") for name in bad)
+    noted = Finding("jitter", "a", "w", "wobbles", "warning")
+    check = dataclasses.replace(dossier.check, findings=(*errors, noted))
+    assert usable(check, (Path("a"), Path("b"), Path("c"))) == tuple(Path(name) for name in kept)
 
 
 def test_a_model_that_lacks_nothing_is_told_so(tmp_path: Path) -> None:
