@@ -94,6 +94,7 @@ class VariantsStruct(ctypes.Structure):
         ("events", Address),
         ("counts", Address),
         ("is_left", Address),
+        ("faults", Address),
         ("rows", Address),
         ("inputs_room", Address),
     ]

@@ -14,6 +14,7 @@ from fractions import Fraction
 from typing import Any
 
 from codegen.expression import Place, c_expression, literal
+from codegen.marks import LEFT, marked, ranged_signals
 from codegen.mathematics import math_files
 from codegen.names import REAL, CNames, c_member, c_type
 from codegen.rendering import render, version
@@ -76,7 +77,7 @@ def _part(name: str, program: Program) -> Program:
     """Return the Program of an instance as it is printed: its parts, or its tick."""
     own = dataclasses.replace(program, name=INSTANCE.format(name))
     if program.period is not None:
-        return own
+        return marked(own)
     return finished(own, ("init", "derive", *PARTS), keep=(*BETWEEN, "work.s"))
 
 
@@ -174,6 +175,9 @@ def _module(
         "zero": literal(0.0, program.number),
         "states": [place(v.name) for v in program.variables if v.name.startswith("state.")],
         "has_faults": any(v.name == "memory.faults" for v in program.variables),
+        "left": [
+            place(LEFT.format(k)) for k, _ in enumerate(ranged_signals(program)) if not is_flow
+        ],
         "finite": [place(wire.source) for wire in program.outputs if wire.type == "real"],
     }
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import ctypes
 import dataclasses
 import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -17,18 +17,16 @@ from typing import Any
 from codegen.build import FLAGS, compiler, compiler_version
 from codegen.cache import key_of, stored
 from codegen.library import SHARED, build_library
+from codegen.marks import LEFT, marked as marked_program, ranged_signals
 from codegen.mathematics import math_files
 from codegen.names import CNames, c_type
 from codegen.rendering import render
 from codegen.source import module_context
 from codegen.usage import locals_of, usages
-from language.operation import Assign, Block, Branch, Choose, FaultBit, Loop, Op, Value
 from language.printing import digest
 from language.program import Program, Variable
-from language.traversal import walk
 
 NAME = "stepper"
-LEFT = "memory.left_{}"
 KINDS: Mapping[str, Any] = {
     "double": ctypes.c_double,
     "float": ctypes.c_float,
@@ -49,7 +47,7 @@ class CompiledStepper:
     def __init__(self, program: Program, flags: Sequence[str] = FLAGS) -> None:
         """Compile, or take what was compiled before. Raises ToolMissing, BuildError."""
         self.program = program
-        marked = _marked(program)
+        marked = marked_program(program)
         library, self._blocks, places = _loaded(_Whole(digest(marked), marked), tuple(flags))
         self._run = library.stepper_run
         self._room = ctypes.create_string_buffer(int(library.stepper_size()))
@@ -59,7 +57,7 @@ class CompiledStepper:
             for name, (kind, offset) in places.items()
         }
         self._fixed = {c.name: c.items or c.value for c in program.constants}
-        self._left = {signal: LEFT.format(k) for k, signal in enumerate(_signals(program))}
+        self._left = {signal: LEFT.format(k) for k, signal in enumerate(ranged_signals(program))}
         for entry in ("default_page", "derive", "init"):
             self.run(entry)
 
@@ -159,38 +157,3 @@ def _files(program: Program) -> tuple[dict[str, str], dict[str, int], dict[str, 
         files.update(math_files(program.number))
     numbered = [*own, "derive", "default_page", *entries]
     return files, {name: number for number, name in enumerate(numbered)}, names
-
-
-def _signals(program: Program) -> tuple[str, ...]:
-    """Return the signals whose leaving of a range is reported."""
-    ops = (op for block in program.blocks.values() for op in walk(block))
-    found = (op.signal for op in ops if isinstance(op, FaultBit) and op.value)
-    return tuple(dict.fromkeys(signal for signal in found if signal))
-
-
-def _marked(program: Program) -> Program:
-    """Return a Program that notes which signals left their range."""
-    signals = _signals(program)
-    if not signals:
-        return program
-    marks = {signal: LEFT.format(k) for k, signal in enumerate(signals)}
-    variables = (*program.variables, *(Variable(name, "truth") for name in marks.values()))
-    blocks = {name: tuple(_with_marks(b, marks)) for name, b in program.blocks.items()}
-    return dataclasses.replace(program, variables=variables, blocks=blocks)
-
-
-def _with_marks(block: Block, marks: Mapping[str, str]) -> Iterator[Op]:
-    for op in block:
-        match op:
-            case Branch(condition, then, other):
-                inner = (tuple(_with_marks(b, marks)) for b in (then, other))
-                yield Branch(condition, *inner)
-            case Choose(selector, cases):
-                yield Choose(selector, tuple((k, tuple(_with_marks(b, marks))) for k, b in cases))
-            case Loop(count, index, body):
-                yield Loop(count, index, tuple(_with_marks(body, marks)))
-            case FaultBit(_, signal, True) if signal:
-                yield op
-                yield Assign(marks[signal], Value(True))
-            case _:
-                yield op

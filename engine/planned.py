@@ -16,7 +16,7 @@ from engine.invariant_watch import broken
 from engine.plan import assembly_of, plan_of
 from engine.range_watch import left_range, outside_text
 from engine.rows import recorded
-from engine.trajectory import Event, Trajectory, column_array
+from engine.trajectory import Event, Trajectory, column_array, fault_names
 from language.assembly import Assembly, ranged
 from language.experiment import Scenario, System
 from language.number import rounded
@@ -74,6 +74,7 @@ class PlannedRun:
         self._events = np.empty(FIRST_EVENTS, dtype=EVENT)
         self._count = np.zeros(1, dtype=np.int64)
         self._is_left = np.zeros(1, dtype=np.uint8)
+        self._faults = np.zeros(len(programs), dtype=np.uint32)
         self._call = self.library.bound(self.plan, self._members())
 
     def carry_out(self) -> bool:
@@ -108,6 +109,13 @@ class PlannedRun:
                 for signal, names in mode_names(program, f"{name}.").items()
             },
             events=tuple(_events(self._events[: int(self._count[0])], self.assembly)),
+            faults=tuple(
+                fault
+                for (name, program), word in zip(
+                    programs.items(), self._faults.tolist(), strict=True
+                )
+                for fault in fault_names(name, program, word)
+            ),
         )
 
     def _members(self) -> dict[str, Any]:
@@ -121,6 +129,7 @@ class PlannedRun:
             "events": self._events,
             "counts": self._count,
             "is_left": self._is_left,
+            "faults": self._faults,
             "rows": self._rows,
         }
 

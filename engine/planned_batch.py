@@ -163,6 +163,7 @@ class _Planned:
         events = np.empty((count, most), dtype=EVENT)
         counts = np.zeros(count, dtype=np.int64)
         is_left = np.zeros(count, dtype=np.uint8)
+        faults = np.zeros((count, len(self.programs)), dtype=np.uint32)
         plan, strides = self._noise(variants)
         members = {
             **self.fixed,
@@ -177,6 +178,7 @@ class _Planned:
             "events": events,
             "counts": counts,
             "is_left": is_left,
+            "faults": faults,
             "rows": np.empty((rows, self.library.width)),
             "inputs_room": np.empty(self.plan.inputs.shape),
         }
@@ -186,6 +188,7 @@ class _Planned:
         for place, name in enumerate(batch.outputs):
             result.outputs[name][variants] = kept[:, place]
         result.event_counts[variants] = counts
+        result.faults[variants] = faults.any(axis=1)
         filled = np.arange(most) < counts[:, None]
         result.event_times[variants] = np.where(filled, events["time"], np.nan)
         numbers = np.where(filled, events["number"], 0)
