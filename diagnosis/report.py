@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from typing import Any
@@ -21,12 +21,22 @@ from diagnosis.locus_picture import locus_picture
 from diagnosis.naming import quantities_of
 from diagnosis.search import Tried
 from diagnosis.selection import Selection
-from diagnosis.worst_window import WorstWindow, window_picture, worst_window
+from diagnosis.worst_window import (
+    FreeRuns,
+    WorstWindow,
+    by_recording,
+    free_runs,
+    window_picture,
+    worst_window,
+)
 from engine.plot import Picture
 from language.known import unit_text
 from language.map import column_dimension
 
 LINES_OF_SVG = re.compile(r"^.*?(?=<svg)", re.DOTALL)
+
+
+PLACES = "Where an unknown torque, force or error would explain most, before effects were tried"
 
 
 @dataclass(frozen=True)
@@ -40,7 +50,8 @@ class Figure:
 
 def report_files(dossier: Dossier, variant: str) -> dict[str, bytes]:
     """Return the files of a diagnosis by name."""
-    figures = figures_of(dossier)
+    sets = shown_sets(dossier)
+    figures = figures_of(dossier, sets)
     verdict = json.dumps(verdict_json(dossier.verdict), indent=2, allow_nan=False) + "\n"
     files = {"verdict.json": verdict.encode(), "variant.yaml": variant.encode()}
     drawings = {}
@@ -49,34 +60,75 @@ def report_files(dossier: Dossier, variant: str) -> dict[str, bytes]:
         files[f"{figure.name}.svg"] = drawing
         files[f"{figure.name}.png"] = figure.picture.data("png")
         drawings[figure.name] = LINES_OF_SVG.sub("", drawing.decode())
-    context = {**context_of(dossier), "variant": variant, "figures": figures, "svg": drawings}
+    each = _each(dossier, sets)
+    context = {
+        **context_of(dossier),
+        "each": each,
+        "variant": variant,
+        "figures": figures,
+        "svg": drawings,
+    }
     files["report.html"] = _page(context).encode()
     return files
 
 
-def figures_of(dossier: Dossier) -> list[Figure]:
+@dataclass(frozen=True)
+class Shown:
+    """Free simulations of one set of recordings: `name` of its files, `words` for a reader."""
+
+    name: str
+    words: str
+    runs: FreeRuns
+
+
+def shown_sets(dossier: Dossier) -> list[Shown]:
+    """Return the free simulations of what was held out, then of what was trained on."""
+    found = dossier.diagnosis
+    if found is None:
+        return []
+    base, model = found.selection.base, found.selection.model
+    sets = [Shown("train", "training", free_runs(base, model, found.bench.series))]
+    if found.held_out:
+        held = found.held_out
+        runs = free_runs(adapted(base, held), adapted(model, held), held)
+        sets.insert(0, Shown("held_out", "held-out", runs))
+    return sets
+
+
+def figures_of(dossier: Dossier, sets: Sequence[Shown]) -> list[Figure]:
     """Return the figures: the worst window of each set of recordings, and the places."""
     found = dossier.diagnosis
     if found is None:
         return []
-    selection = found.selection
-    sets = [("train", "training", found.bench.series, selection.base, selection.model)]
-    if found.held_out:
-        base = adapted(selection.base, found.held_out)
-        model = adapted(selection.model, found.held_out)
-        sets.insert(0, ("held_out", "held-out", found.held_out, base, model))
-    columns = {one.compare: one for one in dossier.case.mapping.columns.values()}
-    units = [unit_text(column_dimension(columns[name])) for name in found.bench.seen]
+    units = _units(dossier, sets[0].runs.signals)
     figures = []
-    for name, words, series, base, model in sets:
-        window = worst_window(base, model, series, units)
-        caption = _caption(window, words)
-        picture = window_picture(window, caption, not selection.accepted)
-        figures.append(Figure(f"window_{name}", caption, picture))
+    for one in sets:
+        window = worst_window(one.runs, units)
+        caption = _caption(window, one.words)
+        picture = window_picture(window, caption, not found.selection.accepted)
+        figures.append(Figure(f"window_{one.name}", caption, picture))
     caption = (
         "Where an unknown torque, force or error would explain most, before effects were tried"
     )
     return [*figures, Figure("places", caption, locus_picture(dossier.verdict.location))]
+
+
+def _units(dossier: Dossier, signals: Sequence[str]) -> list[str]:
+    columns = {one.compare: one for one in dossier.case.mapping.columns.values()}
+    return [unit_text(column_dimension(columns[name])) for name in signals]
+
+
+def _each(dossier: Dossier, sets: Sequence[Shown]) -> list[tuple[str, ...]]:
+    """Return a row for each recording and signal: what is missed [SI] before and after."""
+    rows: list[tuple[str, ...]] = []
+    for one in sets:
+        units = _units(dossier, one.runs.signals)
+        for name, before, after in by_recording(one.runs):
+            for k, signal in enumerate(one.runs.signals):
+                change = after[k] / before[k] - 1.0 if before[k] else 0.0
+                numbers = (f"{before[k]:.3g} {units[k]}", f"{after[k]:.3g} {units[k]}")
+                rows.append((name, one.words, signal, *numbers, f"{100 * change:+.0f} %"))
+    return rows
 
 
 def _caption(window: WorstWindow, words: str) -> str:

@@ -14,6 +14,7 @@ from diagnosis.search import Tried
 from diagnosis.selection import Selection
 from diagnosis.uncertain import si_unit
 from diagnosis.verdict import Quantity
+from diagnosis.wording import rounded
 from language.declaration import Parameter
 from language.model import Automaton
 
@@ -65,7 +66,7 @@ def _parameters(automaton: Automaton, fitted: Mapping[str, Quantity]) -> list[st
         was = float(parameter.value)
         if abs(quantity.value - was) > UNCHANGED * abs(was):
             text = value_text(quantity.value, parameter)
-            told = f"sd {quantity.std:.2g}, declared {was:.6g}"
+            told = f"sd {rounded(quantity.std)}, declared {was:.6g}"
             lines.append(f"  {name}: {{value: {text}}}  # {told}")
     return ["parameters:", *lines] if lines else []
 
@@ -94,7 +95,7 @@ def _effect(
         if own == final or layer.named(own) != final or parameter is None:
             continue
         text = value_text(quantity.value, parameter)
-        note = f"sd {quantity.std:.2g}"
+        note = f"sd {rounded(quantity.std)}"
         if parameter.fitting.per == "recording":
             note = "mean of " + ", ".join(f"{one[final]:.4g}" for one in each)
         values.append(f"      {own}: {text}  # {note}")

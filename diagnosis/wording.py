@@ -60,7 +60,12 @@ def _with_values(one: Named) -> str:
 def quantity(one: Quantity) -> str:
     """Return a value with its standard deviation and unit."""
     unit = "" if one.unit == "1" else f" {one.unit}"
-    return f"{one.value:.4g} ± {one.std:.2g}{unit}"
+    return f"{one.value:.4g} ± {rounded(one.std)}{unit}"
+
+
+def rounded(value: float) -> str:
+    """Return a number with two digits that count, `100` and not `1e+02`."""
+    return f"{float(f'{value:.2g}'):g}"
 
 
 def improvement(dossier: Dossier) -> str:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from diagnosis.estimation import Estimate
 from diagnosis.series import Series
-from diagnosis.simulation import FREE, OBSERVED, free
+from diagnosis.simulation import FREE, OBSERVED, free, is_free
 from engine.band import PALETTE
 from engine.plot import Picture
 from language.text import visible
@@ -37,11 +37,35 @@ class WorstWindow:
     units: tuple[str, ...]
 
 
-def worst_window(
-    base: Estimate, model: Estimate, series: Sequence[Series], units: Sequence[str]
-) -> WorstWindow:
+@dataclass(frozen=True)
+class FreeRuns:
+    """Free simulations of recordings: `before` and `after`, (samples, seen) of each, in SI."""
+
+    series: Sequence[Series]
+    before: Sequence[Reals]
+    after: Sequence[Reals]
+    signals: tuple[str, ...]
+
+
+def free_runs(base: Estimate, model: Estimate, series: Sequence[Series]) -> FreeRuns:
+    """Return how both models go where they are alone."""
+    names = tuple(base.candidate.predictor.seen)
+    return FreeRuns(series, free(base, series), free(model, series), names)
+
+
+def by_recording(runs: FreeRuns) -> list[tuple[str, Reals, Reals]]:
+    """Return name and root mean squares of what is missed, before and after (seen,), in SI."""
+    found = []
+    for one, before, after in zip(runs.series, runs.before, runs.after, strict=True):
+        alone = is_free(one)
+        missed = [np.nanmean((one.measured - run)[alone] ** 2, axis=0) for run in (before, after)]
+        found.append((one.name, np.sqrt(missed[0]), np.sqrt(missed[1])))
+    return found
+
+
+def worst_window(runs: FreeRuns, units: Sequence[str]) -> WorstWindow:
     """Return the window in which the base, alone, misses most: squares over those of a signal."""
-    before, after = free(base, series), free(model, series)
+    series, before, after = runs.series, runs.before, runs.after
     spread = np.nanstd(np.concatenate([one.measured for one in series]), axis=0)
     scale = np.maximum(spread, 1e-12)
     most, place = -1.0, (0, 0)
@@ -63,7 +87,7 @@ def worst_window(
         one.measured[window],
         before[k][window],
         after[k][window],
-        tuple(base.candidate.predictor.seen),
+        runs.signals,
         tuple(units),
     )
 

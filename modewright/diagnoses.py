@@ -15,6 +15,7 @@ from diagnosis.fit import Fit, fit as fitted
 from diagnosis.layers import effects_in
 from diagnosis.library import library
 from diagnosis.variant import variant_text
+from diagnosis.wording import summary
 from language.effect import Effect
 from language.load import automaton_of
 from language.model import Automaton
@@ -62,6 +63,10 @@ def diagnose(
         found = diagnosed(case, tell)
         verdict, after = found.verdict, hashes(case.held_out)
         dossier = Dossier(case, automaton, checked.check, verdict, found, after, left_out)
+        messages = tuple(summary(dossier))
+        dossier = dataclasses.replace(
+            dossier, verdict=dataclasses.replace(verdict, messages=messages)
+        )
     else:
         verdict = undecided(checked.check, hashes(case.train), time.monotonic() - begun)
         dossier = Dossier(case, automaton, checked.check, verdict)

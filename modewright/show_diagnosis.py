@@ -9,7 +9,7 @@ from rich.table import Table
 
 from diagnosis.dossier import Dossier, finite
 from diagnosis.fit import STRONG, Fit
-from diagnosis.wording import summary
+from diagnosis.wording import rounded, summary
 
 
 def print_dossier(screen: Console, dossier: Dossier) -> None:
@@ -28,7 +28,7 @@ def print_fit(screen: Console, fit: Fit) -> None:
         goes = f"{one.strongest[0]} {one.strongest[1]:+.2f}" if one.strongest else ""
         table.add_row(
             one.name, f"{one.declared:.5g}", f"{one.quantity.value:.5g}",
-            f"{one.quantity.std:.2g}", one.quantity.unit, f"{one.left:.0%}", goes, one.note,
+            rounded(one.quantity.std), one.quantity.unit, f"{one.left:.0%}", goes, one.note,
         )  # fmt: skip
     screen.print(table)
     for name, misfit in fit.misfits.items():
