@@ -16,7 +16,8 @@ from typing import Any
 
 from codegen.build import FLAGS, SECONDS, BuildError, compiler, compiler_version
 from codegen.cache import cache_folder, key_of, stored
-from codegen.run_source import column_places, row_width, run_files
+from codegen.run_places import column_places, row_width
+from codegen.run_source import run_files
 from language.assembly import Assembly
 
 Address = ctypes.c_void_p

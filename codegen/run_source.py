@@ -9,36 +9,32 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from codegen.expression import Place, c_expression, literal
+from codegen.expression import literal
 from codegen.marks import LEFT, marked, ranged_signals
 from codegen.mathematics import math_files
 from codegen.names import REAL, CNames, c_member, c_type
 from codegen.rendering import render, version
+from codegen.run_places import INSTANCE, Clock, Places, formula_of, row_width
 from codegen.source import module_context
 from codegen.usage import locals_of, usages
 from language.assembly import RANGE_SLACK, Assembly, Course, Feed, ranged, short_input, wires_of
 from language.continuous import PARTS
 from language.history import AGE
 from language.number import NumberType
-from language.operation import Assign
 from language.program import Program, short
 from language.signal import Sensor
 from language.stepping import BETWEEN, EVENTS_PER_STEP
 from language.traversal import block_names
 from language.wiring import finished
 
-INSTANCE = "i_{}"
-"""What an instance is called in C: its name may be any that the language takes."""
-
 
 def run_files(assembly: Assembly) -> dict[str, str]:
     """Return the files of a system's runs by name."""
     programs = {name: _part(name, program) for name, program in assembly.programs.items()}
-    places = _Places(assembly, programs)
+    places = Places(assembly, programs)
     context = _driver(assembly, programs, places)
     files = {
         "run.h": render("run.h.jinja", context),
@@ -56,23 +52,6 @@ def run_files(assembly: Assembly) -> dict[str, str]:
     return files
 
 
-def column_places(assembly: Assembly) -> list[int]:
-    """Return where each recorded column stands among the numbers of a row."""
-    found, formulas = [], len(assembly.slots)
-    for column in assembly.columns:
-        if column.block:
-            found.append(formulas)
-            formulas += 1
-        else:
-            found.append(assembly.slots.index(column.source))
-    return found
-
-
-def row_width(assembly: Assembly) -> int:
-    """Return how many numbers a row has."""
-    return max(1, len(assembly.slots) + sum(1 for c in assembly.columns if c.block))
-
-
 def _part(name: str, program: Program) -> Program:
     """Return the Program of an instance as it is printed: its parts, or its tick."""
     own = dataclasses.replace(program, name=INSTANCE.format(name))
@@ -81,55 +60,8 @@ def _part(name: str, program: Program) -> Program:
     return finished(own, ("init", "derive", *PARTS), keep=(*BETWEEN, "work.s"))
 
 
-@dataclass(frozen=True)
-class _Places:
-    """Where signals are in the driver."""
-
-    assembly: Assembly
-    programs: Mapping[str, Program]
-    is_row: bool = False
-    is_timed: bool = False
-    number: NumberType = "float64"
-
-    def __call__(self, name: str) -> str:
-        """Return the C text of `signal.<name>`."""
-        signal = short(name)
-        if self.is_row:
-            return f"out[{self.assembly.slots.index(signal)}]"
-        return self.signal(signal)
-
-    def whole(self, name: str, number: int) -> str:
-        """Return a whole number beside a signal."""
-        return repr(number)
-
-    def signal(self, name: str) -> str:
-        """Return the C text of a signal."""
-        courses = [course.name for course in self.assembly.courses]
-        if self.is_timed and name in courses:
-            return f"course_{courses.index(name)}(run, time)"
-        if name in self.assembly.inputs:
-            return f"run->inputs[{self.assembly.inputs.index(name)}]"
-        if name in self.assembly.sensors:
-            return f"run->{INSTANCE.format(name)}.value"
-        owner, _, wire = name.partition(".")
-        program = self.programs[owner]
-        place = CNames(program)(wires_of(program)[wire])
-        return place.replace("self->", f"(double)run->{program.name}.self.")
-
-    def formula(self, block: str) -> str:
-        """Return the C text of a block of the wires."""
-        return _formula(self.assembly, block, self)
-
-
-def _formula(assembly: Assembly, block: str, place: Place) -> str:
-    """Return the C text of a block of the wires, whose signals are at a place."""
-    (op,) = assembly.wires.blocks[block]
-    assert isinstance(op, Assign)
-    return f"(double)({c_expression(op.value, place)})"
-
-
 def _module(
-    assembly: Assembly, name: str, program: Program, places: _Places, flow: int
+    assembly: Assembly, name: str, program: Program, places: Places, flow: int
 ) -> dict[str, Any]:
     used = usages(program, locals_of(program))
     place = CNames(program)
@@ -213,7 +145,7 @@ def _ranges(program: Program, number: int) -> list[dict[str, object]]:
     return found
 
 
-def _driver(assembly: Assembly, programs: Mapping[str, Program], places: _Places) -> dict[str, Any]:
+def _driver(assembly: Assembly, programs: Mapping[str, Program], places: Places) -> dict[str, Any]:
     instances = [_instance(assembly, name, program, places) for name, program in programs.items()]
     rows = dataclasses.replace(places, is_row=True)
     formulas = [c for c in assembly.columns if c.block]
@@ -260,7 +192,7 @@ def _driver(assembly: Assembly, programs: Mapping[str, Program], places: _Places
     }
 
 
-def _slot(assembly: Assembly, signal: str, places: _Places) -> str:
+def _slot(assembly: Assembly, signal: str, places: Places) -> str:
     """Return what fills a slot of a row; an input may change between the instants."""
     courses = [course.name for course in assembly.courses]
     value = places.signal(signal)
@@ -277,24 +209,9 @@ def _course(assembly: Assembly, course: Course) -> dict[str, object]:
         "low": repr(float(course.delay - Fraction(high))),
         "column": assembly.inputs.index(course.name),
         "formulas": [
-            (number, _formula(assembly, block, _Clock())) for number, block in course.formulas
+            (number, formula_of(assembly, block, Clock())) for number, block in course.formulas
         ],
     }
-
-
-@dataclass(frozen=True)
-class _Clock:
-    """Where a formula of time reads it, whatever it is called there."""
-
-    number: NumberType = "float64"
-
-    def __call__(self, name: str) -> str:
-        """Return the C text of the time."""
-        return "now"
-
-    def whole(self, name: str, number: int) -> str:
-        """Return a whole number beside it."""
-        return repr(number)
 
 
 def _happenings(assembly: Assembly) -> list[tuple[int, str]]:
@@ -309,7 +226,7 @@ def _happenings(assembly: Assembly) -> list[tuple[int, str]]:
     return found
 
 
-def _instance(assembly: Assembly, name: str, program: Program, places: _Places) -> dict[str, Any]:
+def _instance(assembly: Assembly, name: str, program: Program, places: Places) -> dict[str, Any]:
     is_flow = program.period is None
     varied = {c.name for owner, c in assembly.tunables() if owner == name}
     flags = [
@@ -342,7 +259,7 @@ def _instance(assembly: Assembly, name: str, program: Program, places: _Places) 
 
 
 def _varying(
-    assembly: Assembly, name: str, program: Program, places: _Places
+    assembly: Assembly, name: str, program: Program, places: Places
 ) -> list[dict[str, str]]:
     """Return the inputs of an instance that change inside its steps, and what they are then."""
     timed = dataclasses.replace(places, is_timed=True)
@@ -355,7 +272,7 @@ def _varying(
     return found
 
 
-def _fed(feed: Feed, program: Program, places: _Places) -> dict[str, object]:
+def _fed(feed: Feed, program: Program, places: Places) -> dict[str, object]:
     kind = c_type(feed.variable, program.number)
     if feed.block:
         value = places.formula(feed.block)
@@ -371,7 +288,7 @@ def _fed(feed: Feed, program: Program, places: _Places) -> dict[str, object]:
     }
 
 
-def _sensor(sensor: Sensor, places: _Places) -> dict[str, object]:
+def _sensor(sensor: Sensor, places: Places) -> dict[str, object]:
     name, lag = INSTANCE.format(sensor.name), float(sensor.lag)
     look = f"lag_look(&me->lag, {lag!r}, now, measured)" if sensor.lag else "measured"
     room = math.ceil(sensor.delay / sensor.period) + 2 if sensor.period and sensor.delay else 0

@@ -6,10 +6,9 @@ Instants, ends of steps, rows, inputs and noise follow from the scenario alone. 
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from bisect import bisect_right
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from itertools import islice
@@ -17,18 +16,14 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.rows import recorded
+from engine.assembling import assembly_of
 from engine.schedule import Grid, Schedule
 from engine.sensing import noise_numbers
 from engine.signals import LineRun
 from engine.stimulus import Course
-from language.assembly import Assembly, Column, Course as Varying, Feed
-from language.declaration import Formula
-from language.experiment import Connection, Scenario, System
-from language.operation import Block
+from language.assembly import Assembly, Course as Varying
+from language.experiment import Scenario, System
 from language.program import Program
-from language.traversal import block_reads
-from language.wires import block_of, piece_block, wire_formulas, wires_program
 
 Reals = NDArray[np.float64]
 Wholes = NDArray[np.int64]
@@ -116,41 +111,6 @@ def why_not_planned(
     return None
 
 
-def assembly_of(system: System, scenario: Scenario, programs: Mapping[str, Program]) -> Assembly:
-    """Return what is to be compiled of a system and a resolved scenario."""
-    formulas = wire_formulas(system, scenario)
-    truths = {name for name, thing in system.inputs.items() if thing.truth}
-    truths |= {line.name for line in system.lines.values() if line.source in truths}
-    for owner, program in programs.items():
-        truths |= {f"{owner}.{w.name}" for w in program.outputs if w.type == "truth"}
-    wires = wires_program(formulas, frozenset(truths))
-    feeds: dict[str, list[Feed]] = {name: [] for name in programs}
-    for (owner, _), connection in system.connections.items():
-        feeds[owner].append(_feed(connection, programs[owner], system))
-    columns = [Column(c.name, c.source, c.block) for c in recorded(system, scenario, programs)]
-    slots = dict.fromkeys(column.source for column in columns if not column.block)
-    for column in columns:
-        if column.block:
-            slots.update(dict.fromkeys(_signals(wires.blocks[column.block])))
-    controlled = {
-        owner
-        for (owner, _), connection in system.connections.items()
-        if any(read.partition(".")[0] in programs for read in connection.reads)
-    }
-    return Assembly(
-        programs=programs,
-        order=system.order,
-        inputs=(*system.inputs, *system.lines),
-        feeds={name: tuple(found) for name, found in feeds.items()},
-        sensors=system.sensors,
-        wires=wires,
-        slots=tuple(slots),
-        columns=tuple(columns),
-        controlled=frozenset(controlled),
-        courses=tuple(_courses(system, scenario)),
-    )
-
-
 def plan_of(system: System, scenario: Scenario, assembly: Assembly) -> Plan:
     """Return the plan of a resolved scenario that can be planned."""
     programs = assembly.programs
@@ -225,18 +185,6 @@ def input_values(
     return found
 
 
-def _courses(system: System, scenario: Scenario) -> Iterator[Varying]:
-    """Yield the inputs that change between instants."""
-    for name in (*system.inputs, *system.lines):
-        line = system.lines.get(name)
-        source = line.source if line else name
-        stimulus = scenario.inputs[source]
-        if stimulus.varies:
-            pieces = enumerate(stimulus.pieces)
-            blocks = tuple((k, piece_block(source, k)) for k, piece in pieces if piece.formula)
-            yield Varying(name, line.delay if line else Fraction(0), blocks)
-
-
 def _course_pieces(
     system: System, scenario: Scenario, assembly: Assembly, instants: Wholes, tick: Fraction
 ) -> Wholes:
@@ -270,23 +218,6 @@ def _two(exact: Fraction) -> tuple[float, float]:
 
 def _no_formula(block: str, time: float) -> float:
     raise AssertionError(f"{block} is a formula of time: not planned")
-
-
-def _feed(connection: Connection, program: Program, system: System) -> Feed:
-    name = connection.target[1]
-    variable = next(v for v in program.inputs if v.name == f"input.{name}")
-    source = connection.source
-    limited = any(v.name == f"latched.{name}" for v in program.variables)
-    flagged = any(v.name == f"is_new.{name}" for v in program.variables)
-    sensors = tuple(r for r in connection.reads if r in system.sensors) if flagged else ()
-    if isinstance(source, Formula):
-        return Feed(variable, "", block_of(connection), limited, sensors)
-    value = source if isinstance(source, str) else source.numerator / source.denominator
-    return Feed(variable, value, None, limited, sensors)
-
-
-def _signals(block: Block) -> list[str]:
-    return [n.removeprefix("signal.") for n in block_reads(block) if n.startswith("signal.")]
 
 
 def _tick(schedule: Schedule, programs: Mapping[str, Program]) -> Fraction | None:
@@ -342,9 +273,3 @@ def _product(a: Reals, b: float) -> tuple[Reals, Reals]:
     product = a * b
     rest = ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low
     return product, rest
-
-
-def with_seed(plan: Plan, seed: int) -> Plan:
-    """Return a plan with the noise of another seed."""
-    noise = {name: noise_of(seed, name, len(values)) for name, values in plan.noise.items()}
-    return dataclasses.replace(plan, noise=noise)

@@ -11,9 +11,10 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.assembling import assembly_of
 from engine.firing import event, mode_names
 from engine.invariant_watch import broken
-from engine.plan import assembly_of, plan_of
+from engine.plan import plan_of
 from engine.range_watch import left_range, outside_text
 from engine.rows import recorded
 from engine.trajectory import Event, Trajectory, column_array, fault_names

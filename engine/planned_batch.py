@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.adjustment import Group, groups
+from engine.assembling import assembly_of
 from engine.batch import NO_EVENT, Batch, BatchResult, EventKind
-from engine.plan import Plan, assembly_of, noise_of, plan_of, why_not_planned
+from engine.plan import Plan, noise_of, plan_of, why_not_planned
 from engine.planned import EVENT, Build
 from engine.variants import (
     empty_result,
