@@ -17,6 +17,7 @@ from diagnosis.verdict import Quantity
 from diagnosis.wording import rounded
 from language.declaration import Parameter
 from language.model import Automaton
+from language.project import read_document
 
 ENDING = "_diagnosed"
 LONGEST_NAME = 31
@@ -42,11 +43,25 @@ def variant_text(dossier: Dossier, extends: str) -> str:
     ]
     if dossier.diagnosis is None:
         return "\n".join(lines) + "\n"
+    lines += [f"# {text}" for text in needed(dossier)]
     selection = dossier.diagnosis.selection
     fitted = quantities_of(selection.model)
     lines += _parameters(dossier.automaton, fitted)
     lines += _effects(dossier, selection, fitted)
     return "\n".join(lines) + "\n"
+
+
+def needed(dossier: Dossier) -> list[str]:
+    """Return what has to be done before the variant can be read: its effects found by name."""
+    project = dossier.case.project
+    accepted = dossier.diagnosis.selection.accepted if dossier.diagnosis else ()
+    told = []
+    for effect in (tried.layer.effect for tried in accepted):
+        own = effect.body.span.source
+        files = [read_document(path) for path in project.effects.get(effect.name, ())]
+        if not any(file.source.lines == own.lines for file in files):
+            told.append(f"{own.name} has to be below spec/: the variant lays this effect by name")
+    return told
 
 
 def _about(dossier: Dossier) -> str:

@@ -14,7 +14,7 @@ from diagnosis.finding import told
 from diagnosis.fit import Fit, fit as fitted
 from diagnosis.layers import effects_in
 from diagnosis.library import library
-from diagnosis.variant import variant_text
+from diagnosis.variant import needed, variant_text
 from diagnosis.wording import summary
 from language.effect import Effect
 from language.load import automaton_of
@@ -63,7 +63,7 @@ def diagnose(
         found = diagnosed(case, tell)
         verdict, after = found.verdict, hashes(case.held_out)
         dossier = Dossier(case, automaton, checked.check, verdict, found, after, left_out)
-        messages = tuple(summary(dossier))
+        messages = (*summary(dossier), *needed(dossier))
         dossier = dataclasses.replace(
             dossier, verdict=dataclasses.replace(verdict, messages=messages)
         )

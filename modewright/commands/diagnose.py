@@ -59,6 +59,7 @@ def diagnose(
     modewright diagnose plant.yaml --train night.csv --out found --fail-on effect --json
     """
     from diagnosis.dossier import verdict_json
+    from diagnosis.variant import needed
     from modewright import show, show_diagnosis
     from modewright.diagnoses import BudgetSpent, diagnose as diagnosed, save_diagnosis
 
@@ -77,6 +78,8 @@ def diagnose(
         print(f"error: no verdict within --budget: {error}", file=sys.stderr)
         raise typer.Exit(PROBLEMS) from None
     files = save_diagnosis(found, out, spec)
+    for text in needed(found):
+        print(f"note: {text}", file=sys.stderr)
     if as_json:
         show.print_json(verdict_json(found.verdict))
     else:

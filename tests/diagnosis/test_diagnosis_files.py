@@ -22,8 +22,10 @@ import pytest
 import modewright as mw
 from diagnosis.dossier import usable, verdict_json
 from diagnosis.finding import Finding
+from diagnosis.variant import needed
 from diagnosis.wording import headline, separation
 from modewright.cli import app
+from modewright.diagnoses import base_of
 from modewright.exits import exit_code
 from tests.diagnosis.spinning import T_C, B, J, bench
 from tests.language.making import ROOT
@@ -178,6 +180,31 @@ def test_the_variant_is_a_spec_like_any_other(found: Found, tmp_path: Path) -> N
 
 def test_the_variant_is_run_where_it_was_written(found: Found) -> None:
     assert run(found.folder, "check", "found/variant.yaml") == 0
+
+
+def test_a_spec_that_is_a_file_anywhere_is_extended_as_a_file(
+    found: Found, dossier: mw.Dossier, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(found.folder)
+    shutil.copy("spec/spinner.yaml", "other.yaml")
+    elsewhere = dataclasses.replace(dossier.automaton, name="other")
+    alone = dataclasses.replace(dossier, automaton=elsewhere)
+    assert base_of(alone, "other.yaml", Path("found")) == "../other.yaml"
+    assert base_of(dossier, "spec/spinner.yaml", Path("found")) == "spinner"
+
+
+def test_an_effect_that_the_project_does_not_have_is_asked_for(dossier: mw.Dossier) -> None:
+    assert needed(dossier) == []
+    assert dossier.diagnosis
+    (tried,) = dossier.diagnosis.selection.accepted
+    effect = dataclasses.replace(tried.layer.effect, name="house_friction")
+    other = dataclasses.replace(tried, layer=dataclasses.replace(tried.layer, effect=effect))
+    selection = dataclasses.replace(dossier.diagnosis.selection, accepted=(other,))
+    diagnosis = dataclasses.replace(dossier.diagnosis, selection=selection)
+    (told,) = needed(dataclasses.replace(dossier, diagnosis=diagnosis))
+    assert told.endswith(
+        "library/coulomb_friction.yaml has to be below spec/: the variant lays this effect by name"
+    )
 
 
 class Page(HTMLParser):
