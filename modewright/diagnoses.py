@@ -50,6 +50,7 @@ def diagnose(
     [s]. Raises SpecError, ValueError, ToolMissing, OutputError, BudgetSpent.
     """
     begun = time.monotonic()
+    _require_apart(train, held_out)
     tell = _within(budget, begun, tell)
     checked = check_recordings(train, map, spec, root=root)
     case, automaton = _case(spec, train, held_out, checked, effects, root)
@@ -97,6 +98,18 @@ def base_of(dossier: Dossier, spec: str, folder: Path) -> str:
     if [file.resolve() for file in project.index.get(dossier.name, [])] == [path.resolve()]:
         return dossier.name
     return os.path.relpath(path.resolve(), folder.resolve())
+
+
+def _require_apart(train: Sequence[str | Path], held_out: Sequence[str | Path]) -> None:
+    """Raise ValueError where a recording is named twice, or is both learnt from and held out."""
+    names = [Path(file).name for file in train]
+    for name in names:
+        if names.count(name) > 1:
+            raise ValueError(f"two recordings to learn from are called `{name}`: rename one")
+    learnt = {Path(file).resolve() for file in train}
+    for file in held_out:
+        if Path(file).resolve() in learnt:
+            raise ValueError(f"{file} is learnt from: it cannot be held out")
 
 
 def _within(budget: float | None, begun: float, tell: Tell) -> Tell:
@@ -154,6 +167,7 @@ def fit(
     `parameters` are those that may move: all that have a range, if none are named. What is odd
     about the recordings is told. Raises SpecError, ValueError, ToolMissing.
     """
+    _require_apart(train, ())
     checked = check_recordings(train, map, spec, root=root)
     for severity, text in told(checked.check.findings):
         if severity != "note":

@@ -327,6 +327,8 @@ def test_no_physics_is_blamed_for_a_wrong_unit(
         (["--budget", "soon"], 2, "is not a time"),
         (["--fail-on", "doubt"], 2, "one of effect"),
         (["--effects", "spec/none"], 2, "there is no effect in"),
+        (["--held-out", "./run_0.csv"], 2, "cannot be held out"),
+        (["--train", "spec/run_1.csv"], 2, "are called `run_1.csv`"),
     ],
 )
 def test_what_is_asked_for_wrongly_is_told(
