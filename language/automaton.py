@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from fractions import Fraction
 from typing import Literal, cast
 
-from language.declaration import Fitting, Kind, Parameter, Range
+from language.declaration import Fitting, Formula, Kind, Parameter, Range
 from language.document import Document, Entry, Node, Scalar, Table
 from language.element import ElementReader
 from language.mode import ModeReader
@@ -210,11 +210,7 @@ class _AutomatonReader(Reader):
         value, derived = None, None
         if "derived" in table.entries:
             kind = "derived"
-            derived = self.expression(table.get("derived"), f"{key}.derived", entry.span)
-            for other in ("value", "tunable", "range", "type"):
-                if other in table.entries:
-                    label = f"a derived parameter has no `{other}`"
-                    self.problems.error("form", table.entries[other].span, label)
+            derived = self._derived(table, key, entry)
         elif type_ != "real":
             node, what = table.get("value"), f"{key}.value"
             value = self.value(node, what, entry.span, NO_UNIT, type_, values)
@@ -224,26 +220,20 @@ class _AutomatonReader(Reader):
         unit = unit or parse_unit("1")
         limits = self.range(table.get("range"), unit)
         if limits and value is not None and not limits[0] <= value <= limits[1]:
-            place = cast(Scalar, table.get("value")).span
-            self.problems.error("range", place, f"the value of `{entry.key}` is outside its range")
+            span = cast(Scalar, table.get("value")).span
+            self.problems.error("range", span, f"the value of `{entry.key}` is outside its range")
         if type_ == "int":
             limits = self.whole_range(limits, table.get("range"))
         fitting = self._fitting(table, unit, limits)
-        at = entry.span
-        return Parameter(
-            entry.key,
-            kind,
-            unit,
-            value,
-            derived,
-            limits,
-            key,
-            at,
-            fitting,
-            type_,
-            values,
-            about=about_of(table),
-        )
+        place = (entry.key, kind, unit, value, derived, limits, key, entry.span)
+        return Parameter(*place, fitting, type_, values, about=about_of(table))
+
+    def _derived(self, table: Table, key: str, entry: Entry) -> Formula:
+        for other in ("value", "tunable", "range", "type"):
+            if other in table.entries:
+                label = f"a derived parameter has no `{other}`"
+                self.problems.error("form", table.entries[other].span, label)
+        return self.expression(table.get("derived"), f"{key}.derived", entry.span)
 
     def _table_parameter(self, entry: Entry, table: Table) -> Parameter:
         key = f"parameters.{entry.key}"

@@ -12,6 +12,7 @@ from language.check_memory import check_memory
 from language.check_observer import check_observer
 from language.check_region import check_regions
 from language.check_rewind import check_reach, check_rewind
+from language.check_size import check_size
 from language.check_unused import check_unused
 from language.check_writer import (
     check_continued,
@@ -33,10 +34,6 @@ from language.syntax import EDGES, KEPT, MEMORY, Tree, names, whole_literal
 from language.units import SECOND, Dimension, Unit, common, fits
 from language.witness import report_refiring
 
-MOST_HELD = 100_000
-"""Equations and balances of all modes: half of what a spec may have of keys and values."""
-MOST_WAYS = 200
-"""Transitions that leave a mode: in the Program and in C each is inside the one before it."""
 WHOLES = (Whole, Enumeration)
 
 
@@ -88,7 +85,7 @@ class _Check:
         self.names, self.literals = declared_names(automaton, self.problems)
         self._parameters()
         self._initials()
-        _check_size(automaton, self.problems)
+        check_size(automaton, self.problems)
         check_regions(automaton, self.problems)
         for mode in automaton.modes.values():
             with self.problems.collecting():
@@ -287,22 +284,6 @@ class _Check:
             if parameter and parameter_kinds(self.automaton)[read.path] != "fixed":
                 label = f"`{read.path}` is {parameter.kind}: a wait is made of fixed values"
                 self.problems.error("wait", read.span, label)
-
-
-def _check_size(automaton: Automaton, problems: Problems) -> None:
-    """What stands at the root holds in every mode: the Program has it once for each."""
-    modes = automaton.all_modes
-    before = len(problems.found)
-    held = sum(len(mode.equations) + len(mode.flow) for mode in modes)
-    if held > MOST_HELD:
-        label = f"the modes have {held} equations and balances, those of the root in each of them"
-        problems.error("huge", automaton.span, label, f"at most {MOST_HELD} are checked")
-    for mode in modes:
-        if len(mode.transitions) > MOST_WAYS:
-            label = f"mode `{mode.name}` has {len(mode.transitions)} transitions"
-            problems.error("huge", mode.span, label, f"a mode has at most {MOST_WAYS}")
-    if len(problems.found) > before:
-        problems.stop_if_any()
 
 
 def _never_entered(automaton: Automaton, region: Region) -> list[str]:

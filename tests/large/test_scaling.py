@@ -10,7 +10,7 @@ from types import FrameType
 import pytest
 
 import modewright as mw
-from language.check import MOST_HELD, MOST_WAYS
+from language.check_size import MOST_HELD, MOST_WAYS
 from language.problem import Problem, Problems, Source, Span, SpecError
 from tests.large import shapes
 
