@@ -228,7 +228,7 @@ class _AutomatonReader(Reader):
         place = (entry.key, kind, unit, value, derived, limits, key, entry.span)
         return Parameter(*place, fitting, type_, values, about=about_of(table))
 
-    def _derived(self, table: Table, key: str, entry: Entry) -> Formula:
+    def _derived(self, table: Table, key: str, entry: Entry) -> Formula | None:
         for other in ("value", "tunable", "range", "type"):
             if other in table.entries:
                 label = f"a derived parameter has no `{other}`"
