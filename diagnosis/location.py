@@ -64,7 +64,8 @@ def located(bench: Bench, base: Estimate) -> tuple[Locus, ...]:
         point = point_of(candidate, len(bench.series), base.values(0))
         quiet = looked_at(candidate, bench.series, noises, point)
         free = levelled(quiet, bench.series, {name: units[name]}, FREE_LEVELS)
-        found.append(_locus(bench, section, layer, free, quiet.cost - free.cost))
+        gain = quiet.cost - free.cost if np.isfinite(quiet.cost) else 0.0
+        found.append(_locus(bench, section, layer, free, gain))
     return tuple(sorted(found, key=lambda locus: -locus.gain))
 
 

@@ -74,11 +74,10 @@ def selected(
             base = base if accepted else better
             tried = searched(bench, model, units, layers, tell)
         rounds.append(tried)
-        layers = [other.layer for other in tried[1:NEXT] if other.promised > 0.0]
-        best = next(iter(tried), None)
+        layers = [other.layer for other in tried[:NEXT] if other.promised > 0.0]
+        enough = (t for t in tried if t.evidence and t.evidence.least > needed)
+        best = next(enough, None)
         if best is None or best.estimate is None or best.evidence is None:
-            break
-        if best.evidence.least <= needed:
             break
         needed = max(threshold, PART * best.evidence.least)
         tell(f"accepted {best.layer.id}: {best.evidence.least:.0f} nats")

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from modewright.cli import app
+from modewright.console import console
 from modewright.exits import exit_code
 from tests.diagnosis.driving import MAP, SPEC, Values, tip_in
 
@@ -30,6 +31,8 @@ def table(path: Path, columns: dict[str, Values]) -> Path:
 @pytest.fixture
 def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "160")
+    console.cache_clear()
     (tmp_path / "spec").mkdir()
     named = SPEC.replace("step: 5 ms", "step: 5 ms\nrecording_map: bench")
     (tmp_path / "spec" / "small.yaml").write_text(named, "utf-8")
