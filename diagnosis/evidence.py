@@ -36,6 +36,11 @@ class Evidence:
         return min(self.train, self.left_out)
 
     @property
+    def rest(self) -> float:
+        """What is gained left out without the recording that gains most."""
+        return self.left_out - max(self.each)
+
+    @property
     def total(self) -> float:
         """Their sum: what candidates are ranked by."""
         return self.train + self.left_out

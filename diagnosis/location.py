@@ -33,8 +33,9 @@ MOST_WINDOWS = 12
 
 @dataclass(frozen=True)
 class Locus:
-    """One place: `gain` [nats] of its freedom, `rms` of its drift [SI]; the `windows` (start, end,
-    recording) in which it is loud, its share by mode, and what it goes `along` with.
+    """One place: `gain` [nats] of its freedom, of it `beyond` the base as it is; `rms` of its drift
+    [SI]; the `windows` (start, end, recording) in which it is loud, its share by mode, and what
+    it goes `along` with.
     """
 
     section: str
@@ -44,6 +45,7 @@ class Locus:
     windows: tuple[tuple[float, float, str], ...] = ()
     modes: dict[str, float] = dataclasses.field(default_factory=dict)
     along: tuple[tuple[str, float], ...] = ()
+    beyond: float = 0.0
 
     @property
     def path(self) -> str:
@@ -65,7 +67,9 @@ def located(bench: Bench, base: Estimate) -> tuple[Locus, ...]:
         quiet = looked_at(candidate, bench.series, noises, point)
         free = levelled(quiet, bench.series, {name: units[name]}, FREE_LEVELS)
         gain = quiet.cost - free.cost if np.isfinite(quiet.cost) else 0.0
-        found.append(_locus(bench, section, layer, free, gain))
+        locus = _locus(bench, section, layer, free, gain)
+        beyond = base.cost - free.cost if np.isfinite(free.cost) else 0.0
+        found.append(dataclasses.replace(locus, beyond=beyond))
     return tuple(sorted(found, key=lambda locus: -locus.gain))
 
 

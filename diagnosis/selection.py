@@ -9,7 +9,7 @@ import numpy as np
 
 from diagnosis.bench import Bench
 from diagnosis.estimation import Estimate
-from diagnosis.evidence import evidence
+from diagnosis.evidence import Evidence, evidence
 from diagnosis.level import settled
 from diagnosis.search import Tell, Tried, searched
 
@@ -20,6 +20,8 @@ PART = 0.05
 never described so well that nothing small is left beside it."""
 NEXT = 9
 """Candidates that are looked at again beside an accepted one: the best of the round before."""
+SHARED = 0.15
+"""The part of what an effect gains that must be left without the recording that gains most."""
 BETTER = 10.0
 """Nats by which a model must fit better for its candidates to be looked at again."""
 MOST_EFFECTS = 3
@@ -75,7 +77,7 @@ def selected(
             tried = searched(bench, model, units, layers, tell)
         rounds.append(tried)
         layers = [other.layer for other in tried[:NEXT] if other.promised > 0.0]
-        enough = (t for t in tried if t.evidence and t.evidence.least > needed)
+        enough = (t for t in tried if t.evidence and _is_enough(t.evidence, needed))
         best = next(enough, None)
         if best is None or best.estimate is None or best.evidence is None:
             break
@@ -86,6 +88,15 @@ def selected(
     kept, model = _still_needed(bench, base, model, accepted, units, threshold, tell)
     first = tuple(rounds[0]) if rounds else ()
     return Selection(base, model, kept, first, _rivals(first, kept))
+
+
+def _is_enough(known: Evidence, needed: float) -> bool:
+    """Tell whether an effect gains enough, and not in one recording alone.
+
+    What only one recording shows is more often an accident of it than physics.
+    """
+    shared = len(known.each) == 1 or known.rest > SHARED * known.left_out
+    return known.least > needed and shared
 
 
 def _better_base(

@@ -1,0 +1,28 @@
+"""An effect is accepted where it gains enough, and not in one recording alone."""
+
+from __future__ import annotations
+
+import pytest
+
+from diagnosis.evidence import Evidence
+from diagnosis.selection import THRESHOLD, _is_enough
+
+
+@pytest.mark.parametrize(
+    ("train", "each", "wanted"),
+    [
+        (200.0, (60.0, 50.0, 90.0), True),
+        (200.0, (-27.0, 19.0, 957.0), False),
+        (200.0, (20.0, 15.0, 5.0), False),
+        (30.0, (60.0, 50.0, 90.0), False),
+        (200.0, (300.0,), True),
+    ],
+)
+def test_what_gains_in_one_recording_alone_is_not_enough(
+    train: float, each: tuple[float, ...], wanted: bool
+) -> None:
+    assert _is_enough(Evidence(train, sum(each), each), THRESHOLD) == wanted
+
+
+def test_the_rest_is_what_the_best_recording_leaves() -> None:
+    assert Evidence(1.0, 60.0, (10.0, 40.0, 10.0)).rest == 20.0
