@@ -13,9 +13,8 @@ import numpy as np
 
 from diagnosis.candidate import Candidate
 from diagnosis.estimation import Estimate, estimated, looked_at
-from diagnosis.gain import linearised
 from diagnosis.point import Point
-from diagnosis.prediction import SMALL, Noises, noises_of, points_of
+from diagnosis.prediction import Noises, near, noises_of, points_of
 from diagnosis.series import Series
 
 REACH = 0.2
@@ -35,18 +34,8 @@ def units_of(
     candidate: Candidate, series: Sequence[Series], noises: Noises, start: Mapping[str, float]
 ) -> dict[str, float]:
     """Return the unit [SI] of each drift of a candidate."""
-    states, inputs = next(iter(points_of(candidate, series, None).items()))[1]
-    page = candidate.page(start, series[0])
-    mode = next(iter(points_of(candidate, series, None)))
-    linear = linearised(
-        candidate.predictor,
-        page,
-        inputs,
-        mode,
-        candidate.recipe.substeps,
-        states,
-        SMALL * candidate.spans,
-    )
+    mode, (states, inputs) = next(iter(points_of(candidate, series, None).items()))
+    linear = near(candidate, candidate.page(start, series[0]), mode, states, inputs)
     if linear is None:
         raise ValueError("the base is unstable where the first recording starts")
     count = max(1, round(REACH / float(series[0].period)))

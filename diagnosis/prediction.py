@@ -154,15 +154,7 @@ def gains_of(
     found: dict[int, Reals] = {}
     first = np.zeros((0, len(start), len(r)))
     for mode, (states, inputs) in points.items():
-        linear = linearised(
-            candidate.predictor,
-            page,
-            inputs,
-            mode,
-            candidate.recipe.substeps,
-            states,
-            SMALL * candidate.spans,
-        )
+        linear = near(candidate, page, mode, states, inputs)
         if linear is None:
             continue
         q = _process_noise(candidate, linear, noises, period)
@@ -175,6 +167,14 @@ def gains_of(
     usual = next(iter(found.values()), nothing)
     steady = np.array([found.get(mode, usual) for mode in modes])
     return Gains(first, np.ascontiguousarray(steady))
+
+
+def near(
+    candidate: Candidate, page: Reals, mode: int, states: Reals, inputs: Reals
+) -> Linear | None:
+    """Return a candidate over one sample, linearised in a mode near a point; None if unstable."""
+    sizes, substeps = SMALL * candidate.spans, candidate.recipe.substeps
+    return linearised(candidate.predictor, page, inputs, mode, substeps, states, sizes)
 
 
 def _process_noise(candidate: Candidate, linear: Linear, noises: Noises, period: float) -> Reals:
