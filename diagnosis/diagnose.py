@@ -20,8 +20,10 @@ from diagnosis.estimation import Estimate, adapted
 from diagnosis.evidence import inflation
 from diagnosis.layers import shipped_effects
 from diagnosis.level import recalibrated, units_of
-from diagnosis.location import Locus, located
+from diagnosis.location import led_by, located
+from diagnosis.locus import Locus
 from diagnosis.naming import named, place_path, quantities_of, verdict_id
+from diagnosis.place_sentence import place_sentence
 from diagnosis.prediction import noises_of
 from diagnosis.search import Tell, Tried
 from diagnosis.selection import THRESHOLD, Selection, selected
@@ -78,13 +80,14 @@ def diagnose(case: Case, tell: Tell = lambda text: None) -> Diagnosis:
     bench, base = recalibrated_base(case, automaton, series, seen, tell)
     units = units_of(base.candidate, bench.series, base.noises, base.values(0))
     loci = located(bench, base)
-    tell(sentence(loci, automaton))
+    tell(place_sentence(loci, bench))
     selection = selected(bench, base, units, case.threshold, tell)
     says = _says(selection, loci, bench, case.threshold)
+    loci = led_by(loci, [place_path(tried.layer) for tried in selection.accepted], bench)
     fit = {"train": misfits(base, selection.model, bench.series)}
     verdict = _verdict(says, selection, loci, automaton, fit)
     hashes = {path.name: _digest(path) for path in case.train}
-    verdict = dataclasses.replace(verdict, inputs=hashes, messages=(sentence(loci, automaton),))
+    verdict = dataclasses.replace(verdict, inputs=hashes, messages=(place_sentence(loci, bench),))
     held = tuple(
         dataclasses.replace(
             read_series(path, case, automaton, seen), is_linear=bench.series[0].is_linear
@@ -102,21 +105,6 @@ def compared(mapping: RecordingMap, automaton: Automaton) -> tuple[str, ...]:
     """Return the outputs that a map compares, in the order of the automaton."""
     wanted = {column.compare for column in mapping.columns.values() if column.compare}
     return tuple(name for name in automaton.outputs if name in wanted)
-
-
-def sentence(loci: Sequence[Locus], automaton: Automaton) -> str:
-    """Return where something is missing, in one sentence."""
-    best = loci[0] if loci else None
-    if best is None or best.gain <= 0.0:
-        return "nothing asks for a torque or force that the model lacks"
-    unit = {"flow": "in its balance", "elements": "through it", "outputs": "in its signal"}
-    mode = max(best.modes, key=lambda name: best.modes[name]) if best.modes else ""
-    along = best.along[0] if best.along else ("", 0.0)
-    return (
-        f"missing at {best.path}: {best.rms:.3g} (SI, rms) {unit[best.section]}, "
-        f"{100 * best.modes.get(mode, 0.0):.0f} % of it in mode {mode}, "
-        f"along with {along[0]} (r = {along[1]:.2f}); {best.gain:.0f} nats"
-    )
 
 
 def read_series(path: Path, case: Case, automaton: Automaton, seen: Sequence[str]) -> Series:

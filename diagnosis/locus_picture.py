@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from matplotlib.figure import Figure
 
-from diagnosis.location import Locus
+from diagnosis.locus import Locus
 from engine.band import PALETTE
 from engine.plot import Picture
 from language.text import visible

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from diagnosis.location import Locus
+from diagnosis.locus import Locus
 
 FORMAT = "modewright-verdict/1"
 Says = Literal["effect", "nothing_missing", "unknown", "ambiguous"]
@@ -72,7 +72,7 @@ class Verdict:
 
     def json(self) -> dict[str, Any]:
         """Return the verdict as written to `verdict.json`."""
-        loci = [locus for locus in self.location if locus.gain > 0.0]
+        loci = [locus for locus in self.location if locus.gain > 0.0 or locus.named]
         worst = loci[0] if loci else None
         return {
             "format": FORMAT,

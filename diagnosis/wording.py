@@ -6,20 +6,13 @@ from collections.abc import Mapping, Sequence
 
 from diagnosis.dossier import Dossier
 from diagnosis.finding import told
-from diagnosis.layers import Layer, drift
-from diagnosis.location import Locus
+from diagnosis.layers import Layer
 from diagnosis.naming import place_path, verdict_id
+from diagnosis.place_sentence import PLACES, place_sentence
 from diagnosis.search import FULL_FITS, WORTH, Tried
 from diagnosis.selection import CLOSE, Selection
 from diagnosis.verdict import Misfit as FitMisfit, Named, Quantity
-from language.place import Misfit, place_of
 
-PLACES = {
-    "flow": "in the balance of",
-    "inputs": "at the input",
-    "outputs": "in the signal",
-    "elements": "in the element",
-}
 MOST_NAMED = 4
 """Most rivals, windows or findings told in a sentence."""
 
@@ -89,31 +82,11 @@ def _misfits(signals: Mapping[str, FitMisfit]) -> str:
 
 
 def location(dossier: Dossier) -> str:
-    """Return where something is missing, before any effect was tried, in one sentence."""
-    best = next((locus for locus in dossier.verdict.location if locus.gain > 0.0), None)
-    if best is None:
+    """Return where something is missing, in one sentence; empty where nothing is."""
+    found = dossier.diagnosis
+    if found is None or dossier.verdict.verdict == "nothing_missing":
         return ""
-    unit = _unit(dossier, best)
-    kind = {"flow": "an unknown torque or force", "elements": "an unknown torque or force"}
-    mode = max(best.modes, key=lambda name: best.modes[name], default="")
-    share = f", {100 * best.modes[mode]:.0f} % of it in mode {mode}" if mode else ""
-    along = f", along with {best.along[0][0]} (r = {best.along[0][1]:.2f})" if best.along else ""
-    return (
-        f"before any effect was tried, {kind.get(best.section, 'an error')} "
-        f"{PLACES[best.section]} {best.place} explained most: "
-        f"{best.rms:.3g} {unit} rms{share}{along}"
-    )
-
-
-def _unit(dossier: Dossier, locus: Locus) -> str:
-    """Return the unit of what is unknown at a place."""
-    root = dossier.case.document.root
-    kinds = {"flow": "balance", "elements": "element", "outputs": "output"}
-    kind = kinds[locus.section]
-    place = place_of(root, drift(kind, locus.place).effect, locus.place)
-    if isinstance(place, Misfit):
-        return ""
-    return str(place.holes.get("unit" if kind == "output" else "force", ""))
+    return place_sentence(dossier.verdict.location, found.bench)
 
 
 def separation(dossier: Dossier) -> list[str]:

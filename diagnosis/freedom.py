@@ -1,0 +1,70 @@
+"""Freedom: the base with one drift as free as the recordings ask for, all others small."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+
+from diagnosis.bench import Bench
+from diagnosis.estimation import Estimate, estimated, looked_at
+from diagnosis.layers import DRIFT, Layer
+from diagnosis.level import FREE_LEVELS, units_of
+from diagnosis.point import point_of
+from diagnosis.prediction import Noises
+
+SMALL_LEVEL = FREE_LEVELS[1]
+"""What all drifts have while one of them is let free."""
+START_LEVEL = 10.0
+WIDE_LEVELS = (1.0, 100.0, 1000.0)
+"""Levels from which parameters are fitted: a sensor's error is easily a hundred times its noise."""
+NEAR_LEVELS = (3.0, 30.0, 300.0)
+"""Levels that are looked at beside, when the parameters are fitted."""
+ROUNDS = 3
+"""Rounds in which the parameters are fitted to a freedom: what they have to do is little."""
+
+
+def freed(bench: Bench, base: Estimate, layer: Layer | None = None) -> Estimate:
+    """Return the base with one drift free, its parameters fitted anew; with none, all small.
+
+    They start where the base is, and where they are declared: a base that lacks something may
+    have been led far astray.
+    """
+    known = layer is None or any(layer.id == other.id for other in bench.drifts)
+    drifts = bench.drifts if known or layer is None else (*bench.drifts, layer)
+    candidate = bench.candidate((), drifts)
+    name = layer.named(DRIFT) if layer else None
+    units = units_of(candidate, bench.series, base.noises, base.values(0))
+    levels = dict.fromkeys(units, SMALL_LEVEL) | ({name: START_LEVEL} if name else {})
+    noises = with_levels(base.noises, units, levels)
+    found = []
+    for start in (base.values(0), {}):
+        point = point_of(candidate, len(bench.series), start)
+        now = looked_at(candidate, bench.series, noises, point)
+        found.append(_scanned(now, bench, units, name, WIDE_LEVELS))
+    now = min(found, key=lambda one: one.cost)
+    now = estimated(candidate, bench.series, now.noises, now.point, ROUNDS)
+    return _scanned(now, bench, units, name, NEAR_LEVELS)
+
+
+def _scanned(
+    now: Estimate,
+    bench: Bench,
+    units: Mapping[str, float],
+    name: str | None,
+    levels: Sequence[float],
+) -> Estimate:
+    """Return an estimate with the level of one drift that foresees best, its parameters held."""
+    if name is None:
+        return now
+    best = now
+    for level in levels:
+        noises = with_levels(now.noises, units, {name: level})
+        tried = looked_at(now.candidate, bench.series, noises, now.point)
+        best = tried if tried.cost < best.cost else best
+    return best
+
+
+def with_levels(noises: Noises, units: Mapping[str, float], levels: Mapping[str, float]) -> Noises:
+    """Return noises with some drifts at levels, in their units."""
+    sizes = {name: level * units[name] for name, level in levels.items()}
+    return dataclasses.replace(noises, drifts={**noises.drifts, **sizes})

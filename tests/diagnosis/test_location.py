@@ -1,0 +1,70 @@
+"""What is missing is found where it is: sensors are not taken for torques, accepted places lead."""
+
+from __future__ import annotations
+
+import pytest
+
+from diagnosis.bench import Bench
+from diagnosis.estimation import Estimate
+from diagnosis.freedom import freed
+from diagnosis.layers import drift, fitting
+from diagnosis.level import recalibrated, units_of
+from diagnosis.location import acting, led_by
+from diagnosis.locus import Locus, locus_of
+from diagnosis.place_sentence import NOTHING, place_sentence
+from diagnosis.prediction import noises_of
+from diagnosis.series import Series
+from tests.diagnosis.test_estimation import FRICTION, TRUTH, bench, recorded
+
+__all__ = ["bench"]
+
+
+def with_effect(bench: Bench, effect: str, own: dict[str, float]) -> Bench:
+    layers = {layer.id: layer for e in bench.effects for layer in fitting(bench.document, e)}
+    truth = bench.candidate((layers[effect],))
+    series: tuple[Series, ...] = recorded(truth, {**TRUTH, **own})
+    return Bench(
+        bench.document, bench.project, bench.automaton, (), series, bench.seen, bench.drifts
+    )
+
+
+def based(bench: Bench) -> Estimate:
+    candidate = bench.candidate(())
+    units = units_of(candidate, bench.series, noises_of(bench.series, {}), {})
+    return recalibrated(candidate, bench.series, units)
+
+
+def test_a_sensor_is_not_taken_for_a_torque(bench: Bench) -> None:
+    hidden = with_effect(bench, "sensor_lag@w_s", {"tau_w_s": 0.03})
+    base = based(hidden)
+    sensor = freed(hidden, base, drift("output", "w_s"))
+    assert sensor.cost < freed(hidden, base, hidden.drifts[0]).cost - 100.0
+
+
+def test_a_friction_is_no_sensor_and_told_with_its_size_and_what_it_goes_with(
+    bench: Bench,
+) -> None:
+    hidden = with_effect(bench, "coulomb_friction@w_em", FRICTION)
+    base, layer = based(hidden), hidden.drifts[0]
+    free = freed(hidden, base, layer)
+    assert free.cost < freed(hidden, base, drift("output", "w_s")).cost - 100.0
+    locus = locus_of(hidden, "flow", layer, free)
+    assert locus.rms == pytest.approx(FRICTION["T_c_w_em"], rel=0.4)
+    told = place_sentence(led_by([locus], ["flow.w_em"], hidden), hidden)
+    assert told.startswith("missing in the balance of w_em: ")
+    assert "N*m rms" in told
+    assert "% of what accelerates it" in told
+    assert "along with the sign of w_" in told or "along with the recording" in told
+
+
+def test_the_place_of_an_accepted_effect_leads_with_what_its_balance_shows(bench: Bench) -> None:
+    loci = [Locus("elements", "half_shaft", 90.0, 8.0), Locus("flow", "w_em", 80.0, 2.0)]
+    led = led_by(loci, ["inputs.T_em"], bench)
+    assert [one.path for one in led] == ["inputs.T_em", "elements.half_shaft", "flow.w_em"]
+    assert (led[0].rms, led[0].gain, led[0].named) == (2.0, 80.0, True)
+    assert acting(bench, "elements", "vehicle") == "flow.w_w"
+    assert acting(bench, "elements", "half_shaft") == "elements.half_shaft"
+
+
+def test_nothing_is_told_where_no_place_gains(bench: Bench) -> None:
+    assert place_sentence([Locus("flow", "w_em", -3.0, 0.1)], bench) == NOTHING
