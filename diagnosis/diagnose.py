@@ -27,10 +27,11 @@ from diagnosis.place_sentence import place_sentence
 from diagnosis.prediction import noises_of
 from diagnosis.search import Tell, Tried
 from diagnosis.selection import THRESHOLD, Selection, selected
-from diagnosis.series import Series, series_of, thinned
+from diagnosis.series import Series, series_of, shows_inputs, thinned
 from diagnosis.simulation import misfits
 from diagnosis.verdict import Misfit, Named, Ranked, Says, Verdict
-from engine.recording import read_recording
+from engine.recorded_part import file_of
+from engine.recording import pieces, read_recording
 from language.document import Document
 from language.effect import Effect
 from language.experiment import RecordingMap
@@ -76,7 +77,7 @@ def diagnose(case: Case, tell: Tell = lambda text: None) -> Diagnosis:
     seen = compared(case.mapping, automaton)
     if not seen:
         raise ValueError(f"map `{case.mapping.name}` compares no output of `{automaton.name}`")
-    series = [read_series(path, case, automaton, seen) for path in case.train]
+    series = [one for path in case.train for one in read_series(path, case, automaton, seen)]
     bench, base = recalibrated_base(case, automaton, series, seen, tell)
     units = units_of(base.candidate, bench.series, base.noises, base.values(0))
     loci = located(bench, base)
@@ -89,10 +90,9 @@ def diagnose(case: Case, tell: Tell = lambda text: None) -> Diagnosis:
     hashes = {path.name: _digest(path) for path in case.train}
     verdict = dataclasses.replace(verdict, inputs=hashes, messages=(place_sentence(loci, bench),))
     held = tuple(
-        dataclasses.replace(
-            read_series(path, case, automaton, seen), is_linear=bench.series[0].is_linear
-        )
+        dataclasses.replace(one, is_linear=bench.series[0].is_linear)
         for path in case.held_out
+        for one in read_series(path, case, automaton, seen)
     )
     if held:
         tell("held out: " + ", ".join(f"{path.name} {_digest(path)}" for path in case.held_out))
@@ -107,8 +107,13 @@ def compared(mapping: RecordingMap, automaton: Automaton) -> tuple[str, ...]:
     return tuple(name for name in automaton.outputs if name in wanted)
 
 
-def read_series(path: Path, case: Case, automaton: Automaton, seen: Sequence[str]) -> Series:
-    """Return a recording of a case on its grid. Raises SpecError, ValueError, ToolMissing."""
+def read_series(
+    path: Path, case: Case, automaton: Automaton, seen: Sequence[str]
+) -> tuple[Series, ...]:
+    """Return a recording of a case on its grid, a series for each window that is used of it.
+
+    Raises SpecError, ValueError, ToolMissing.
+    """
     used = [
         column.name
         for column in case.mapping.columns.values()
@@ -121,8 +126,9 @@ def read_series(path: Path, case: Case, automaton: Automaton, seen: Sequence[str
         for name, thing in automaton.inputs.items()
         if thing.default is not None
     }
-    found = series_of(recording, list(automaton.inputs), seen, {**declared, **constants})
-    return thinned(found)
+    known = {**declared, **constants}
+    found = [series_of(piece, list(automaton.inputs), seen, known) for piece in pieces(recording)]
+    return tuple(found if shows_inputs(automaton, seen) else map(thinned, found))
 
 
 def recalibrated_base(
@@ -209,4 +215,4 @@ def _confirmed(verdict: Verdict, selection: Selection, held: tuple[Series, ...])
 
 
 def _digest(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()[:16]
+    return hashlib.sha256(file_of(path).read_bytes()).hexdigest()[:16]

@@ -13,6 +13,7 @@ from diagnosis.diagnose import Case, Diagnosis
 from diagnosis.finding import Finding, told
 from diagnosis.recording_check import RecordingCheck
 from diagnosis.verdict import Verdict
+from engine.recorded_part import file_of
 from language.model import Automaton
 
 
@@ -84,4 +85,6 @@ def undecided(check: RecordingCheck, train: Mapping[str, str], runtime_s: float)
 
 def hashes(files: tuple[Path, ...]) -> dict[str, str]:
     """Return the first 16 hexadecimal digits of SHA-256 of each file, by name."""
-    return {path.name: hashlib.sha256(path.read_bytes()).hexdigest()[:16] for path in files}
+    return {
+        path.name: hashlib.sha256(file_of(path).read_bytes()).hexdigest()[:16] for path in files
+    }

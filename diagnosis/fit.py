@@ -99,7 +99,7 @@ def fit(case: Case, parameters: Sequence[str] | None = None, tell: Tell = lambda
     if not seen:
         raise ValueError(f"map `{case.mapping.name}` compares no output of `{automaton.name}`")
     case = dataclasses.replace(case, effects=())
-    series = [read_series(path, case, automaton, seen) for path in case.train]
+    series = [one for path in case.train for one in read_series(path, case, automaton, seen)]
     bench, found = recalibrated_base(case, automaton, series, seen, tell)
     if not found.candidate.uncertain:
         raise ValueError(f"no parameter of `{automaton.name}` has a `range` to be fitted in")

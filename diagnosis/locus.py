@@ -14,6 +14,7 @@ from diagnosis.companion import along
 from diagnosis.estimation import Estimate
 from diagnosis.layers import DRIFT, Layer
 from diagnosis.scale import scale_of
+from diagnosis.series import Series
 
 Reals = NDArray[np.float64]
 LOUD = 2.0
@@ -58,7 +59,7 @@ def locus_of(bench: Bench, section: str, layer: Layer, free: Estimate) -> Locus:
     windows = [
         window
         for one, values in zip(bench.series, drifts, strict=True)
-        for window in _windows(values, size, float(one.period), one.name)
+        for window in _windows(values, size, one)
     ]
     windows.sort(key=lambda window: window[0] - window[1])
     scale = scale_of(bench, section, layer.place, free)
@@ -74,14 +75,14 @@ def locus_of(bench: Bench, section: str, layer: Layer, free: Estimate) -> Locus:
     )
 
 
-def _windows(
-    values: Reals, size: float, period: float, name: str
-) -> list[tuple[float, float, str]]:
+def _windows(values: Reals, size: float, series: Series) -> list[tuple[float, float, str]]:
+    """Return the times [s] of a recording at which a drift is loud."""
+    start, period = float(series.start), float(series.period)
     loud = np.flatnonzero(np.abs(values) > LOUD * size) if size > 0.0 else np.array([], dtype=int)
     if not len(loud):
         return []
     parts = np.split(loud, np.flatnonzero(np.diff(loud) * period > SHORTEST) + 1)
-    return [(float(part[0] * period), float(part[-1] * period), name) for part in parts]
+    return [(start + part[0] * period, start + part[-1] * period, series.name) for part in parts]
 
 
 def _shares(

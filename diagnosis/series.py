@@ -1,7 +1,8 @@
 """Series: a recording on the grid of its fastest channel, for prediction from sample to sample.
 
-Every value keeps its own sample: a channel without one at a sample is NaN there if it is compared,
-and holds its latest value if it is an input. Nothing is interpolated.
+The grid begins where a compared channel has a value. Every value keeps its own sample: a channel
+without one at a sample is NaN there if it is compared; an input holds its latest value, or runs
+straight between its time stamps where the map says `hold: linear`.
 """
 
 from __future__ import annotations
@@ -14,6 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.recording import Channel, Recording
+from language.graph import reachable
+from language.model import Automaton
 
 Reals = NDArray[np.float64]
 PACE = Fraction(5, 1000)
@@ -55,8 +58,8 @@ def series_of(
     fed = {c.column.to: c for c in recording.channels.values() if c.column.to is not None}
     compared = {c.column.compare: c for c in recording.channels.values() if c.column.compare}
     used = [*fed.values(), *(compared[name] for name in seen if name in compared)]
-    start = max(channel.times[0] for channel in used)
     end = min(channel.times[-1] for channel in used)
+    start = _start([compared[name] for name in seen if name in compared], used)
     step = period or min(grid_period(channel.times) for channel in used)
     count = int((end - start) / step) + 1
     if count < 2:
@@ -72,10 +75,21 @@ def series_of(
     )
 
 
+def shows_inputs(automaton: Automaton, seen: Sequence[str]) -> bool:
+    """Tell whether a compared output follows an input at once, with no state in between."""
+    edges: dict[str, set[str]] = {}
+    for mode in automaton.all_modes:
+        for name, formula in mode.equations.items():
+            edges.setdefault(name, set()).update(formula.reads)
+    read = [reachable(edges, automaton.source_of(name)) for name in seen]
+    return bool(set(automaton.inputs) & set().union(*read))
+
+
 def thinned(series: Series) -> Series:
     """Return a fast recording at a slower pace: inputs are means over it, every n-th value is kept.
 
-    What a driveline does is slower than `PACE`; a fit costs in proportion to the samples.
+    What a driveline does is slower than `PACE`; a fit costs in proportion to the samples. Not for
+    outputs that show an input at once: what is shown with a mean is not what was measured.
     """
     factor = int(PACE / series.period)
     if factor < 2:
@@ -102,6 +116,13 @@ def grid_period(times: Sequence[Fraction]) -> Fraction:
     return Fraction(usual).limit_denominator(1_000_000)
 
 
+def _start(compared: Sequence[Channel], used: Sequence[Channel]) -> Fraction:
+    """Return the first stamp [s] of the fastest compared channel at which all are known."""
+    common = max(channel.times[0] for channel in used)
+    fastest = min(compared, key=lambda channel: grid_period(channel.times))
+    return next((time for time in fastest.times if time >= common), common)
+
+
 def _places(channel: Channel, start: Fraction, step: Fraction) -> NDArray[np.int64]:
     """The sample that each value of a channel belongs to: the nearest one."""
     times = np.array([float(time - start) for time in channel.times])
@@ -118,7 +139,10 @@ def _held(
 ) -> Reals:
     if channel is None:
         return np.full(count, defaults[name])
-    places, values = _places(channel, start, step), np.array(channel.values, dtype=float)
+    if channel.column.hold == "linear":
+        grid = float(start) + float(step) * np.arange(count)
+        return np.asarray(np.interp(grid, channel.seconds, channel.array), dtype=np.float64)
+    places, values = _places(channel, start, step), channel.array
     latest = np.searchsorted(places, np.arange(count), side="right") - 1
     return values[np.maximum(latest, 0)]
 
@@ -128,5 +152,5 @@ def _placed(channel: Channel | None, start: Fraction, step: Fraction, count: int
     if channel is not None:
         places = _places(channel, start, step)
         inside = (places >= 0) & (places < count)
-        found[places[inside]] = np.array(channel.values, dtype=float)[inside]
+        found[places[inside]] = channel.array[inside]
     return found

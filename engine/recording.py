@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from engine.channel_reader import ChannelReader, require_names
 from engine.recorded_csv import read_csv
 from engine.recorded_file import RecordedFile
+from engine.recorded_part import file_of, windows_of
 from language.experiment import Column, RecordingMap, Window
 from language.problem import Problems
 
@@ -78,6 +79,8 @@ def cut(recording: Recording, window: Window) -> Recording:
 def read_recording(path: Path, mapping: RecordingMap, used: Sequence[str]) -> Recording:
     """Read the used channels of a file: CSV (also gzipped), Parquet, MF4 or a log of CAN frames.
 
+    `run.csv@0..12.5` is the part of a file from 0 s to 12.5 s.
+
     Raises SpecError with all problems, ToolMissing.
     """
     problems = Problems()
@@ -99,12 +102,14 @@ def read_recording(path: Path, mapping: RecordingMap, used: Sequence[str]) -> Re
     if file.is_stamped:
         stamps = [t for c in channels.values() for t in (c.times[0], c.times[-1])]
     known = [time for time in stamps if time is not None]
-    windows = mapping.windows_of(path.name)
+    windows = windows_of(path, mapping, problems)
+    problems.stop_if_any()
     return within(Recording(path.name, channels, max(known), min(known), windows), mapping)
 
 
 def open_recorded(path: Path, mapping: RecordingMap, problems: Problems) -> RecordedFile:
     """Return what a file holds, by the ending of its name. Raises SpecError, ToolMissing."""
+    path = file_of(path)
     ending = path.suffix.lower()
     if ending == ".parquet":
         from engine.recorded_parquet import read_parquet

@@ -16,6 +16,7 @@ from diagnosis.layers import effects_in
 from diagnosis.library import library
 from diagnosis.variant import needed, variant_text
 from diagnosis.wording import summary
+from engine.recorded_part import overlap
 from language.effect import Effect
 from language.load import automaton_of
 from language.model import Automaton
@@ -106,9 +107,8 @@ def _require_apart(train: Sequence[str | Path], held_out: Sequence[str | Path]) 
     for name in names:
         if names.count(name) > 1:
             raise ValueError(f"two recordings to learn from are called `{name}`: rename one")
-    learnt = {Path(file).resolve() for file in train}
     for file in held_out:
-        if Path(file).resolve() in learnt:
+        if any(overlap(Path(file), Path(learnt)) for learnt in train):
             raise ValueError(f"{file} is learnt from: it cannot be held out")
 
 

@@ -1,0 +1,95 @@
+"""Series: how a recording is laid on a grid, and which are thinned."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from diagnosis.candidate import candidate
+from diagnosis.diagnose import Case, read_series
+from diagnosis.series import shows_inputs
+from engine.recorded_part import overlap
+from language.load import automaton_of
+from language.map import read_map
+from language.model import Automaton
+from language.problem import SpecError
+from language.project import Project, expanded, read_document
+
+PROJECT = Project(Path())
+
+
+def case_of(spec: str) -> tuple[Case, Automaton]:
+    document = read_document(PROJECT.path_of(spec))
+    automaton = automaton_of(document, PROJECT)
+    assert automaton.recording_map
+    mapping = read_map(read_document(PROJECT.path_of(automaton.recording_map.text)), PROJECT)
+    return Case(expanded(document, PROJECT), PROJECT, mapping, ()), automaton
+
+
+def leaf_like(path: Path) -> Path:
+    """Motor speed rises by 1 rpm in 10 ms; wheel frames every 20 ms, 4 ms behind, 0.1 km/h up."""
+    rows = ["t_s,em_torque_Nm,em_speed_rpm,wheel_a_kmh,wheel_b_kmh,t_wheel_s"]
+    for k in range(100):
+        wheel = f"{0.1 * k:.1f},{0.1 * k:.1f},{0.01 * k + 0.004:.3f}" if k % 2 else ",,"
+        rows.append(f"{0.01 * k:.2f},{k % 7},{k},{wheel}")
+    path.write_text("\n".join(rows), "utf-8")
+    return path
+
+
+def test_a_grid_begins_with_a_compared_value_and_linear_inputs_run_between_stamps(
+    tmp_path: Path,
+) -> None:
+    case, automaton = case_of("leaf_motor_side")
+    (one,) = read_series(leaf_like(tmp_path / "drive.csv"), case, automaton, ("w_em",))
+    assert one.start == Fraction(2, 100)
+    rpm = one.measured[:, 0] * 30.0 / np.pi
+    assert rpm == pytest.approx(np.arange(2.0, 2.0 + one.count))
+    assert one.inputs[:, 0] == pytest.approx(np.arange(2, 2 + one.count) % 7)
+    wheel = 0.1 * (np.arange(2, 2 + one.count) - 0.4)
+    assert one.inputs[:, 1] * 3.6 == pytest.approx(wheel)
+
+
+def test_a_part_of_a_file_is_cut_out_of_it(tmp_path: Path) -> None:
+    case, automaton = case_of("leaf_motor_side")
+    path = leaf_like(tmp_path / "drive.csv")
+    whole, late = (
+        read_series(file, case, automaton, ("w_em",))[0]
+        for file in (path, path.with_name("drive.csv@0.5..0.8"))
+    )
+    assert (float(late.start), late.count) == (0.52, 28)
+    assert late.name == "drive.csv@0.5..0.8"
+    assert np.array_equal(late.measured, whole.measured[50:78])
+    with pytest.raises(SpecError):
+        read_series(path.with_name("drive.csv@5..8"), case, automaton, ("w_em",))
+
+
+def test_parts_of_one_file_are_apart_unless_they_have_a_time_in_common() -> None:
+    file = Path("run.csv")
+    assert not overlap(Path("run.csv@0..2"), Path("run.csv@2..4"))
+    assert overlap(Path("run.csv@0..2.5"), Path("run.csv@2..4"))
+    assert overlap(file, Path("run.csv@2..4"))
+    assert not overlap(file, Path("other.csv"))
+
+
+def test_only_outputs_that_show_an_input_at_once_keep_a_recording_from_being_thinned() -> None:
+    assert shows_inputs(case_of("emps")[1], ("F_m",))
+    assert shows_inputs(case_of("brfd_damper")[1], ("F",))
+    assert not shows_inputs(case_of("blind_driveline")[1], ("w_em", "w_s"))
+    assert not shows_inputs(case_of("leaf_motor_side")[1], ("w_em",))
+
+
+def test_what_is_shown_follows_from_the_input_of_its_own_sample() -> None:
+    case, _ = case_of("emps")
+    one = candidate(case.document, PROJECT, (), (), ("F_m",), Fraction(1, 1000))
+    ramp = 1e-3 * np.arange(50.0).reshape(-1, 1) ** 2
+    nothing = np.zeros((1, 2, 1))
+    blank, substeps = np.full((50, 1), np.nan), one.recipe.substeps
+    page = np.array(list(one.predictor.page.values()))
+    found = one.predictor.predict(page, ramp, blank, nothing[:0], nothing, substeps, linear=True)
+    q, v = found.states.T
+    force = 35.1507 * (160.18 * 243.45 * (ramp[:, 0] - q) - 243.45 * v)
+    assert found.seen[:, 0] == pytest.approx(force, rel=1e-12)
+    assert np.all(np.abs(force[10:]) > 100.0)
