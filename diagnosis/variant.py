@@ -25,9 +25,9 @@ UNCHANGED = 1e-6
 """Relative change below which a parameter is not written down."""
 
 
-def variant_name(base: str) -> str:
-    """Return the name of the variant of a base."""
-    return base[: LONGEST_NAME - len(ENDING)] + ENDING
+def variant_name(base: str, ending: str = ENDING) -> str:
+    """Return the name of the variant of a base, or of what goes with it."""
+    return base[: LONGEST_NAME - len(ending)] + ending
 
 
 def variant_text(dossier: Dossier, extends: str) -> str:

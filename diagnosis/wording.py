@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from diagnosis.digits import quantity_text
 from diagnosis.dossier import Dossier
 from diagnosis.finding import told
 from diagnosis.layers import Layer
@@ -52,8 +53,7 @@ def _with_values(one: Named) -> str:
 
 def quantity(one: Quantity) -> str:
     """Return a value with its standard deviation and unit."""
-    unit = "" if one.unit == "1" else f" {one.unit}"
-    return f"{one.value:.4g} ± {rounded(one.std)}{unit}"
+    return quantity_text(one)
 
 
 def rounded(value: float) -> str:

@@ -6,30 +6,29 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from diagnosis.estimation import Estimate
 from diagnosis.series import Series
 from diagnosis.simulation import FREE, OBSERVED, free, is_free
-from engine.band import PALETTE
-from engine.plot import Picture
-from language.text import visible
 
 Reals = NDArray[np.float64]
-BLUE, RED, *_ = PALETTE
 
 
 @dataclass(frozen=True)
 class WorstWindow:
-    """A window of a recording: times [s] (n,), `measured`, `before`, `after` (n, seen) in SI.
+    """A window of a recording: times [s] (n,), `inputs` (n, fed), and `measured`, `before`, `after`
+    (n, seen) in SI.
 
-    The model is alone from `alone` [s] on. `units` are those of the signals.
+    The model is alone from `alone` [s] on. `units` are those of the signals; `words` say which
+    recordings it is the worst of.
     """
 
     recording: str
+    words: str
     alone: float
     times: Reals
+    inputs: Reals
     measured: Reals
     before: Reals
     after: Reals
@@ -63,8 +62,11 @@ def by_recording(runs: FreeRuns) -> list[tuple[str, Reals, Reals]]:
     return found
 
 
-def worst_window(runs: FreeRuns, units: Sequence[str]) -> WorstWindow:
-    """Return the window in which the base, alone, misses most: squares over those of a signal."""
+def worst_window(runs: FreeRuns, units: Sequence[str], which: str) -> WorstWindow:
+    """Return the window in which the base, alone, misses most: squares over those of a signal.
+
+    `which` says in words which recordings these are.
+    """
     series, before, after = runs.series, runs.before, runs.after
     spread = np.nanstd(np.concatenate([one.measured for one in series]), axis=0)
     scale = np.maximum(spread, 1e-12)
@@ -80,10 +82,13 @@ def worst_window(runs: FreeRuns, units: Sequence[str]) -> WorstWindow:
     k, start = place
     one, window = series[k], _window(series[k], start)
     period = float(one.period)
+    times = float(one.start) + np.arange(window.start, window.stop) * period
     return WorstWindow(
         one.name,
+        f"worst window of the {which} recordings: {one.name}, {times[0]:.4g} to {times[-1]:.4g} s",
         float(one.start) + (start + _samples(one, OBSERVED)) * period,
-        float(one.start) + np.arange(window.start, window.stop) * period,
+        times,
+        one.inputs[window],
         one.measured[window],
         before[k][window],
         after[k][window],
@@ -104,40 +109,3 @@ def _starts(series: Series) -> range:
 
 def _window(series: Series, start: int) -> slice:
     return slice(start, min(series.count, start + _samples(series, OBSERVED + FREE)))
-
-
-def window_picture(window: WorstWindow, title: str, is_same: bool) -> Picture:
-    """Return the picture of a window: signals above, what they miss beneath.
-
-    `is_same`: nothing was laid over the base, so that one simulation is all there is.
-    """
-    count = len(window.signals)
-    figure = Figure(figsize=(8.5, 0.8 + 2.2 * count), layout="constrained")
-    rows = figure.subplots(
-        2 * count, 1, sharex=True, squeeze=False, height_ratios=[1.7, 1.0] * count
-    )
-    for k, name in enumerate(window.signals):
-        above, beneath = rows[2 * k][0], rows[2 * k + 1][0]
-        known = np.isfinite(window.measured[:, k])
-        times, measured = window.times[known], window.measured[known, k]
-        above.plot(times, measured, ".", color="black", ms=3, label="recorded")
-        runs = [(window.before, RED, "without the effect", "--")]
-        runs += [(window.after, BLUE, "with the effect", "-")]
-        if is_same:
-            runs = [(window.before, RED, "simulated, recalibrated", "-")]
-        for values, colour, label, style in runs:
-            above.plot(window.times, values[:, k], style, color=colour, lw=1.3, label=label)
-            missed = measured - values[known, k]
-            beneath.plot(times, missed, style, color=colour, lw=1.1)
-        beneath.axhline(0.0, color="black", lw=0.6)
-        unit = window.units[k]
-        above.set_ylabel(visible(f"{name} [{unit}]"), fontsize=9, parse_math=False)
-        beneath.set_ylabel("missed", fontsize=9, parse_math=False)
-        for axis in (above, beneath):
-            axis.grid(alpha=0.3)
-            axis.axvspan(window.times[0], window.alone, color="#999999", alpha=0.15, lw=0)
-    top = rows[0][0]
-    top.legend(loc="best", fontsize=8)
-    top.set_title(visible(title), loc="left", fontsize=11, parse_math=False)
-    rows[-1][0].set_xlabel("time [s]; grey: an observer follows, then the model is alone")
-    return Picture(figure)

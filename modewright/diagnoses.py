@@ -20,7 +20,7 @@ from engine.recorded_part import overlap
 from language.effect import Effect
 from language.load import automaton_of
 from language.model import Automaton
-from language.project import Project, expanded, read_document
+from language.project import Project, expanded, read_document, shown
 from modewright.files import make_folder, write_files
 from modewright.recordings import CheckedRecordings, check_recordings
 
@@ -87,7 +87,10 @@ def save_diagnosis(dossier: Dossier, out: str | Path, spec: str) -> list[Path]:
     folder = Path(out)
     make_folder(folder)
     variant = variant_text(dossier, base_of(dossier, spec, folder))
-    files = {folder / name: data for name, data in report_files(dossier, variant).items()}
+    files = {
+        folder / name: data
+        for name, data in report_files(dossier, variant, Path(shown(folder))).items()
+    }
     write_files(files)
     return list(files)
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import copy
 import dataclasses
+import html
 import json
 import re
+import shlex
 import shutil
 import signal
 import subprocess
@@ -17,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import jsonschema
+import numpy as np
 import pytest
 
 import modewright as mw
@@ -178,8 +181,29 @@ def test_the_variant_is_a_spec_like_any_other(found: Found, tmp_path: Path) -> N
     assert early == pytest.approx(0.1 * slope * (1 - 0.05 * B / J), rel=0.02)
 
 
-def test_the_variant_is_run_where_it_was_written(found: Found) -> None:
-    assert run(found.folder, "check", "found/variant.yaml") == 0
+def test_the_commands_of_the_report_do_what_it_says(
+    found: Found, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = html.unescape((found.folder / "found" / "report.html").read_text("utf-8"))
+    commands = re.findall(r"<dd><code>modewright ([^<]*)</code>", text)
+    assert [command.split()[0] for command in commands] == [
+        "check", "simulate", "generate", "lockstep", "explain",
+    ]  # fmt: skip
+    for command in [*commands, "check found/scenario.yaml"]:
+        assert run(found.folder, *shlex.split(command)) == 0, command
+    assert "equal, bit for bit" in capsys.readouterr().out
+    assert (found.folder / "run.png").exists() and list((found.folder / "build").glob("*.c"))
+
+
+def test_the_worst_window_is_a_table_for_other_tools(found: Found) -> None:
+    table = np.genfromtxt(found.folder / "found" / "window.csv", delimiter=",", names=True)
+    assert table.dtype.names == ("t_s", "T", "w", "w_without", "w_with")
+    alone = table["t_s"] >= table["t_s"][0] + 1.0
+    missed = [np.max(np.abs(table["w"] - table[name])[alone]) for name in ("w_without", "w_with")]
+    text = (found.folder / "found" / "report.html").read_text("utf-8")
+    told = re.search(r"misses w by up to (\S+) rad/s without, (\S+) rad/s with", text)
+    assert told and [float(told[1]), float(told[2])] == pytest.approx(missed, rel=0.06)
+    assert missed[1] < missed[0]
 
 
 def test_a_spec_that_is_a_file_anywhere_is_extended_as_a_file(
@@ -232,7 +256,12 @@ def test_the_report_is_one_page_that_needs_nothing_but_what_lies_beside_it(found
     assert page.open == []
     assert page.references
     assert [name for name in page.references if not (found.folder / "found" / name).exists()] == []
-    assert text.count("<svg") == 3
+    assert text.count("<svg") == text.count('<svg role="img" aria-label="') == 4
+    names = re.findall(r'\bid="([^"]+)"', text)
+    assert len(names) == len(set(names))
+    assert set(re.findall(r"url\(#([^)]+)\)", text)) <= set(names)
+    assert not re.search(r"https?://(?!www\.w3\.org/)", text)
+    assert len(text.encode()) < 1_000_000
     for digest in found.verdict["inputs"].values():
         assert digest in text
     told = re.sub(r"<[^>]+>", " ", text)
@@ -241,7 +270,9 @@ def test_the_report_is_one_page_that_needs_nothing_but_what_lies_beside_it(found
         "confirmed on recordings that were held out",
         "passage through zero speed",
         "coulomb_friction@w",
-        "recording by recording",
+        "Where it improved and where not",
+        "told by its past",
+        "What it changes in the equations (1 line)",
         "Nothing odd was found",
     ):
         assert sentence in told, sentence

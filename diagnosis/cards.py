@@ -1,0 +1,107 @@
+"""Cards: what a reader wants to know first, in four short answers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from diagnosis import wording
+from diagnosis.digits import change, per_cent, probability
+from diagnosis.dossier import Dossier
+from diagnosis.finding import told
+from diagnosis.search import Tried
+from diagnosis.selection import Selection
+
+MOST_LINES = 4
+
+
+@dataclass(frozen=True)
+class Card:
+    """A question and its answer, line by line."""
+
+    title: str
+    lines: tuple[str, ...]
+
+
+def cards_of(dossier: Dossier) -> list[Card]:
+    """Return the answers: where, how sure, how much better, what to keep in mind."""
+    if dossier.diagnosis is None:
+        return []
+    selection = dossier.diagnosis.selection
+    cards = [_where(dossier), _sure(dossier, selection), _better(dossier), _doubt(dossier)]
+    return [card for card in cards if card.lines]
+
+
+def _where(dossier: Dossier) -> Card:
+    verdict = dossier.verdict
+    named = verdict.effects or verdict.ambiguous_with
+    lines = [wording.effect_at(one) for one in named]
+    if not lines and verdict.verdict == "unknown":
+        lines = [f"most at {one.path}" for one in verdict.location[:1] if one.gain > 0.0]
+    if not lines:
+        lines = ["nowhere: no place asks for more than the model has"]
+    return Card("Where", tuple(dict.fromkeys(lines)))
+
+
+def _sure(dossier: Dossier, selection: Selection) -> Card:
+    verdict = dossier.verdict
+    count = sum(one.evidence is not None for one in selection.first_round)
+    lines = []
+    if verdict.verdict in ("effect", "ambiguous"):
+        shares = selection.probabilities()
+        first = shares.get(selection.accepted[0].layer.id, 0.0) if selection.accepted else 0.0
+        words = f"{probability(first)} probable among {count} candidates fitted"
+        lines = [words, *(_gain(one) for one in selection.accepted)]
+        lines.append(f"{dossier.case.threshold:g} nats are needed")
+    else:
+        best = max(
+            (one for one in selection.first_round if one.evidence),
+            key=lambda one: one.evidence.least if one.evidence else 0.0,
+            default=None,
+        )
+        lines.append(f"{len(selection.first_round)} candidates looked at, {count} fitted")
+        if best is not None:
+            lines += [f"best: {_gain(best)}", f"{dossier.case.threshold:g} nats are needed in both"]
+    confirmed = {
+        True: "confirmed on recordings that were held out",
+        False: "not confirmed on recordings that were held out",
+        None: "",
+    }[verdict.confirmed]
+    return Card("How sure", (*lines, confirmed) if confirmed else tuple(lines))
+
+
+def _gain(tried: Tried) -> str:
+    assert tried.evidence
+    known = tried.evidence
+    return f"{tried.layer.id}: {known.train:.0f} nats in training, {known.left_out:.0f} left out"
+
+
+def _better(dossier: Dossier) -> Card:
+    fit = dossier.verdict.fit
+    part = "held_out" if fit.get("held_out") else "train"
+    lines = []
+    has_model = bool(dossier.diagnosis and dossier.diagnosis.selection.accepted)
+    for name, one in fit.get(part, {}).items():
+        before, after = per_cent(one.nrmse_before), per_cent(one.nrmse_after)
+        if has_model:
+            moved = change(one.nrmse_before, one.nrmse_after)
+            lines.append(f"{name}: {before} \N{RIGHTWARDS ARROW} {after} ({moved})")
+        else:
+            lines.append(f"{name}: {before}")
+    title = "How much better" if has_model else "How well it fits"
+    words = "held-out" if part == "held_out" else "training"
+    return Card(title, (f"misfit of free simulation, {words} recordings", *lines))
+
+
+def _doubt(dossier: Dossier) -> Card:
+    verdict = dossier.verdict
+    lines = []
+    if verdict.verdict == "effect":
+        rivals = [wording.effect_at(one) for one in verdict.ambiguous_with]
+        lines.append(f"nearly as good: {', '.join(rivals)}" if rivals else "no rival comes close")
+    findings = [text for severity, text in told(dossier.findings) if severity != "note"]
+    lines += [findings[0].replace("`", "")] if findings else ["nothing odd in the recordings"]
+    lacking = sum(not one.is_testable for one in dossier.check.excitation.effects)
+    if lacking:
+        whole = len(dossier.check.excitation.effects)
+        lines.append(f"{lacking} of {whole} effects are hardly testable with these recordings")
+    return Card("Keep in mind", tuple(lines[:MOST_LINES]))

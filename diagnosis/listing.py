@@ -1,0 +1,264 @@
+"""Listing: the tables of a report, as texts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from diagnosis import wording
+from diagnosis.digits import change, per_cent, probability, significant, with_spread
+from diagnosis.dossier import Dossier
+from diagnosis.fit import note_of
+from diagnosis.location import Locus
+from diagnosis.naming import quantities_of
+from diagnosis.search import Tried
+from diagnosis.selection import Selection
+from diagnosis.whiteness import Whiteness
+from diagnosis.worst_window import FreeRuns, by_recording
+from language.document import Scalar, Table
+
+MOST_WINDOWS = 6
+SAME = 0.02
+"""Part of a misfit below which a change is none."""
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A misfit without and with what was found, what has changed, and whether to the `better`."""
+
+    before: str
+    after: str
+    change: str
+    trend: str
+
+
+@dataclass(frozen=True)
+class FitRow:
+    """Misfits of one recording, or of a whole set, signal by signal."""
+
+    name: str
+    words: str
+    cells: tuple[Cell, ...]
+    is_sum: bool = False
+
+
+def fit_rows(dossier: Dossier, words: str, part: str, runs: FreeRuns) -> list[FitRow]:
+    """Return the misfits [SI] of each recording of a set, then those of all over their spread."""
+    rows = []
+    for name, before, after in by_recording(runs):
+        pairs = zip(before, after, strict=True)
+        cells = tuple(_cell(float(a), float(b), significant) for a, b in pairs)
+        rows.append(FitRow(name, words, cells))
+    whole = dossier.verdict.fit.get(part, {})
+    sums = tuple(_cell(one.nrmse_before, one.nrmse_after, per_cent) for one in whole.values())
+    return [*rows, FitRow("all together, over the spread of the signal", words, sums, True)]
+
+
+def _cell(before: float, after: float, text: Callable[[float], str]) -> Cell:
+    part = after / before - 1.0 if before > 0.0 else 0.0
+    trend = "same" if abs(part) < SAME else "better" if part < 0.0 else "worse"
+    return Cell(text(before), text(after), change(before, after), trend)
+
+
+@dataclass(frozen=True)
+class CandidateRow:
+    """A candidate: `bar` is its gain as a part of the largest, in per cent."""
+
+    effect: str
+    place: str
+    train: str
+    left_out: str
+    probability: str
+    bar: float
+    reason: str
+    is_accepted: bool
+
+
+def candidate_rows(dossier: Dossier, selection: Selection) -> list[CandidateRow]:
+    """Return those that were fitted: what was accepted first, then by rank."""
+    ids = {one.layer.id for one in selection.accepted}
+    first = [one for one in selection.first_round if one.layer.id not in ids]
+    listed = [one for one in (*selection.accepted, *first) if one.evidence]
+    most = max([one.evidence.train for one in listed if one.evidence] + [1.0])
+    shares = selection.probabilities()
+    return [_row(dossier, selection, one, k, most, shares) for k, one in enumerate(listed)]
+
+
+def _row(
+    dossier: Dossier,
+    selection: Selection,
+    tried: Tried,
+    rank: int,
+    most: float,
+    shares: Mapping[str, float],
+) -> CandidateRow:
+    assert tried.evidence
+    known, share = tried.evidence, shares.get(tried.layer.id)
+    effect, _, place = wording.title(tried.layer, dossier).partition("@")
+    return CandidateRow(
+        effect,
+        place,
+        f"{known.train:.0f}",
+        f"{known.left_out:.0f}",
+        "" if share is None else probability(share),
+        100.0 * max(known.train, 0.0) / most,
+        wording.reason(tried, rank, selection, dossier.case.threshold),
+        tried.layer.id in {one.layer.id for one in selection.accepted},
+    )
+
+
+def unfitted(dossier: Dossier, selection: Selection) -> list[tuple[str, list[str]]]:
+    """Return why the other candidates were not fitted, each reason with their names."""
+    found: dict[str, list[str]] = {}
+    ids = {one.layer.id for one in selection.accepted}
+    for tried in selection.first_round:
+        if not tried.evidence and tried.layer.id not in ids:
+            why = wording.reason(tried, 0, selection, dossier.case.threshold)
+            found.setdefault(why, []).append(wording.title(tried.layer, dossier))
+    return list(found.items())
+
+
+@dataclass(frozen=True)
+class ParameterRow:
+    """A parameter: what it is, its values as texts, and how far it is from what was declared."""
+
+    name: str
+    about: str
+    unit: str
+    declared: str
+    before: str
+    after: str
+    change: str
+    note: str
+
+
+def parameter_rows(dossier: Dossier, selection: Selection) -> list[ParameterRow]:
+    """Return each fitted parameter: declared, recalibrated, and with what was found."""
+    before, after = quantities_of(selection.base), quantities_of(selection.model)
+    coordinates = {one.name: one for one in selection.model.candidate.uncertain}
+    rows = []
+    for name, now in after.items():
+        declared = dossier.automaton.parameters.get(name)
+        value = None if declared is None or declared.value is None else float(declared.value)
+        rows.append(
+            ParameterRow(
+                name,
+                about_of(dossier, "parameters", name),
+                "" if now.unit == "1" else now.unit,
+                "new" if value is None else f"{value:.5g}",
+                with_spread(before[name].value, before[name].std) if name in before else "",
+                with_spread(now.value, now.std),
+                "" if value is None else _moved(value, now.value),
+                note_of(now, coordinates[name]),
+            )
+        )
+    return rows
+
+
+def _moved(declared: float, now: float) -> str:
+    return change(declared, now) if declared > 0.0 else ""
+
+
+def about_of(dossier: Dossier, section: str, name: str) -> str:
+    """Return what the spec says a parameter, input or state is; empty where it says nothing."""
+    table = dossier.case.document.root.get(section)
+    entry = table.get(name) if isinstance(table, Table) else None
+    return text_of(entry, "about") if isinstance(entry, Table) else ""
+
+
+def text_of(table: Table, key: str) -> str:
+    """Return the text of a key; empty where there is none."""
+    node = table.get(key)
+    return node.text if isinstance(node, Scalar) else ""
+
+
+def place_rows(locus: Locus) -> list[tuple[str, str]]:
+    """Return what is known of what is missing at a place: modes, windows, companions."""
+    modes = sorted(locus.modes.items(), key=lambda pair: -pair[1])
+    shares = [f"{name} {per_cent(share)}" for name, share in modes if share >= 0.005]
+    windows = [f"{file} {start:.2f}-{end:.2f} s" for start, end, file in locus.windows]
+    more = len(windows) - MOST_WINDOWS
+    told = ", ".join(windows[:MOST_WINDOWS]) + (f" and {more} more" if more > 0 else "")
+    along = [f"{name} (correlation {r:.2f})" for name, r in locus.along]
+    rows = [
+        ("strongest in", told),
+        ("by mode", ", ".join(shares)),
+        ("goes along with", ", ".join(along)),
+    ]
+    return [row for row in rows if row[1]]
+
+
+def whiteness_rows(
+    before: Sequence[Whiteness], after: Sequence[Whiteness], units: Sequence[str], is_same: bool
+) -> list[tuple[str, ...]]:
+    """Return a row by signal and model: size, what its past tells, lags outside, chance."""
+    models = [("recalibrated", before)] if is_same else [("without", before), ("with", after)]
+    rows: list[tuple[str, ...]] = []
+    for k, unit in enumerate(units):
+        for words, found in models:
+            one = found[k]
+            chance = "< 0.001" if one.chance < 0.001 else f"{one.chance:.2g}"
+            rows.append(
+                (
+                    one.signal,
+                    words,
+                    f"{significant(one.rms)} {unit}",
+                    per_cent(one.foretold),
+                    f"{one.outside} of {len(one.lags)}",
+                    chance,
+                    one.words,
+                )
+            )
+    return rows
+
+
+def recording_rows(dossier: Dossier) -> list[tuple[str, ...]]:
+    """Return name, length, rate, lost samples and findings of each training recording."""
+    check = dossier.check
+    rows: list[tuple[str, ...]] = []
+    for name in dict.fromkeys(one.recording for one in check.channels):
+        channels = [one for one in check.channels if one.recording == name]
+        length = max(one.end for one in channels) - min(one.start for one in channels)
+        rates = sorted({round(one.rate) for one in channels if math.isfinite(one.rate)})
+        lost = max(one.dropped for one in channels)
+        found = [one.severity for one in check.findings if one.recording == name]
+        worst = ", ".join(f"{found.count(s)} {s}" for s in ("error", "warning") if s in found)
+        used = "not used" if name in dossier.left_out else "training"
+        if dossier.diagnosis is None:
+            used = "not used"
+        rate = "-".join(f"{rate}" for rate in (rates[:1] + rates[1:][-1:]))
+        rows.append(
+            (
+                name,
+                used,
+                f"{length:.1f} s",
+                f"{rate} Hz",
+                per_cent(lost) if lost else "none",
+                worst or "none",
+            )
+        )
+    return rows
+
+
+def untestable(dossier: Dossier) -> list[tuple[str, str]]:
+    """Return what recordings would have to show, and the effects that ask for it."""
+    lacking: dict[str, list[str]] = {}
+    for one in dossier.check.excitation.effects:
+        if one.lacking:
+            lacking.setdefault(" and ".join(one.lacking), []).append(one.effect)
+    return [(needs, ", ".join(names)) for needs, names in lacking.items()]
+
+
+def fixed(dossier: Dossier) -> list[str]:
+    """Return the parameters that have no range, with their values: they were taken as exact."""
+    return [
+        f"{name} = {float(one.value):.5g}"
+        for name, one in dossier.automaton.parameters.items()
+        if one.range is None and one.value is not None and one.type == "real"
+    ]
+
+
+def in_parts(text: str) -> list[tuple[str, bool]]:
+    """Return a sentence in parts, with whether each stood between back quotes."""
+    return [(part, place % 2 == 1) for place, part in enumerate(text.split("`"))]

@@ -1,0 +1,94 @@
+"""Rerun: how to use what was found - the worst window as a scenario, and the commands."""
+
+from __future__ import annotations
+
+import json
+import math
+import shlex
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from diagnosis.dossier import Dossier
+from diagnosis.variant import variant_name
+from diagnosis.worst_window import WorstWindow
+from language.known import unit_text
+
+VARIANT = "variant.yaml"
+WINDOW = "window.csv"
+SCENARIO = "scenario.yaml"
+
+
+def window_table(window: WorstWindow, inputs: Mapping[str, str]) -> str:
+    """Return a window as CSV, in SI: inputs, what was recorded, and both simulations.
+
+    `inputs` are names with units. What was not recorded is blank.
+    """
+    seen = window.signals
+    names = ["t_s", *inputs, *seen]
+    names += [f"{name}_{word}" for word in ("without", "with") for name in seen]
+    parts = (window.times[:, None], window.inputs, window.measured, window.before, window.after)
+    rows = [",".join(_cell(value) for value in row) for row in np.concatenate(parts, axis=1)]
+    return "\n".join([",".join(names), *rows]) + "\n"
+
+
+def _cell(value: float) -> str:
+    return f"{value:.9g}" if math.isfinite(value) else ""
+
+
+def scenario_text(dossier: Dossier, window: WorstWindow) -> str:
+    """Return a scenario that runs the variant through a window, beside whose table it stands.
+
+    Inputs are held from sample to sample: C can be given them like this too.
+    """
+    automaton = dossier.automaton
+    fed = {name: unit_text(one.unit.dimension) for name, one in automaton.inputs.items()}
+    lines = [
+        "language: 1",
+        f"scenario: {variant_name(dossier.name, '_window')}",
+        f"of: {VARIANT}",
+        f"about: {json.dumps(window.words, ensure_ascii=False)}",
+        "horizon: recording",
+        "recording:",
+        f"  file: {WINDOW}",
+        "  time: {column: t_s, unit: s}",
+        "  columns:",
+        *(
+            f"    {name}: {{to: {name}, unit: {unit}, hold: previous}}"
+            for name, unit in fed.items()
+        ),
+    ]
+    starts = []
+    for name, unit in zip(window.signals, window.units, strict=True):
+        lines.append(f"    {name}: {{compare: {name}, unit: {unit}, blank: skip}}")
+        if name in automaton.states:
+            starts.append(f"{name}: column({name})")
+    if starts:
+        lines.append(f"initial: {{{', '.join(starts)}}}")
+    return "\n".join(lines) + "\n"
+
+
+def commands(dossier: Dossier, folder: Path) -> list[tuple[str, str]]:
+    """Return what can be done with the variant: words, and the command."""
+    variant, scenario = (shlex.quote(str(folder / name)) for name in (VARIANT, SCENARIO))
+    found = [("look for problems", f"modewright check {variant}")]
+    if dossier.diagnosis is not None:
+        run = f"{variant} -s {scenario}"
+        found += [
+            ("simulate the worst window", f"modewright simulate {run} --plot run.png"),
+            ("print it as C", f"modewright generate {variant} --out build"),
+            ("compare engine and C, bit by bit", f"modewright lockstep {run}"),
+            ("list what differs", f"modewright explain {dossier.name} {variant}"),
+        ]
+    return found
+
+
+def made_by(dossier: Dossier, folder: Path) -> str:
+    """Return the command that makes this report."""
+    words = ["modewright", "diagnose", dossier.name]
+    for path in dossier.case.train:
+        words += ["--train", str(path)]
+    for path in dossier.case.held_out:
+        words += ["--held-out", str(path)]
+    return shlex.join([*words, "--out", str(folder)])
