@@ -10,7 +10,7 @@ from diagnosis import wording
 from diagnosis.digits import change, per_cent, probability, significant, with_spread
 from diagnosis.dossier import Dossier
 from diagnosis.fit import note_of
-from diagnosis.location import Locus
+from diagnosis.locus import Locus
 from diagnosis.naming import quantities_of
 from diagnosis.search import Tried
 from diagnosis.selection import Selection
