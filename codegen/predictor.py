@@ -21,6 +21,10 @@ from codegen.source import c_files
 from language.program import Program, short
 
 Reals = NDArray[np.float64]
+MOST_SAMPLES = 5000
+"""Samples after which a gain that still changes is taken for the steady one."""
+CLOSE = 1e-6
+"""A gain that changes by less from sample to sample, of its largest entry, is steady."""
 LIBRARY_FLAGS = (*FLAGS, "-shared", "-fPIC")
 
 
@@ -85,6 +89,24 @@ class Predictor:
             _at(page), _at(inputs), mode, substeps, _at(states), _at(to), _at(seen)
         )
         return to, seen
+
+    def gains(
+        self, phi: Reals, c: Reals, q: Reals, r: Reals, start: Reals, first: int
+    ) -> tuple[Reals, Reals] | None:
+        """Return the Kalman gains of the `first` samples (first, states, seen) and the steady one.
+
+        Of x(k+1) = phi x(k) + w, y = c x + v with covariance `q` of w, variances `r` (seen,) of v,
+        from a covariance `start`. None where they grow beyond all bounds.
+        """
+        shape = (len(self.states), len(self.seen))
+        firsts, steady = np.empty((first, *shape)), np.empty(shape)
+        covariance = np.ascontiguousarray(start, dtype=np.float64).copy()
+        given = [np.ascontiguousarray(a, dtype=np.float64) for a in (phi, c, q, r)]
+        done = self._library.modewright_gains(
+            *(_at(a) for a in given), _at(covariance), first, MOST_SAMPLES, CLOSE,
+            _at(firsts), _at(steady),
+        )  # fmt: skip
+        return (firsts, steady) if done >= 0 else None
 
     def predict(
         self,
@@ -153,6 +175,11 @@ def _loaded(path: Path) -> Any:
         *(pointer, pointer, pointer),
     ]
     library.modewright_advance.restype = None
+    library.modewright_gains.argtypes = [
+        *(pointer, pointer, pointer, pointer, pointer),
+        *(whole, whole, ctypes.c_double, pointer, pointer),
+    ]
+    library.modewright_gains.restype = whole
     library.modewright_predict.argtypes = [
         *(pointer, pointer, pointer, pointer, whole, pointer),
         *(whole, whole, ctypes.c_int, pointer, pointer, pointer, pointer),

@@ -19,7 +19,7 @@ from diagnosis.bench import Bench, balance_drifts
 from diagnosis.estimation import Estimate, adapted
 from diagnosis.evidence import inflation
 from diagnosis.layers import shipped_effects
-from diagnosis.level import recalibrated, units_of
+from diagnosis.level import first_fit, recalibrated, units_of
 from diagnosis.location import led_by, located
 from diagnosis.locus import Locus
 from diagnosis.naming import named, place_path, quantities_of, verdict_id
@@ -27,7 +27,7 @@ from diagnosis.place_sentence import place_sentence
 from diagnosis.prediction import noises_of
 from diagnosis.search import Tell, Tried
 from diagnosis.selection import THRESHOLD, Selection, selected
-from diagnosis.series import Series, series_of, shows_inputs, thinned
+from diagnosis.series import Series, paced, series_of
 from diagnosis.simulation import misfits
 from diagnosis.verdict import Misfit, Named, Ranked, Says, Verdict
 from engine.recorded_part import file_of
@@ -89,10 +89,11 @@ def diagnose(case: Case, tell: Tell = lambda text: None) -> Diagnosis:
     verdict = _verdict(says, selection, loci, automaton, fit)
     hashes = {path.name: _digest(path) for path in case.train}
     verdict = dataclasses.replace(verdict, inputs=hashes, messages=(place_sentence(loci, bench),))
+    is_linear = bench.series[0].is_linear
     held = tuple(
-        dataclasses.replace(one, is_linear=bench.series[0].is_linear)
+        one
         for path in case.held_out
-        for one in read_series(path, case, automaton, seen)
+        for one in paced(read_series(path, case, automaton, seen), automaton, seen, is_linear)
     )
     if held:
         tell("held out: " + ", ".join(f"{path.name} {_digest(path)}" for path in case.held_out))
@@ -127,8 +128,9 @@ def read_series(
         if thing.default is not None
     }
     known = {**declared, **constants}
-    found = [series_of(piece, list(automaton.inputs), seen, known) for piece in pieces(recording)]
-    return tuple(found if shows_inputs(automaton, seen) else map(thinned, found))
+    return tuple(
+        series_of(piece, list(automaton.inputs), seen, known) for piece in pieces(recording)
+    )
 
 
 def recalibrated_base(
@@ -140,12 +142,13 @@ def recalibrated_base(
     drifts = balance_drifts(case.document, automaton)
     found = []
     for is_linear in (False, True):
-        own = tuple(dataclasses.replace(one, is_linear=is_linear) for one in series)
+        own = paced(series, automaton, seen, is_linear)
         bench = Bench(case.document, case.project, automaton, effects, own, seen, drifts)
         candidate = bench.candidate(())
         units = units_of(candidate, own, noises_of(own, {}), {})
-        found.append((bench, recalibrated(candidate, own, units)))
-    bench, base = min(found, key=lambda pair: pair[1].likelihood)
+        found.append((bench, first_fit(candidate, own, units), units))
+    bench, first, units = min(found, key=lambda one: one[1].likelihood)
+    base = recalibrated(first, bench.series, units)
     held = "straight between samples" if bench.series[0].is_linear else "held"
     tell(f"recalibrated, inputs {held}: {base.cost:.0f} nats")
     return bench, base

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from diagnosis.candidate import Candidate
-from diagnosis.normal import Normal, foreseen, normal_of, stepped
+from diagnosis.normal import Columns, Normal, columns_of, normal_of, stepped
 from diagnosis.point import Point, point_of, values_at
 from diagnosis.prediction import Gains, Noises, Outcome, gains_of, predicted
 from diagnosis.series import Series
@@ -24,13 +24,16 @@ ENOUGH = 0.3
 """A round that gains less than this [nats] is the last."""
 FIRST_DAMPING = 1e-3
 LARGEST_DAMPING = 1e5
+TRIED = (0.0, 1.0)
+"""Dampings of the steps that are tried while screening."""
 
 
 @dataclass(frozen=True)
 class Estimate:
     """A candidate at a point: cost [nats] with priors, and how it foresees the recordings.
 
-    `normal` are the normal equations of the last round, None before the first.
+    `normal` are the normal equations of the last round, None before the first, and `columns` what
+    they were made from.
     """
 
     candidate: Candidate
@@ -40,6 +43,7 @@ class Estimate:
     gains: Gains = field(repr=False)
     noises: Noises = field(repr=False)
     normal: Normal | None = field(default=None, repr=False)
+    columns: Columns = field(default_factory=dict, repr=False)
 
     @property
     def likelihood(self) -> float:
@@ -52,27 +56,43 @@ class Estimate:
 
 
 def looked_at(
-    candidate: Candidate, series: Sequence[Series], noises: Noises, point: Point
+    candidate: Candidate,
+    series: Sequence[Series],
+    noises: Noises,
+    point: Point,
+    near: Outcome | None = None,
 ) -> Estimate:
-    """Return a candidate at a point, with gains made where its modes were seen."""
+    """Return a candidate at a point, with gains made where its modes were seen.
+
+    `near` is where they were seen at a point near it, if that is known.
+    """
     values = values_at(candidate, point, 0)
-    gains = gains_of(candidate, series, values, noises)
+    gains = gains_of(candidate, series, values, noises, near)
     outcome = _run(candidate, series, point, gains, noises)
-    if outcome.is_whole:
+    if near is None and outcome.is_whole:
         gains = gains_of(candidate, series, values, noises, outcome)
         outcome = _run(candidate, series, point, gains, noises)
     cost = outcome.cost() + point.prior(candidate)
     return Estimate(candidate, point, cost, outcome, gains, noises)
 
 
-def with_normal(estimate: Estimate, series: Sequence[Series]) -> Estimate:
-    """Return an estimate with the normal equations at its point."""
+def with_normal(
+    estimate: Estimate, series: Sequence[Series], known: Columns | None = None
+) -> Estimate:
+    """Return an estimate with the normal equations at its point.
+
+    `known` are columns of a model near it, which are not looked for again.
+    """
 
     def run(point: Point) -> Outcome:
         return _run(estimate.candidate, series, point, estimate.gains, estimate.noises)
 
-    normal = normal_of(estimate.candidate, estimate.point, estimate.outcome, run)
-    return dataclasses.replace(estimate, normal=normal)
+    candidate, outcome = estimate.candidate, estimate.outcome
+    known = known or {}
+    fresh = [name for name in candidate.names if name not in known]
+    columns = {**known, **columns_of(candidate, estimate.point, outcome, run, fresh)}
+    normal = normal_of(candidate, outcome, columns)
+    return dataclasses.replace(estimate, normal=normal, columns=columns)
 
 
 def estimated(
@@ -91,7 +111,7 @@ def estimated(
         better, damping = _improved(now, series, damping)
         if better is None:
             break
-        renewed = looked_at(candidate, series, noises, better.point)
+        renewed = looked_at(candidate, series, noises, better.point, better.outcome)
         gained = now.cost - better.cost
         now = renewed if renewed.cost < better.cost + ENOUGH else better
         if gained < ENOUGH:
@@ -119,13 +139,20 @@ def adapted(model: Estimate, series: Sequence[Series], rounds: int = 5) -> Estim
     return now
 
 
-def would_reach(estimate: Estimate, series: Sequence[Series]) -> float:
-    """Return the cost [nats] that one full step from an estimate promises."""
+def reached(estimate: Estimate, series: Sequence[Series], known: Columns) -> Estimate:
+    """Return the best of an estimate and of one step from it; `known` are columns near it."""
     if not np.isfinite(estimate.cost):
-        return float(np.inf)
-    known = with_normal(estimate, series)
-    assert known.normal is not None
-    return estimate.cost - foreseen(known.point, known.normal)
+        return estimate
+    start = with_normal(estimate, series, known)
+    assert start.normal is not None
+    best = start
+    for damping in TRIED:
+        point = stepped(start.candidate, start.point, start.normal, damping)
+        outcome = _run(start.candidate, series, point, start.gains, start.noises)
+        cost = outcome.cost() + point.prior(start.candidate)
+        if cost < best.cost:
+            best = dataclasses.replace(start, point=point, cost=cost, outcome=outcome)
+    return best
 
 
 def _improved(

@@ -1,8 +1,4 @@
-"""Gain: the steady Kalman gain of a model that is linearised by differences, mode by mode.
-
-x(k+1) = Phi x(k) + w, y(k) = C x(k) + v, with w of covariance Q and v of R; the gain is that of the
-discrete Riccati equation by structure-preserving doubling (Chu, Fan, Lin 2005).
-"""
+"""Linear: a model near a point, by differences of its compiled self: what its gain is made from."""
 
 from __future__ import annotations
 
@@ -14,10 +10,6 @@ from numpy.typing import NDArray
 from codegen.predictor import Predictor
 
 Reals = NDArray[np.float64]
-DOUBLINGS = 60
-"""Most doublings: 2^60 samples; usually 10 to 20 are needed."""
-CLOSE = 1e-10
-"""Two covariances that differ by less, of their largest entry, are the same."""
 LARGEST = 1e12
 """A difference quotient beyond this is no model any more."""
 SMALLEST = 1e-9
@@ -46,6 +38,23 @@ def linearised(
 
     None where it leaves all bounds within the sample.
     """
+    with np.errstate(invalid="ignore", over="ignore"):
+        ahead, shown, b = _differences(predictor, page, inputs, mode, substeps, at, sizes)
+    if not np.max(np.abs(np.hstack([ahead, b]))) < LARGEST:
+        return None
+    return Linear(ahead, shown @ np.linalg.pinv(ahead), b)
+
+
+def _differences(
+    predictor: Predictor,
+    page: Reals,
+    inputs: Reals,
+    mode: int,
+    substeps: int,
+    at: Reals,
+    sizes: Reals,
+) -> tuple[Reals, Reals, Reals]:
+    """Return how states and what is seen a sample later change with states and inputs."""
     count = len(at)
     ahead, shown = np.empty((count, count)), np.empty((len(predictor.seen), count))
     for column in range(count):
@@ -63,50 +72,4 @@ def linearised(
         high, _ = predictor.advance(page, inputs + step, mode, substeps, at)
         low, _ = predictor.advance(page, inputs - step, mode, substeps, at)
         b[:, column] = (high - low) / (2.0 * step[column])
-    if not np.max(np.abs(np.hstack([ahead, b]))) < LARGEST:
-        return None
-    return Linear(ahead, shown @ np.linalg.pinv(ahead), b)
-
-
-def steady_gain(linear: Linear, q: Reals, r: Reals) -> Reals | None:
-    """Return the gain (states, seen) of process noise `q` and measurement noise `r`.
-
-    None where there is no steady covariance.
-    """
-    phi, c = linear.phi, linear.c
-    a, g, h = phi.T.copy(), c.T @ np.linalg.solve(r, c), q.copy()
-    unit = np.eye(len(phi))
-    for _ in range(DOUBLINGS):
-        try:
-            w = np.linalg.inv(unit + g @ h)
-        except np.linalg.LinAlgError:
-            return None
-        aw = a @ w
-        change = a.T @ h @ w @ a
-        g = g + aw @ g @ a.T
-        a = aw @ a
-        h = h + change
-        h = 0.5 * (h + h.T)
-        if not np.all(np.isfinite(h)):
-            return None
-        if np.max(np.abs(change)) <= CLOSE * np.max(np.abs(h)):
-            break
-    return _gain(h, c, r)
-
-
-def first_gains(linear: Linear, q: Reals, r: Reals, start: Reals, count: int) -> Reals:
-    """Return the gains (count, states, seen) of the first samples, from a covariance `start`."""
-    covariance, found = start, []
-    unit = np.eye(len(start))
-    for _ in range(count):
-        covariance = linear.phi @ covariance @ linear.phi.T + q
-        gain = _gain(covariance, linear.c, r)
-        rest = unit - gain @ linear.c
-        covariance = rest @ covariance @ rest.T + gain @ r @ gain.T
-        found.append(gain)
-    return np.ascontiguousarray(np.array(found).reshape(count, len(start), len(r)))
-
-
-def _gain(covariance: Reals, c: Reals, r: Reals) -> Reals:
-    cross = covariance @ c.T
-    return np.asarray(np.linalg.solve((c @ cross + r).T, cross.T).T, dtype=np.float64)
+    return ahead, shown, b

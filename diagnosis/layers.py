@@ -18,6 +18,7 @@ from language.document import Document
 from language.effect import Effect, Laying, read_effect
 from language.laying import lay_effect
 from language.load import automaton_of, program_of
+from language.memory import applications
 from language.model import Automaton
 from language.place import Misfit, place_of
 from language.problem import Problems, Source, Span
@@ -32,6 +33,8 @@ STABLE_PART = Fraction(1, 2)
 """A step is at most this part of the largest stable one: parameters move while they are fitted."""
 FAR = Fraction(4)
 """How far an effect's parameter may move while it is fitted, as a factor."""
+DELAYED_STEPS = 4
+"""Fewest major steps between two samples of a model with a delay."""
 MOST_STEPS = 40
 """Most major steps between two samples."""
 
@@ -104,14 +107,16 @@ def stepped(
 ) -> tuple[Program, int]:
     """Return the Program in which `names` are tunable, and its steps in a period [s].
 
-    The step is a whole part of the period, at least two: inputs may run straight between samples.
-    It is stable for parameters that effects `brought` at a quarter and at four times their value.
+    The step is a whole part of the period, a short one where there is a delay: none is shorter than
+    a step. It is stable for parameters that effects `brought` at a quarter and at four times their
+    value.
     """
     longest = min(
         _stable(_scaled(given, brought, factor), LONGEST_STEP)
         for factor in (Fraction(1), FAR, 1 / FAR)
     )
-    substeps = min(max(2, -(-period // longest)), MOST_STEPS)
+    fewest = DELAYED_STEPS if applications(given, ("delay",)) else 1
+    substeps = min(max(fewest, -(-period // longest)), MOST_STEPS)
     parameters = {
         name: dataclasses.replace(parameter, kind="tunable") if name in names else parameter
         for name, parameter in given.parameters.items()

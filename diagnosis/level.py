@@ -19,9 +19,11 @@ from diagnosis.series import Series
 
 REACH = 0.2
 LEVELS = (0.0, 0.1, 0.3, 1.0, 3.0)
+"""Standard deviations that a drift may have, in its unit; the last is the most while naming."""
 FIRST_LEVELS = (0.1, 0.3, 1.0)
 """Those from which a base is fitted: a fit with much drift does not find its way to less."""
-"""Standard deviations that a drift may have, in its unit; the last is the most while naming."""
+QUIET = FIRST_LEVELS[0]
+"""That from which a candidate is fitted as well."""
 FREE_LEVELS = (*LEVELS, 10.0, 30.0, 100.0)
 """Those for locating."""
 FAR = 4.0
@@ -63,7 +65,7 @@ def levelled(
             while 0 <= here + direction < len(levels):
                 drifts = {**now.noises.drifts, name: levels[here + direction] * units[name]}
                 noises = dataclasses.replace(now.noises, drifts=drifts)
-                tried = looked_at(now.candidate, series, noises, now.point)
+                tried = looked_at(now.candidate, series, noises, now.point, now.outcome)
                 if not tried.cost < now.cost - ENOUGH:
                     break
                 now, here = tried, here + direction
@@ -88,22 +90,46 @@ def settled(
     return now
 
 
-def recalibrated(
+def fitted(
+    candidate: Candidate,
+    series: Sequence[Series],
+    noises: Noises,
+    start: Mapping[str, float] | Point,
+    units: Mapping[str, float],
+) -> Estimate:
+    """Return the better of two fits: with the drifts that `noises` has, and with next to none.
+
+    What a model explains it has to explain without drifts; a fit with much does not find there.
+    """
+    quiet = {**noises.drifts, **{name: QUIET * unit for name, unit in units.items()}}
+    first = settled(
+        candidate, series, dataclasses.replace(noises, drifts=quiet), start, units, turns=2
+    )
+    if all(noises.drifts.get(name, 0.0) <= quiet[name] for name in units):
+        return first
+    second = settled(candidate, series, noises, start, units, turns=1)
+    return min(first, second, key=lambda one: one.cost)
+
+
+def first_fit(
     candidate: Candidate, series: Sequence[Series], units: Mapping[str, float]
 ) -> Estimate:
-    """Return the base fitted to recordings from where it is declared.
+    """Return the base fitted once to recordings from where it is declared.
 
-    It is fitted twice: how far innovations usually are out, beyond which they count no more, is
-    known after the first time.
+    How far innovations usually are out, beyond which they count no more, is known after it.
     """
-    noises = noises_of(series, units)
-    first = settled(candidate, series, noises, {}, units, turns=1)
+    first = settled(candidate, series, noises_of(series, units), {}, units, turns=1)
     limits = FAR * first.outcome.robust()
+    return dataclasses.replace(first, noises=dataclasses.replace(first.noises, limits=limits))
+
+
+def recalibrated(first: Estimate, series: Sequence[Series], units: Mapping[str, float]) -> Estimate:
+    """Return the base fitted to recordings from a first fit, with drifts from little to much."""
     found = []
     for level in FIRST_LEVELS:
         drifts = {name: level * unit for name, unit in units.items()}
-        known = dataclasses.replace(first.noises, limits=limits, drifts=drifts)
-        found.append(settled(candidate, series, known, first.point, units))
+        known = dataclasses.replace(first.noises, drifts=drifts)
+        found.append(settled(first.candidate, series, known, first.point, units))
     return min(found, key=lambda one: one.cost)
 
 

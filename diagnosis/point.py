@@ -49,6 +49,20 @@ def point_of(candidate: Candidate, recordings: int, start: Mapping[str, float]) 
     return Point(z, np.tile(z, (recordings, 1)))
 
 
+def extended(candidate: Candidate, base: Candidate, at: Point, start: Mapping[str, float]) -> Point:
+    """Return the point of a candidate that stands where a base does `at` a point of its own.
+
+    What the base does not have is at `start` [SI].
+    """
+    point = point_of(candidate, len(at.own), start)
+    names = candidate.names
+    for k, name in enumerate(base.names):
+        if name in names:
+            point.shared[names.index(name)] = at.shared[k]
+            point.own[:, names.index(name)] = at.own[:, k]
+    return point
+
+
 def values_at(candidate: Candidate, point: Point, recording: int) -> dict[str, float]:
     """Return the parameters [SI] of a recording."""
     return {

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from codegen.predictor import Prediction
 from diagnosis.candidate import Candidate
-from diagnosis.gain import Linear, first_gains, linearised, steady_gain
+from diagnosis.gain import Linear, linearised
 from diagnosis.noise import MAD, noise_of
 from diagnosis.series import Series
 
@@ -25,6 +26,8 @@ SHORT_STAY = 5
 """Samples: a mode that is left sooner has the gain of the mode that lasts longest."""
 START_PART = 0.01
 """Standard deviation of a state at the start, as a part of its range."""
+FOLDS = 5
+"""Parts of the recordings that are left out in turn: every fifth block in time of each."""
 SMALL = 1e-5
 """Change of a state for a difference, as a part of its range."""
 MODEL_NOISE = 1e-7
@@ -54,6 +57,15 @@ class Gains:
 
 
 @dataclass(frozen=True)
+class Block:
+    """A part of the innovations of a `recording`, left out with the others of its `fold`."""
+
+    recording: int
+    fold: int
+    part: slice
+
+
+@dataclass(frozen=True)
 class Outcome:
     """Innovations of all recordings behind their burn-in, (samples, seen) each.
 
@@ -64,6 +76,16 @@ class Outcome:
     predictions: tuple[Prediction, ...] = field(repr=False)
     limits: Reals = field(repr=False)
     is_whole: bool = True
+
+    @property
+    def blocks(self) -> list[Block]:
+        """The recordings, each cut into `FOLDS` blocks."""
+        found = []
+        for r, innovation in enumerate(self.innovations):
+            edges = np.linspace(0, len(innovation), FOLDS + 1).astype(int).tolist()
+            parts = [slice(low, high) for low, high in pairwise(edges)]
+            found += [Block(r, (r + k) % FOLDS, part) for k, part in enumerate(parts)]
+        return found
 
     def cost(self) -> float:
         """Return sum over channels of N/2 log(mean square), the negative log likelihood [nats]."""
@@ -150,20 +172,20 @@ def gains_of(
     modes = candidate.predictor.modes
     points = points_of(candidate, series, outcome)
     start = np.diag((START_PART * candidate.spans) ** 2)
-    r = np.diag(noises.seen**2)
     found: dict[int, Reals] = {}
-    first = np.zeros((0, len(start), len(r)))
+    first = np.zeros((0, len(start), len(noises.seen)))
     for mode, (states, inputs) in points.items():
         linear = near(candidate, page, mode, states, inputs)
         if linear is None:
             continue
         q = _process_noise(candidate, linear, noises, period)
-        gain = steady_gain(linear, q, r)
-        if gain is not None:
-            found[mode] = gain
-            if not len(first):
-                first = first_gains(linear, q, r, start, count)
-    nothing = np.zeros((len(start), len(r)))
+        gains = candidate.predictor.gains(
+            linear.phi, linear.c, q, noises.seen**2, start, 0 if found else count
+        )
+        if gains is not None:
+            first = first if found else gains[0]
+            found[mode] = gains[1]
+    nothing = np.zeros((len(start), len(noises.seen)))
     usual = next(iter(found.values()), nothing)
     steady = np.array([found.get(mode, usual) for mode in modes])
     return Gains(first, np.ascontiguousarray(steady))

@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from diagnosis.bench import Bench
 from diagnosis.candidate import Candidate
-from diagnosis.estimation import Estimate, looked_at, would_reach
+from diagnosis.estimation import Estimate, looked_at, reached
 from diagnosis.evidence import Evidence, evidence
 from diagnosis.layers import Layer
-from diagnosis.level import settled
-from diagnosis.point import Point, point_of
+from diagnosis.level import fitted
+from diagnosis.point import extended
 
 FULL_FITS = 10
 """Candidates that are fitted to the end, best foreseen first."""
@@ -45,45 +43,43 @@ def searched(
     tell: Tell = lambda text: None,
 ) -> list[Tried]:
     """Return the candidates that could be laid on the base's layers, best first."""
-    promised: list[tuple[float, Layer, Candidate, Point]] = []
+    promised: list[tuple[float, Layer, Estimate]] = []
     for layer in layers:
         candidate = _possible(bench, base, layer)
         if candidate is not None:
-            reach, point = screened(bench, candidate, base)
-            promised.append((base.cost - reach, layer, candidate, point))
+            start = screened(bench, candidate, base)
+            promised.append((base.cost - start.cost, layer, start))
     promised.sort(key=lambda one: -one[0])
     found = []
-    for place, (gain, layer, candidate, point) in enumerate(promised):
+    for place, (gain, layer, start) in enumerate(promised):
         if place >= FULL_FITS or gain < WORTH:
             found.append(Tried(layer, gain))
             continue
-        estimate = settled(candidate, bench.series, base.noises, point, units, turns=1)
+        estimate = fitted(start.candidate, bench.series, base.noises, start.point, units)
         known = evidence(estimate, base, bench.series)
         tell(f"{layer.id}: train {known.train:.0f}, left out {known.left_out:.0f} nats")
         found.append(Tried(layer, gain, estimate, known))
     return sorted(found, key=lambda one: -one.score)
 
 
-def screened(bench: Bench, candidate: Candidate, base: Estimate) -> tuple[float, Point]:
-    """Return the cost [nats] that a fit of a candidate promises, and the start that promises it."""
-    best, where = np.inf, point_of(candidate, len(bench.series), base.values(0))
+def screened(bench: Bench, candidate: Candidate, base: Estimate) -> Estimate:
+    """Return a candidate one step from the best of its starts, seen from there.
+
+    How the base's parameters act is taken from the base.
+    """
+    found = []
     for start in starts_of(candidate, base.values(0)):
-        point = point_of(candidate, len(bench.series), start)
+        point = extended(candidate, base.candidate, base.point, start)
         here = looked_at(candidate, bench.series, base.noises, point)
-        reach = would_reach(here, bench.series)
-        if reach < best:
-            best, where = reach, point
-    return best, where
+        found.append(reached(here, bench.series, base.columns))
+    return min(found, key=lambda one: one.cost)
 
 
 def starts_of(candidate: Candidate, base: Mapping[str, float]) -> list[dict[str, float]]:
-    """Return where a fit may start: the base's values with each start of the effect's own."""
+    """Return where a fit may start: each start of the parameters that the base does not have."""
     own = [one for one in candidate.uncertain if one.name not in base]
     most = max((len(one.starts) for one in own), default=1)
-    return [
-        {**base, **{one.name: one.starts[min(k, len(one.starts) - 1)] for one in own}}
-        for k in range(most)
-    ]
+    return [{one.name: one.starts[min(k, len(one.starts) - 1)] for one in own} for k in range(most)]
 
 
 def _possible(bench: Bench, base: Estimate, layer: Layer) -> Candidate | None:

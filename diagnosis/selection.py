@@ -20,6 +20,8 @@ PART = 0.05
 never described so well that nothing small is left beside it."""
 NEXT = 9
 """Candidates that are looked at again beside an accepted one: the best of the round before."""
+AGAIN = 15
+"""Candidates that are looked at again where the model itself is found to fit better."""
 SHARED = 0.15
 """The part of what an effect gains that must be left without the recording that gains most."""
 BETTER = 10.0
@@ -74,7 +76,8 @@ def selected(
             tell(f"the model itself fits better: {better.cost:.0f} nats; candidates again")
             model = better
             base = base if accepted else better
-            tried = searched(bench, model, units, layers, tell)
+            promising = [other.layer for other in tried if other.promised > 0.0]
+            tried = searched(bench, model, units, promising[:AGAIN], tell)
         rounds.append(tried)
         layers = [other.layer for other in tried[:NEXT] if other.promised > 0.0]
         enough = (t for t in tried if t.evidence and _is_enough(t.evidence, needed))

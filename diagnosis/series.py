@@ -7,12 +7,14 @@ straight between its time stamps where the map says `hold: linear`.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
 
 from engine.recording import Channel, Recording
 from language.graph import reachable
@@ -85,24 +87,38 @@ def shows_inputs(automaton: Automaton, seen: Sequence[str]) -> bool:
     return bool(set(automaton.inputs) & set().union(*read))
 
 
-def thinned(series: Series) -> Series:
+def paced(
+    series: Sequence[Series], automaton: Automaton, seen: Sequence[str], is_linear: bool
+) -> tuple[Series, ...]:
+    """Return recordings whose inputs are held or run straight, thinned where that loses nothing.
+
+    Where an output shows an input at once it does: what is shown with a mean was never measured.
+    """
+    if shows_inputs(automaton, seen):
+        return tuple(dataclasses.replace(one, is_linear=is_linear) for one in series)
+    return tuple(thinned(one, is_linear) for one in series)
+
+
+def thinned(series: Series, is_linear: bool = False) -> Series:
     """Return a fast recording at a slower pace: inputs are means over it, every n-th value is kept.
 
-    What a driveline does is slower than `PACE`; a fit costs in proportion to the samples. Not for
-    outputs that show an input at once: what is shown with a mean is not what was measured.
+    What a driveline does is slower than `PACE`; a fit costs in proportion to the samples. A held
+    input is the mean of what it is until the next sample, one that `is_linear` of what is around.
     """
-    factor = int(PACE / series.period)
-    if factor < 2:
-        return series
+    factor = max(1, int(PACE / series.period))
     count = series.count // factor
-    whole = series.inputs[: count * factor].reshape(count, factor, -1)
+    inputs = series.inputs[: count * factor]
+    if is_linear and factor > 1:
+        inputs = uniform_filter1d(inputs, factor | 1, axis=0, mode="nearest")[::factor]
+    else:
+        inputs = np.mean(inputs.reshape(count, factor, -1), axis=1)
     return Series(
         series.name,
         series.period * factor,
         series.start,
-        np.ascontiguousarray(np.mean(whole, axis=1)),
+        np.ascontiguousarray(inputs),
         np.ascontiguousarray(series.measured[: count * factor : factor]),
-        False,
+        is_linear,
     )
 
 

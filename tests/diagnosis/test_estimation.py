@@ -12,7 +12,7 @@ from diagnosis.bench import Bench, balance_drifts
 from diagnosis.candidate import Candidate
 from diagnosis.evidence import evidence
 from diagnosis.layers import fitting, shipped_effects
-from diagnosis.level import recalibrated, settled, units_of
+from diagnosis.level import first_fit, recalibrated, settled, units_of
 from diagnosis.prediction import noises_of
 from diagnosis.series import Series, thinned
 from language.load import automaton_of
@@ -73,7 +73,7 @@ def test_a_clean_recording_gives_the_parameters_that_made_it(bench: Bench) -> No
     candidate = bench.candidate(())
     series = recorded(candidate, TRUTH)
     units = units_of(candidate, series, noises_of(series, {}), {})
-    found = recalibrated(candidate, series, units).values(0)
+    found = recalibrated(first_fit(candidate, series, units), series, units).values(0)
     for name, value in TRUTH.items():
         assert found[name] == pytest.approx(value, rel=0.02), name
 
@@ -84,7 +84,7 @@ def test_a_left_out_friction_gains_where_it_is_and_a_lag_does_not(bench: Bench) 
     friction = bench.candidate((layers["coulomb_friction@w_em"],))
     series = recorded(friction, {**TRUTH, **FRICTION})
     units = units_of(base, series, noises_of(series, {}), {})
-    known = recalibrated(base, series, units)
+    known = recalibrated(first_fit(base, series, units), series, units)
     start = {**known.values(0), "T_c_w_em": 0.5}
     better = settled(friction, series, known.noises, start, units, turns=1)
     assert evidence(better, known, series).least > 100.0
@@ -102,4 +102,11 @@ def test_a_fast_recording_is_thinned_to_means_of_its_inputs() -> None:
     assert slow.period == Fraction(1, 200)
     assert list(slow.inputs[:, 0]) == [2.0, 7.0, 12.0, 17.0]
     assert list(slow.measured[:, 0]) == [0.0, 10.0, 20.0, 30.0]
-    assert thinned(slow) is slow
+    assert np.array_equal(thinned(slow).inputs, slow.inputs)
+
+
+def test_an_input_that_runs_straight_is_not_shifted_by_thinning() -> None:
+    ramp = np.arange(40.0).reshape(40, 1)
+    slow = thinned(Series("ramp", Fraction(1, 1000), Fraction(0), ramp, ramp), is_linear=True)
+    assert list(slow.inputs[1:-1, 0]) == list(slow.measured[1:-1, 0])
+    assert slow.is_linear
