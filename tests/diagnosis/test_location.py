@@ -8,7 +8,7 @@ from diagnosis.bench import Bench
 from diagnosis.estimation import Estimate
 from diagnosis.freedom import freed
 from diagnosis.layers import drift, fitting
-from diagnosis.level import recalibrated, units_of
+from diagnosis.level import first_fit, recalibrated, units_of
 from diagnosis.location import acting, led_by
 from diagnosis.locus import Locus, locus_of
 from diagnosis.place_sentence import NOTHING, place_sentence
@@ -31,7 +31,7 @@ def with_effect(bench: Bench, effect: str, own: dict[str, float]) -> Bench:
 def based(bench: Bench) -> Estimate:
     candidate = bench.candidate(())
     units = units_of(candidate, bench.series, noises_of(bench.series, {}), {})
-    return recalibrated(candidate, bench.series, units)
+    return recalibrated(first_fit(candidate, bench.series, units), bench.series, units)
 
 
 def test_a_sensor_is_not_taken_for_a_torque(bench: Bench) -> None:
