@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
 from importlib import metadata, resources
 from typing import Any
 
@@ -11,8 +12,13 @@ import jinja2
 
 def render(template: str, context: Mapping[str, Any]) -> str:
     """Return a template filled in; a hole without a value is an error."""
+    return _environment().get_template(template).render(context)
+
+
+@cache
+def _environment() -> jinja2.Environment:
     folder = resources.files("codegen").joinpath("templates")
-    environment = jinja2.Environment(
+    return jinja2.Environment(
         loader=jinja2.FunctionLoader(lambda name: folder.joinpath(name).read_text("utf-8")),
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
@@ -20,7 +26,6 @@ def render(template: str, context: Mapping[str, Any]) -> str:
         keep_trailing_newline=True,
         autoescape=False,
     )
-    return environment.get_template(template).render(context)
 
 
 def version() -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
@@ -90,20 +91,18 @@ def locals_of(program: Program) -> dict[str, frozenset[str]]:
 
 def _set_once(block: Block) -> set[str]:
     """Work variables assigned exactly once, and read only in the same list of operations."""
-    counts: dict[str, int] = {}
-    for op in walk(block):
-        if isinstance(op, Assign):
-            counts[op.target] = counts.get(op.target, 0) + 1
+    counts = Counter(op.target for op in walk(block) if isinstance(op, Assign))
+    outside = Counter(block_reads(block))
     found: set[str] = set()
     for ops in _lists(block):
-        for position, op in enumerate(ops):
-            if isinstance(op, Assign) and counts[op.target] == 1 and op.target.startswith("work."):
-                after = set(block_reads(ops[position + 1 :]))
-                before = set(block_reads(ops[: position + 1]))
-                outside = sum(1 for name in block_reads(block) if name == op.target)
-                inside = sum(1 for name in block_reads(ops) if name == op.target)
-                if op.target in after and op.target not in before and outside == inside:
-                    found.add(op.target)
+        inside: Counter[str] = Counter()
+        assigned: set[str] = set()
+        for op in ops:
+            fresh = Counter(block_reads((op,)))
+            inside.update(fresh)
+            if isinstance(op, Assign) and counts[op.target] == 1 and not inside[op.target]:
+                assigned.add(op.target)
+        found |= {n for n in assigned if n.startswith("work.") and 0 < inside[n] == outside[n]}
     return found
 
 

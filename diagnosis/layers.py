@@ -14,6 +14,7 @@ from fractions import Fraction
 from importlib import resources
 from pathlib import Path
 
+from language.continuous import step_limits
 from language.document import Document
 from language.effect import Effect, Laying, read_effect
 from language.laying import lay_effect
@@ -126,8 +127,7 @@ def stepped(
 
 
 def _stable(given: Automaton, longest: Fraction) -> Fraction:
-    motion = program_of(given).motion
-    for limit in motion.limits if motion else ():
+    for limit in () if given.is_sampled else step_limits(given):
         stable = Fraction(limit.step).limit_denominator(10**9) if limit.step < 1.0 else Fraction(1)
         longest = min(longest, STABLE_PART * stable)
     return max(longest, Fraction(1, 10**6))

@@ -50,8 +50,10 @@ class _Block:
         self.taken = taken
         self.variables = variables
         self.versions: Counter[str] = Counter()
-        self.counts: Counter[Hashable] = Counter()
-        self.named: dict[Hashable, str] = {}
+        self.counts: Counter[int] = Counter()
+        self.named: dict[int, str] = {}
+        self.numbers: dict[Hashable, int] = {}
+        self.keys: dict[int, int] = {}
         self.result_ops: list[Op] = []
 
     def result(self) -> Block:
@@ -73,12 +75,20 @@ class _Block:
 
     def _pass(self, op: Op) -> None:
         """What an operation writes, in the blocks that it runs too, is another value from here."""
+        self.keys.clear()
         self.versions.update(set(block_writes((op,))))
         for inner in walk((op,)):
             if isinstance(inner, Run):
                 self.versions.update(self.writes[inner.block])
 
-    def _key(self, expr: Expr) -> Hashable:
+    def _key(self, expr: Expr) -> int:
+        """Return the number of a value; that of an expression holds for one operation."""
+        if id(expr) not in self.keys:
+            value = self._parts(expr)
+            self.keys[id(expr)] = self.numbers.setdefault(value, len(self.numbers))
+        return self.keys[id(expr)]
+
+    def _parts(self, expr: Expr) -> Hashable:
         match expr:
             case Value(value):
                 return repr(value)

@@ -27,6 +27,7 @@ from language.field import (
 )
 from language.history import (
     AGE,
+    History,
     alarm_names,
     alarms_of,
     delayed,
@@ -54,7 +55,7 @@ from language.parallel import Selection, parallel_blocks, parallel_step
 from language.parameter import constant_names
 from language.part import parts_block
 from language.problem import Problems
-from language.program import Program, TransitionInfo, Variable, fired_variable
+from language.program import MotionLimit, Program, TransitionInfo, Variable, fired_variable
 from language.region import in_modes
 from language.stepping import (
     BETWEEN,
@@ -107,12 +108,7 @@ def continuous_program(
     parameters = parameter_constants(automaton, problems)
     transitions = transition_infos(automaton, problems)
     histories, alarms = histories_of(automaton), alarms_of(automaton)
-    known = {
-        **constant_names(automaton),
-        **variable_names(automaton, "before"),
-        **in_modes(automaton, "memory.mode"),
-        **delayed(automaton, histories),
-    }
+    known = _known(automaton, histories)
     field = _field(automaton, known, varying, bool(histories))
     flows = field_blocks(field)
     point = Point(automaton, values_of(parameters), {})
@@ -139,6 +135,25 @@ def continuous_program(
     program = dataclasses.replace(program, motion=info, faults=(ZENO, LIVELOCK))
     entries = (*(ENTRIES if not varying else ENTRIES[:2]), *PARTS)
     return finished(program, entries, keep=(*BETWEEN, *_courses(varying)))
+
+
+def step_limits(automaton: Automaton) -> tuple[MotionLimit, ...]:
+    """Return the largest stable step of each mode that has one, whatever the step is."""
+    problems = Problems()
+    histories = histories_of(automaton)
+    field = _field(automaton, _known(automaton, histories), (), bool(histories))
+    point = Point(automaton, values_of(parameter_constants(automaton, problems)), {})
+    place = (automaton.step, automaton.span, problems)
+    return method_of(automaton.method, field, field_blocks(field), point, *place)[1].limits
+
+
+def _known(automaton: Automaton, histories: tuple[History, ...]) -> Names:
+    return {
+        **constant_names(automaton),
+        **variable_names(automaton, "before"),
+        **in_modes(automaton, "memory.mode"),
+        **delayed(automaton, histories),
+    }
 
 
 def _field(
