@@ -58,6 +58,7 @@ verify: setup ## measure every acceptance figure; with recordings: ARGS="--recor
 	$(BIN)/python tests/verify/command_line.py
 	$(BIN)/python tests/verify/studies.py
 	$(BIN)/python tests/verify/fast.py
+	$(BIN)/python tests/verify/variants.py
 
 verify-part: setup ## measure a fixed part of the figures, as CI does
 	$(BIN)/python tests/verify/first_drive.py

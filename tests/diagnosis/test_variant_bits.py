@@ -1,0 +1,28 @@
+"""What a diagnosis writes is a spec: it is checked, runs, and is the same in C, bit for bit.
+
+`make verify` does this for every effect at every place; here are those that need most.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.diagnosis.accepting import layers_of
+from tests.diagnosis.variant_run import variant_run
+from tests.language.making import project_of
+
+TOGETHER = (
+    ("actuator_delay@T_em", "backlash@half_shaft", "sensor_lag@w_s"),
+    ("stiffness_hysteresis@half_shaft", "tyre_slip@vehicle", "torque_ripple@T_em"),
+)
+
+
+@pytest.mark.parametrize("ids", TOGETHER, ids=", ".join)
+def test_a_variant_with_three_effects_is_the_same_in_c(
+    tmp_path: Path, ids: tuple[str, ...]
+) -> None:
+    found = variant_run(tmp_path, layers_of(project_of(tmp_path), ids))
+    assert found.is_whole, found
+    assert found.ticks >= 200
