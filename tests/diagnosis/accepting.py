@@ -79,7 +79,7 @@ def accepted(project: Project, layers: Sequence[Layer]) -> Dossier:
     plain = automaton(base, project, ())
     effects = tuple(named(layer, model, plain) for layer in layers)
     verdict = Verdict(
-        "effect", effects, (), 0.0, (), (), {"train": {}}, {}, None, 1.0, (), {"a.csv": "0" * 16}
+        "effect", effects, (), 1.0, (), (), {"train": {}}, {}, None, 1.0, (), {"a.csv": "0" * 16}
     )
     return Dossier(case, plain, NOTHING, verdict, Diagnosis(verdict, selection, NOTHING, ()))
 
