@@ -115,6 +115,7 @@ def _compiled(
         tuple(layer.named(DRIFT) for layer in drifts),
         tuple(float(made.parameters[layer.named("memory")].value or 1) for layer in drifts),
         _delays(made),
+        tuple(name in brought for name in columns.states),
     )
     with built(program, columns) as library:
         return recipe, library.read_bytes()
@@ -128,11 +129,14 @@ def _delays(made: Automaton) -> tuple[str, ...]:
 
 
 def _with_starts(given: Automaton, seen: Sequence[str]) -> Automaton:
-    """Return an automaton in which each compared state starts at a tunable of its own."""
+    """Return an automaton in which each compared state starts at a tunable of its own.
+
+    Also where an effect shows something else in its place: it starts near it.
+    """
     parameters, states = dict(given.parameters), dict(given.states)
     for output in seen:
-        state = states.get(given.source_of(output))
-        if state is not None and state.name == output:
+        state = states.get(output)
+        if state is not None:
             fresh = START.format(output)
             key, span = f"parameters.{fresh}", state.span
             parameters[fresh] = Parameter(

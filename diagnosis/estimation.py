@@ -24,8 +24,10 @@ ENOUGH = 0.3
 """A round that gains less than this [nats] is the last."""
 FIRST_DAMPING = 1e-3
 LARGEST_DAMPING = 1e5
-TRIED = (0.0, 1.0)
-"""Dampings of the steps that are tried while screening."""
+SCREENED_ROUNDS = 4
+"""Most rounds while candidates are screened."""
+WORTH_A_ROUND = 3.0
+"""A round of screening that gains less [nats] is the last."""
 
 
 @dataclass(frozen=True)
@@ -140,19 +142,17 @@ def adapted(model: Estimate, series: Sequence[Series], rounds: int = 5) -> Estim
 
 
 def reached(estimate: Estimate, series: Sequence[Series], known: Columns) -> Estimate:
-    """Return the best of an estimate and of one step from it; `known` are columns near it."""
-    if not np.isfinite(estimate.cost):
-        return estimate
-    start = with_normal(estimate, series, known)
-    assert start.normal is not None
-    best = start
-    for damping in TRIED:
-        point = stepped(start.candidate, start.point, start.normal, damping)
-        outcome = _run(start.candidate, series, point, start.gains, start.noises)
-        cost = outcome.cost() + point.prior(start.candidate)
-        if cost < best.cost:
-            best = dataclasses.replace(start, point=point, cost=cost, outcome=outcome)
-    return best
+    """Return where some steps lead for which `known` columns of a model near it are good enough."""
+    now, damping = estimate, FIRST_DAMPING
+    for _ in range(SCREENED_ROUNDS if np.isfinite(now.cost) else 0):
+        better, damping = _improved(with_normal(now, series, known), series, damping)
+        if better is None:
+            break
+        gained, now = now.cost - better.cost, better
+        if gained < WORTH_A_ROUND:
+            break
+    regained = looked_at(now.candidate, series, now.noises, now.point, now.outcome)
+    return min(now, regained, key=lambda one: one.cost)
 
 
 def _improved(

@@ -26,6 +26,8 @@ SHORT_STAY = 5
 """Samples: a mode that is left sooner has the gain of the mode that lasts longest."""
 START_PART = 0.01
 """Standard deviation of a state at the start, as a part of its range."""
+KEPT = 0.999
+"""Part of itself that an integral keeps over a sample, and what decays does not."""
 FOLDS = 5
 """Parts of the recordings that are left out in turn: every fifth block in time of each."""
 SMALL = 1e-5
@@ -171,21 +173,22 @@ def gains_of(
     count = max(1, round(BURN_IN / period))
     modes = candidate.predictor.modes
     points = points_of(candidate, series, outcome)
-    start = np.diag((START_PART * candidate.spans) ** 2)
     found: dict[int, Reals] = {}
-    first = np.zeros((0, len(start), len(noises.seen)))
+    first = np.zeros((0, len(candidate.spans), len(noises.seen)))
     for mode, (states, inputs) in points.items():
         linear = near(candidate, page, mode, states, inputs)
         if linear is None:
             continue
-        q = _process_noise(candidate, linear, noises, period)
+        unsure = np.where(_turns(candidate, linear), 0.0, candidate.spans)
+        start = np.diag((START_PART * unsure) ** 2)
+        q = _process_noise(candidate, linear, noises, period, unsure)
         gains = candidate.predictor.gains(
             linear.phi, linear.c, q, noises.seen**2, start, 0 if found else count
         )
         if gains is not None:
             first = first if found else gains[0]
             found[mode] = gains[1]
-    nothing = np.zeros((len(start), len(noises.seen)))
+    nothing = np.zeros((len(candidate.spans), len(noises.seen)))
     usual = next(iter(found.values()), nothing)
     steady = np.array([found.get(mode, usual) for mode in modes])
     return Gains(first, np.ascontiguousarray(steady))
@@ -199,10 +202,21 @@ def near(
     return linearised(candidate.predictor, page, inputs, mode, substeps, states, sizes)
 
 
-def _process_noise(candidate: Candidate, linear: Linear, noises: Noises, period: float) -> Reals:
-    """Return Q: the noise of the inputs, of the drifts, and next to none of all states."""
+def _turns(candidate: Candidate, linear: Linear) -> NDArray[np.bool_]:
+    """Tell which states (states,) are an effect's integrals, such as an angle.
+
+    What such a one shows changes its sign as it turns: a gain made at one angle would be wrong.
+    """
+    keeps = np.diag(linear.phi) > KEPT
+    return np.asarray(keeps & np.array(candidate.recipe.brought), dtype=np.bool_)
+
+
+def _process_noise(
+    candidate: Candidate, linear: Linear, noises: Noises, period: float, unsure: Reals
+) -> Reals:
+    """Return Q: the noise of the inputs, of the drifts, and next to none of what is `unsure`."""
     q = linear.b @ np.diag(noises.inputs**2) @ linear.b.T
-    q = q + np.diag((MODEL_NOISE * candidate.spans) ** 2)
+    q = q + np.diag((MODEL_NOISE * unsure) ** 2)
     for name, memory in zip(candidate.drifts, candidate.recipe.memories, strict=True):
         place = candidate.predictor.states.index(name)
         kept = np.exp(-period / memory)

@@ -31,7 +31,7 @@ from language.document import Items, Node, Scalar, Table
 class Recipe:
     """A candidate but for its library: `columns` of its arrays, `substeps` of a sample, `spans` of
     its states, `uncertain` parameters, `drifts` (states) and their `memories` [s]; `delays` are
-    parameters that are one.
+    parameters that are one, and `brought` tells which states the effects have.
     """
 
     columns: Columns
@@ -41,6 +41,7 @@ class Recipe:
     drifts: tuple[str, ...]
     memories: tuple[float, ...]
     delays: tuple[str, ...] = ()
+    brought: tuple[bool, ...] = ()
 
 
 def recipe_key(*parts: str) -> str:
@@ -116,6 +117,7 @@ def _recipe(known: dict[str, Any]) -> Recipe:
         tuple(known["drifts"]),
         tuple(known["memories"]),
         tuple(known["delays"]),
+        tuple(known["brought"]),
     )
 
 

@@ -5,16 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from diagnosis.bench import Bench
 from diagnosis.candidate import Candidate
-from diagnosis.estimation import Estimate, looked_at, reached
+from diagnosis.estimation import Estimate, looked_at, outcome_at, reached
 from diagnosis.evidence import Evidence, evidence
 from diagnosis.layers import Layer
 from diagnosis.level import fitted
-from diagnosis.point import extended
+from diagnosis.point import Point, extended
+from diagnosis.series import Series
 
-FULL_FITS = 10
+FULL_FITS = 7
 """Candidates that are fitted to the end, best foreseen first."""
+STARTS = 2
+"""Starts of a candidate from which steps are made, the best ones."""
 WORTH = 10.0
 """A candidate that promises less [nats] is not fitted."""
 Tell = Callable[[str], None]
@@ -63,7 +68,7 @@ def searched(
 
 
 def screened(bench: Bench, candidate: Candidate, base: Estimate) -> Estimate:
-    """Return a candidate one step from the best of its starts, seen from there.
+    """Return a candidate some steps from the best of its starts, seen from there.
 
     How the base's parameters act is taken from the base.
     """
@@ -71,15 +76,37 @@ def screened(bench: Bench, candidate: Candidate, base: Estimate) -> Estimate:
     for start in starts_of(candidate, base.values(0)):
         point = extended(candidate, base.candidate, base.point, start)
         here = looked_at(candidate, bench.series, base.noises, point)
-        found.append(reached(here, bench.series, base.columns))
-    return min(found, key=lambda one: one.cost)
+        found.append(turned(here, bench.series))
+    found.sort(key=lambda one: one.cost)
+    reach = [reached(here, bench.series, base.columns) for here in found[:STARTS]]
+    return min(reach, key=lambda one: one.cost)
 
 
 def starts_of(candidate: Candidate, base: Mapping[str, float]) -> list[dict[str, float]]:
     """Return where a fit may start: each start of the parameters that the base does not have."""
     own = [one for one in candidate.uncertain if one.name not in base]
-    most = max((len(one.starts) for one in own), default=1)
+    most = max((len(one.starts) for one in own if not one.per_recording), default=1)
     return [{one.name: one.starts[min(k, len(one.starts) - 1)] for one in own} for k in range(most)]
+
+
+def turned(estimate: Estimate, series: Sequence[Series]) -> Estimate:
+    """Return an estimate with what each recording has of its own at the best of its starts."""
+    uncertain = estimate.candidate.uncertain
+    own = [k for k, one in enumerate(uncertain) if one.per_recording and len(one.starts) > 1]
+    if not own or not np.isfinite(estimate.cost):
+        return estimate
+    variances = estimate.outcome.variances()
+    best, lowest = estimate.point.own.copy(), np.full(len(series), np.inf)
+    for k in own:
+        for start in uncertain[k].starts:
+            trial = best.copy()
+            trial[:, k] = uncertain[k].coordinate(start)
+            outcome = outcome_at(estimate, series, Point(estimate.point.shared, trial))
+            each = np.array([np.nansum(one / variances) for one in outcome.squares()])
+            better = each < lowest
+            best[better, k], lowest[better] = trial[better, k], each[better]
+    point = Point(estimate.point.shared, best)
+    return looked_at(estimate.candidate, series, estimate.noises, point, estimate.outcome)
 
 
 def _possible(bench: Bench, base: Estimate, layer: Layer) -> Candidate | None:

@@ -94,17 +94,17 @@ def _of_effect(parameter: Parameter) -> Uncertain:
 
 
 def _starts(parameter: Parameter, value: float) -> tuple[float, ...]:
-    """Return where fits start: near the neutral value, at the declared starts, at the value."""
+    """Return where fits start: at the declared starts, or near the neutral value and away from it,
+    or at the value.
+    """
     fitting = parameter.fitting
-    declared = tuple(float(start) for start in fitting.starts) or (value,)
+    if fitting.starts:
+        return tuple(float(start) for start in fitting.starts)
     neutral = fitting.neutral
-    if neutral is None or neutral == "absent":
-        return declared
-    far = next((start for start in declared if start != float(neutral)), None)
-    if far is None and parameter.range:
-        far = float(neutral) + 0.1 * float(parameter.range[1] - neutral)
-    assert far is not None
-    return (float(neutral) + NEAR * (far - float(neutral)), far)
+    if neutral is None or neutral == "absent" or not parameter.range:
+        return (value,)
+    far = 0.1 * float(parameter.range[1] - neutral)
+    return (float(neutral) + NEAR * far, float(neutral) + far)
 
 
 def si_unit(parameter: Parameter) -> str:

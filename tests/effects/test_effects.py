@@ -155,18 +155,20 @@ def test_stribeck_friction_is_larger_at_low_speed(tmp_path: Path) -> None:
 
 
 def test_a_brake_that_lets_go_slowly_is_a_load_that_fades(tmp_path: Path) -> None:
+    """Nothing beside the brake while it is applied; then what its pads had come to, fading."""
     found = ran(
         tmp_path,
         "rotor",
-        "{brake_drag@w: {values: {share: 0.5, tau_b: 0.2 s}}}",
-        {"T": "0 N*m", "T_b": "{start: 8 N*m, steps: {0.5 s: 0 N*m}}"},
+        "{brake_drag@w: {values: {T_r: 3 N*m, share: 0.25, tau_b: 0.4 s}}}",
+        {"T": "0 N*m", "T_b": "{start: 16 N*m, steps: {0.5 s: 0 N*m}}"},
         initial="{plant.w: 50 rad/s}",
         horizon="2 s",
     )
-    top = 4 * (1 - np.exp(-0.5 / 0.2))
+    top = (3 + 0.25 * 16) * (1 - np.exp(-0.5 / 0.2))
     t = found.times[51:] - 0.5
     w = speed(found)
-    assert np.max(np.abs(w[51:] - (w[50] - top / J * 0.2 * (1 - np.exp(-t / 0.2))))) < 1e-7
+    assert w[50] == w[0]
+    assert np.max(np.abs(w[51:] - (w[50] - top / J * 0.4 * (1 - np.exp(-t / 0.4))))) < 1e-6
 
 
 # Sensors: the dynamics stay, one output is another.
@@ -215,7 +217,7 @@ NEUTRAL = [
     ("viscous_friction@w_w", "b: 0 N*m*s/rad"),
     ("quadratic_drag@w_w", "c_2: 0"),
     ("load_dependent_loss@w_em", "loss: 0"),
-    ("brake_drag@w_w", "share: 0"),
+    ("brake_drag@w_w", "share: 0, T_r: 0 N*m"),
     ("stiffness_nonlinear@half_shaft", "q: 0"),
     ("stiffness_hysteresis@half_shaft", "k_r: 0 N*m/rad"),
     ("position_dependent_stiffness@half_shaft", "a: 0"),
