@@ -19,6 +19,8 @@ from language.units import parse_unit
 
 FORCES = (parse_unit("N*m").dimension.powers, parse_unit("N").dimension.powers)
 """What a balance of forces or torques is in: drifts act there, a sensor's filter is none."""
+NOT_CANDIDATES = ("unknown_input", "sensor_quantisation")
+"""Effects that no parameter is fitted of: one is found as a drift, one only adds noise."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +55,8 @@ class Bench:
 
     def layers(self) -> Iterator[Layer]:
         """Yield every effect at every place where these recordings could tell it."""
-        for effect in self.effects:
+        candidates = (one for one in self.effects if one.name not in NOT_CANDIDATES)
+        for effect in candidates:
             for layer in fitting(self.document, effect):
                 if self._can_tell(layer):
                     yield layer

@@ -18,6 +18,7 @@ import numpy as np
 from diagnosis.bench import Bench, balance_drifts
 from diagnosis.estimation import Estimate, adapted
 from diagnosis.evidence import inflation
+from diagnosis.hidden import with_hidden
 from diagnosis.layers import shipped_effects
 from diagnosis.level import first_fit, recalibrated, units_of
 from diagnosis.location import led_by, located
@@ -39,8 +40,6 @@ from language.load import automaton_of
 from language.model import Automaton
 from language.project import Project
 
-NOT_CANDIDATES = ("unknown_input", "sensor_quantisation")
-"""Effects that could explain anything, or that add noise: described, never named."""
 CLEAR = 3.0
 """A rival within this of the best [nats] makes the verdict ambiguous."""
 UNKNOWN = 4.0
@@ -83,6 +82,7 @@ def diagnose(case: Case, tell: Tell = lambda text: None) -> Diagnosis:
     loci = located(bench, base)
     tell(place_sentence(loci, bench))
     selection = selected(bench, base, units, case.threshold, tell)
+    selection = with_hidden(bench, selection, loci, UNKNOWN * case.threshold, tell)
     says = _says(selection, loci, bench, case.threshold)
     loci = led_by(loci, [place_path(tried.layer) for tried in selection.accepted], bench)
     fit = {"train": misfits(base, selection.model, bench.series)}
@@ -138,7 +138,6 @@ def recalibrated_base(
 ) -> tuple[Bench, Estimate]:
     """Fit the base with inputs held, and straight between samples: the better one stays."""
     effects = case.effects if case.effects is not None else shipped_effects()
-    effects = tuple(effect for effect in effects if effect.name not in NOT_CANDIDATES)
     drifts = balance_drifts(case.document, automaton)
     found = []
     for is_linear in (False, True):

@@ -57,8 +57,8 @@ def evidence(model: Estimate, base: Estimate, series: Sequence[Series]) -> Evide
     more = _free(model, len(series)) - _free(base, len(series))
     price = 0.5 * more * np.log(max(count * shrink, 2.0))
     train = shrink * (base.cost - model.cost) - price
-    scale = model.outcome.variances()
-    each = shrink * (_left_out(base, series, scale) - _left_out(model, series, scale))
+    before, after = _left_out(base, series), _left_out(model, series)
+    each = shrink * _gained(before, after, model.outcome.counts())
     return Evidence(float(train), float(np.sum(each)), tuple(float(one) for one in each))
 
 
@@ -84,21 +84,34 @@ def _free(model: Estimate, recordings: int) -> int:
     return sum(recordings if one.per_recording else 1 for one in model.candidate.uncertain)
 
 
-def _left_out(model: Estimate, series: Sequence[Series], scale: Reals) -> Reals:
-    """Return the cost [nats] of each recording, its blocks at points that others ask for.
+def _gained(before: Reals, after: Reals, counts: Reals) -> Reals:
+    """Return the gain [nats] in each recording, N/2 log of the ratio of mean squares in all.
 
-    Squares are counted in the mean squares `scale` of both models' last word.
+    `before` and `after` are sums of squares (recordings, seen). What a recording has of the gain is
+    what it has of the difference.
     """
+    if not (np.all(np.isfinite(before)) and np.all(np.isfinite(after))):
+        return np.full(len(before), np.inf if np.all(np.isfinite(after)) else -np.inf)
+    first, second = before.sum(axis=0), after.sum(axis=0)
+    apart = first - second
+    ratio = np.log(first / second)
+    weight = np.where(
+        np.abs(ratio) > 1e-12, ratio / np.where(apart == 0.0, 1.0, apart), 1.0 / first
+    )
+    return np.asarray(0.5 * (before - after) @ (counts * weight), dtype=np.float64)
+
+
+def _left_out(model: Estimate, series: Sequence[Series]) -> Reals:
+    """Return the squares (recordings, seen) of each block at the point that the others ask for."""
     assert model.normal is not None
-    found = np.zeros(len(series))
+    found = np.zeros((len(series), len(model.candidate.predictor.seen)))
     for fold in range(FOLDS):
         point = stepped(model.candidate, model.point, model.normal.without(fold), 0.0)
         outcome = outcome_at(model, series, point)
         if not outcome.is_whole:
-            return np.full(len(series), np.inf)
+            return np.full(found.shape, np.inf)
         squares = outcome.squares()
         for block in outcome.blocks:
             if block.fold == fold:
-                sums = np.nansum(squares[block.recording][block.part], axis=0)
-                found[block.recording] += 0.5 * float(np.sum(sums / scale))
+                found[block.recording] += np.nansum(squares[block.recording][block.part], axis=0)
     return found

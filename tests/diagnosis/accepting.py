@@ -9,8 +9,9 @@ from typing import Any, cast
 import numpy as np
 
 from codegen.predictor import Columns
+from diagnosis.bench import NOT_CANDIDATES
 from diagnosis.candidate import Candidate
-from diagnosis.diagnose import NOT_CANDIDATES, Case, Diagnosis
+from diagnosis.diagnose import Case, Diagnosis
 from diagnosis.dossier import Dossier
 from diagnosis.estimation import Estimate
 from diagnosis.evidence import Evidence
