@@ -8,6 +8,7 @@ from diagnosis import wording
 from diagnosis.digits import change, per_cent, probability
 from diagnosis.dossier import Dossier
 from diagnosis.finding import told
+from diagnosis.listing import place_rows
 from diagnosis.search import Tried
 from diagnosis.selection import Selection
 
@@ -38,8 +39,11 @@ def _where(dossier: Dossier) -> Card:
     if not lines and verdict.verdict == "unknown":
         lines = [f"most at {one.path}" for one in verdict.location[:1] if one.gain > 0.0]
     if not lines:
-        lines = ["nowhere: no place asks for more than the model has"]
-    return Card("Where", tuple(dict.fromkeys(lines)))
+        return Card("Where", ("nowhere: no place asks for more than the model has",))
+    rows = dict(place_rows(verdict.location[0], 2)) if verdict.location else {}
+    lines = [*dict.fromkeys(lines)][:MOST_LINES]
+    lines += [f"{words} {rows[words]}" for words in ("by mode", "strongest in") if words in rows]
+    return Card("Where", tuple(lines))
 
 
 def _sure(dossier: Dossier, selection: Selection) -> Card:
@@ -49,7 +53,8 @@ def _sure(dossier: Dossier, selection: Selection) -> Card:
     if verdict.verdict in ("effect", "ambiguous"):
         shares = selection.probabilities()
         first = shares.get(selection.accepted[0].layer.id, 0.0) if selection.accepted else 0.0
-        words = f"{probability(first)} probable among {count} candidates fitted"
+        tried = f"best of {len(selection.first_round)} candidates, {count} fitted in full"
+        words = f"{probability(first)} probable, {tried}"
         lines = [words, *(_gain(one) for one in selection.accepted)]
         lines.append(f"{dossier.case.threshold:g} nats are needed")
     else:

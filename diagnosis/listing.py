@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from diagnosis import wording
-from diagnosis.digits import change, per_cent, probability, significant, with_spread
+from diagnosis.digits import change, per_cent, probability, significant
 from diagnosis.dossier import Dossier
-from diagnosis.fit import note_of
 from diagnosis.locus import Locus
-from diagnosis.naming import quantities_of
 from diagnosis.search import Tried
 from diagnosis.selection import Selection
-from diagnosis.whiteness import Whiteness
 from diagnosis.worst_window import FreeRuns, by_recording
-from language.document import Scalar, Table
 
 MOST_WINDOWS = 6
+LOOSE = 0.3
+"""A correlation below this is not told."""
 SAME = 0.02
 """Part of a misfit below which a change is none."""
 
@@ -119,98 +117,20 @@ def unfitted(dossier: Dossier, selection: Selection) -> list[tuple[str, list[str
     return list(found.items())
 
 
-@dataclass(frozen=True)
-class ParameterRow:
-    """A parameter: what it is, its values as texts, and how far it is from what was declared."""
-
-    name: str
-    about: str
-    unit: str
-    declared: str
-    before: str
-    after: str
-    change: str
-    note: str
-
-
-def parameter_rows(dossier: Dossier, selection: Selection) -> list[ParameterRow]:
-    """Return each fitted parameter: declared, recalibrated, and with what was found."""
-    before, after = quantities_of(selection.base), quantities_of(selection.model)
-    coordinates = {one.name: one for one in selection.model.candidate.uncertain}
-    rows = []
-    for name, now in after.items():
-        declared = dossier.automaton.parameters.get(name)
-        value = None if declared is None or declared.value is None else float(declared.value)
-        rows.append(
-            ParameterRow(
-                name,
-                about_of(dossier, "parameters", name),
-                "" if now.unit == "1" else now.unit,
-                "new" if value is None else f"{value:.5g}",
-                with_spread(before[name].value, before[name].std) if name in before else "",
-                with_spread(now.value, now.std),
-                "" if value is None else _moved(value, now.value),
-                note_of(now, coordinates[name]),
-            )
-        )
-    return rows
-
-
-def _moved(declared: float, now: float) -> str:
-    return change(declared, now) if declared > 0.0 else ""
-
-
-def about_of(dossier: Dossier, section: str, name: str) -> str:
-    """Return what the spec says a parameter, input or state is; empty where it says nothing."""
-    table = dossier.case.document.root.get(section)
-    entry = table.get(name) if isinstance(table, Table) else None
-    return text_of(entry, "about") if isinstance(entry, Table) else ""
-
-
-def text_of(table: Table, key: str) -> str:
-    """Return the text of a key; empty where there is none."""
-    node = table.get(key)
-    return node.text if isinstance(node, Scalar) else ""
-
-
-def place_rows(locus: Locus) -> list[tuple[str, str]]:
+def place_rows(locus: Locus, most: int = MOST_WINDOWS) -> list[tuple[str, str]]:
     """Return what is known of what is missing at a place: modes, windows, companions."""
     modes = sorted(locus.modes.items(), key=lambda pair: -pair[1])
     shares = [f"{name} {per_cent(share)}" for name, share in modes if share >= 0.005]
     windows = [f"{file} {start:.2f}-{end:.2f} s" for start, end, file in locus.windows]
-    more = len(windows) - MOST_WINDOWS
-    told = ", ".join(windows[:MOST_WINDOWS]) + (f" and {more} more" if more > 0 else "")
-    along = [f"{name} (correlation {r:.2f})" for name, r in locus.along]
+    more = len(windows) - most
+    told = ", ".join(windows[:most]) + (f" and {more} more" if more > 0 else "")
+    along = [f"{name} (correlation {r:.2f})" for name, r in locus.along if abs(r) >= LOOSE]
     rows = [
         ("strongest in", told),
         ("by mode", ", ".join(shares)),
         ("goes along with", ", ".join(along)),
     ]
     return [row for row in rows if row[1]]
-
-
-def whiteness_rows(
-    before: Sequence[Whiteness], after: Sequence[Whiteness], units: Sequence[str], is_same: bool
-) -> list[tuple[str, ...]]:
-    """Return a row by signal and model: size, what its past tells, lags outside, chance."""
-    models = [("recalibrated", before)] if is_same else [("without", before), ("with", after)]
-    rows: list[tuple[str, ...]] = []
-    for k, unit in enumerate(units):
-        for words, found in models:
-            one = found[k]
-            chance = "< 0.001" if one.chance < 0.001 else f"{one.chance:.2g}"
-            rows.append(
-                (
-                    one.signal,
-                    words,
-                    f"{significant(one.rms)} {unit}",
-                    per_cent(one.foretold),
-                    f"{one.outside} of {len(one.lags)}",
-                    chance,
-                    one.words,
-                )
-            )
-    return rows
 
 
 def recording_rows(dossier: Dossier) -> list[tuple[str, ...]]:
@@ -248,15 +168,6 @@ def untestable(dossier: Dossier) -> list[tuple[str, str]]:
         if one.lacking:
             lacking.setdefault(" and ".join(one.lacking), []).append(one.effect)
     return [(needs, ", ".join(names)) for needs, names in lacking.items()]
-
-
-def fixed(dossier: Dossier) -> list[str]:
-    """Return the parameters that have no range, with their values: they were taken as exact."""
-    return [
-        f"{name} = {float(one.value):.5g}"
-        for name, one in dossier.automaton.parameters.items()
-        if one.range is None and one.value is not None and one.type == "real"
-    ]
 
 
 def in_parts(text: str) -> list[tuple[str, bool]]:

@@ -17,6 +17,8 @@ from diagnosis.digits import probability
 from diagnosis.dossier import Dossier, verdict_json
 from diagnosis.drawing import drawings_of, embedded
 from diagnosis.finding import told
+from diagnosis.parameter_list import astray, fixed, parameter_rows, text_of
+from diagnosis.remainder import left_words, whiteness_rows
 from diagnosis.rerun import SCENARIO, WINDOW, commands, made_by, scenario_text, window_table
 from diagnosis.shown import Shown, shown_of
 from diagnosis.sources import sources, tools
@@ -55,7 +57,7 @@ def _about_verdict(dossier: Dossier, shown: Sequence[Shown]) -> dict[str, Any]:
     verdict, found = dossier.verdict, dossier.diagnosis
     return {
         "name": dossier.name,
-        "about": listing.text_of(dossier.case.document.root, "about"),
+        "about": text_of(dossier.case.document.root, "about"),
         "verdict": verdict,
         "has_model": bool(found and found.selection.accepted),
         "headline": listing.in_parts(wording.headline(dossier)),
@@ -90,11 +92,11 @@ def _about_models(dossier: Dossier, shown: Sequence[Shown]) -> dict[str, Any]:
         "candidates": listing.candidate_rows(dossier, selection),
         "unfitted": listing.unfitted(dossier, selection),
         "other": probability(dossier.verdict.other),
-        "parameters": listing.parameter_rows(dossier, selection),
-        "whiteness": listing.whiteness_rows(
-            one.before, one.after, one.units, not selection.accepted
-        ),
+        "parameters": parameter_rows(dossier, selection),
+        "astray": astray(selection),
+        "whiteness": whiteness_rows(one.before, one.after, one.units, not selection.accepted),
         "whiteness_of": one.words,
+        "left": left_words(one.before, one.after, not selection.accepted),
     }
 
 
@@ -103,7 +105,7 @@ def _about_data(dossier: Dossier) -> dict[str, Any]:
         "findings": [(s, listing.in_parts(text)) for s, text in told(dossier.findings)],
         "recordings": listing.recording_rows(dossier),
         "untestable": listing.untestable(dossier),
-        "fixed": listing.fixed(dossier),
+        "fixed": fixed(dossier),
         "threshold": dossier.case.threshold,
     }
 
