@@ -47,31 +47,31 @@ def _where(dossier: Dossier) -> Card:
 
 
 def _sure(dossier: Dossier, selection: Selection) -> Card:
-    verdict = dossier.verdict
-    count = sum(one.evidence is not None for one in selection.first_round)
+    fitted = [one for one in selection.first_round if one.evidence]
+    count = f"{len(selection.first_round)} candidates, {len(fitted)} fitted in full"
     lines = []
-    if verdict.verdict in ("effect", "ambiguous"):
+    if selection.accepted:
         shares = selection.probabilities()
-        first = shares.get(selection.accepted[0].layer.id, 0.0) if selection.accepted else 0.0
-        tried = f"best of {len(selection.first_round)} candidates, {count} fitted in full"
-        words = f"{probability(first)} probable, {tried}"
-        lines = [words, *(_gain(one) for one in selection.accepted)]
+        for one in (selection.accepted[0], *selection.rivals):
+            if one.layer.id in shares:
+                lines.append(f"{probability(shares[one.layer.id])} probable: {one.layer.id}")
+        lines += [f"best of {count}", *(_gain(one) for one in selection.accepted)]
         lines.append(f"{dossier.case.threshold:g} nats are needed")
     else:
-        best = max(
-            (one for one in selection.first_round if one.evidence),
-            key=lambda one: one.evidence.least if one.evidence else 0.0,
-            default=None,
-        )
-        lines.append(f"{len(selection.first_round)} candidates looked at, {count} fitted")
+        lines.append(f"none of {count}, gains enough")
+        best = max(fitted, key=_least, default=None)
         if best is not None:
             lines += [f"best: {_gain(best)}", f"{dossier.case.threshold:g} nats are needed in both"]
     confirmed = {
-        True: "confirmed on recordings that were held out",
-        False: "not confirmed on recordings that were held out",
+        True: "better on recordings that were held out, too",
+        False: "not better on recordings that were held out",
         None: "",
-    }[verdict.confirmed]
+    }[dossier.verdict.confirmed]
     return Card("How sure", (*lines, confirmed) if confirmed else tuple(lines))
+
+
+def _least(tried: Tried) -> float:
+    return tried.evidence.least if tried.evidence else 0.0
 
 
 def _gain(tried: Tried) -> str:
@@ -100,6 +100,8 @@ def _better(dossier: Dossier) -> Card:
 def _doubt(dossier: Dossier) -> Card:
     verdict = dossier.verdict
     lines = []
+    if verdict.verdict == "ambiguous":
+        lines.append("more than one effect explains it: see what to record to be sure")
     if verdict.verdict == "effect":
         rivals = [wording.effect_at(one) for one in verdict.ambiguous_with]
         lines.append(f"nearly as good: {', '.join(rivals)}" if rivals else "no rival comes close")

@@ -46,7 +46,8 @@ def drawings_of(dossier: Dossier, shown: Sequence[Shown]) -> list[Drawing]:
         picture = window_picture(one.window, inputs, is_same)
         found.append(Drawing(f"window_{one.part}", caption, caption, picture))
     found.append(_whiteness(shown[0], is_same))
-    found.append(_places(dossier))
+    if any(locus.gain > 0.0 for locus in dossier.verdict.location):
+        found.append(_places(dossier))
     return found
 
 

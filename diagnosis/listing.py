@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from diagnosis import wording
@@ -93,17 +93,25 @@ def _row(
 ) -> CandidateRow:
     assert tried.evidence
     known, share = tried.evidence, shares.get(tried.layer.id)
+    is_accepted = tried.layer.id in {one.layer.id for one in selection.accepted}
+    reason = wording.reason(tried, rank, selection, dossier.case.threshold)
+    if is_accepted and dossier.verdict.verdict == "ambiguous":
+        reason = "best, but not told from others: laid in what is shown here"
     effect, _, place = wording.title(tried.layer, dossier).partition("@")
     return CandidateRow(
         effect,
         place,
-        f"{known.train:.0f}",
-        f"{known.left_out:.0f}",
+        _nats(known.train),
+        _nats(known.left_out),
         "" if share is None else probability(share),
         100.0 * max(known.train, 0.0) / most,
-        wording.reason(tried, rank, selection, dossier.case.threshold),
-        tried.layer.id in {one.layer.id for one in selection.accepted},
+        reason,
+        is_accepted,
     )
+
+
+def _nats(gain: float) -> str:
+    return f"{gain:.0f}" if math.isfinite(gain) else "diverges"
 
 
 def unfitted(dossier: Dossier, selection: Selection) -> list[tuple[str, list[str]]]:
@@ -168,6 +176,13 @@ def untestable(dossier: Dossier) -> list[tuple[str, str]]:
         if one.lacking:
             lacking.setdefault(" and ".join(one.lacking), []).append(one.effect)
     return [(needs, ", ".join(names)) for needs, names in lacking.items()]
+
+
+def noise_words(selection: Selection, signals: Sequence[str], units: Sequence[str]) -> str:
+    """Return the noise of the recorded signals: no model misses less."""
+    noise = selection.base.noises.seen
+    parts = zip(signals, noise, units, strict=True)
+    return ", ".join(f"{name} {significant(float(sd), 2)} {unit}" for name, sd, unit in parts)
 
 
 def in_parts(text: str) -> list[tuple[str, bool]]:

@@ -60,6 +60,7 @@ def _about_verdict(dossier: Dossier, shown: Sequence[Shown]) -> dict[str, Any]:
         "about": text_of(dossier.case.document.root, "about"),
         "verdict": verdict,
         "has_model": bool(found and found.selection.accepted),
+        "laid": [one.layer.id for one in found.selection.accepted] if found else [],
         "headline": listing.in_parts(wording.headline(dossier)),
         "cards": cards_of(dossier),
         "location": wording.location(dossier) if found else "",
@@ -89,6 +90,7 @@ def _about_models(dossier: Dossier, shown: Sequence[Shown]) -> dict[str, Any]:
     one = shown[0]
     return {
         "fit": [row for s in shown for row in listing.fit_rows(dossier, s.words, s.part, s.runs)],
+        "noise": listing.noise_words(selection, one.runs.signals, one.units),
         "candidates": listing.candidate_rows(dossier, selection),
         "unfitted": listing.unfitted(dossier, selection),
         "other": probability(dossier.verdict.other),

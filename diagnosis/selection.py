@@ -71,14 +71,16 @@ def selected(
     needed = threshold
     while len(accepted) < MOST_EFFECTS:
         tried = searched(bench, model, units, layers, tell)
+        rest: list[Tried] = []
         better = _better_base(bench, model, units, tried)
         if better is not None:
             tell(f"the model itself fits better: {better.cost:.0f} nats; candidates again")
             model = better
             base = base if accepted else better
             promising = [other.layer for other in tried if other.promised > 0.0]
-            tried = searched(bench, model, units, promising[:AGAIN], tell)
-        rounds.append(tried)
+            before, tried = tried, searched(bench, model, units, promising[:AGAIN], tell)
+            rest = _passed_over(before, tried)
+        rounds.append([*tried, *rest])
         layers = [other.layer for other in tried[:NEXT] if other.promised > 0.0]
         enough = (t for t in tried if t.evidence and _is_enough(t.evidence, needed))
         best = next(enough, None)
@@ -91,6 +93,12 @@ def selected(
     kept, model = _still_needed(bench, base, model, accepted, units, threshold, tell)
     first = tuple(rounds[0]) if rounds else ()
     return Selection(base, model, kept, first, _rivals(first, kept))
+
+
+def _passed_over(before: list[Tried], again: list[Tried]) -> list[Tried]:
+    """Return those that were not looked at again: they promise less over a better model."""
+    ids = {one.layer.id for one in again}
+    return [Tried(one.layer, one.promised) for one in before if one.layer.id not in ids]
 
 
 def _is_enough(known: Evidence, needed: float) -> bool:

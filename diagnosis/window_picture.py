@@ -25,7 +25,7 @@ def window_picture(window: WorstWindow, inputs: Mapping[str, str], is_same: bool
     """
     driven = _moving(window, inputs)
     count = len(window.signals)
-    heights = [0.8] * bool(driven) + [1.7, 1.0] * count
+    heights = [1.0] * bool(driven) + [1.7, 1.0] * count
     figure = Figure(figsize=(8.5, 0.9 + 0.82 * sum(heights)), layout="constrained")
     rows = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)
     axes = [row[0] for row in rows]
@@ -59,7 +59,7 @@ def _draw_inputs(
     for k, colour in zip(driven, (GREEN, PURPLE, GREY), strict=False):
         axis.plot(window.times, window.inputs[:, k], color=colour, lw=1.1, label=visible(names[k]))
     text = f"{names[driven[0]] if len(driven) == 1 else 'inputs'} [{units[driven[0]]}]"
-    axis.set_ylabel(visible(text), fontsize=9, parse_math=False)
+    axis.set_ylabel(visible(text), fontsize=8, parse_math=False)
     if len(driven) > 1:
         axis.legend(loc="best", fontsize=8)
 
@@ -78,4 +78,4 @@ def _draw_signal(above: Axes, beneath: Axes, window: WorstWindow, k: int, is_sam
     beneath.axhline(0.0, color="black", lw=0.6)
     name, unit = window.signals[k], window.units[k]
     above.set_ylabel(visible(f"{name} [{unit}]"), fontsize=9, parse_math=False)
-    beneath.set_ylabel(visible(f"missed [{unit}]"), fontsize=9, parse_math=False)
+    beneath.set_ylabel(visible(f"missed [{unit}]"), fontsize=8, parse_math=False)

@@ -25,6 +25,7 @@ import pytest
 import modewright as mw
 from diagnosis.dossier import usable, verdict_json
 from diagnosis.finding import Finding
+from diagnosis.report import report_files
 from diagnosis.variant import needed
 from diagnosis.wording import headline, separation
 from modewright.cli import app
@@ -267,7 +268,7 @@ def test_the_report_is_one_page_that_needs_nothing_but_what_lies_beside_it(found
     told = re.sub(r"<[^>]+>", " ", text)
     for sentence in (
         "lacks coulomb friction in the balance of w",
-        "confirmed on recordings that were held out",
+        "confirmed on held-out recordings",
         "passage through zero speed",
         "coulomb_friction@w",
         "Where it improved and where not",
@@ -307,6 +308,10 @@ def test_what_cannot_be_told_apart_is_told_with_what_would_separate_it(dossier: 
     assert "coulomb friction in the balance of w; road grade in the balance of w" in told
     named = "coulomb_friction from road_grade, torque_offset, viscous_friction"
     assert separation(doubtful) == [f"{named}: passage through zero speed"]
+    page = re.sub(r"<[^>]+>", " ", report_files(doubtful, "")["report.html"].decode())
+    assert "These recordings cannot tell apart: coulomb friction" in page
+    assert "best, but not told from others" in page
+    assert "confirmed" not in page
 
 
 @pytest.mark.parametrize(
