@@ -311,7 +311,7 @@ def test_what_cannot_be_told_apart_is_told_with_what_would_separate_it(dossier: 
     page = re.sub(r"<[^>]+>", " ", report_files(doubtful, "")["report.html"].decode())
     assert "These recordings cannot tell apart: coulomb friction" in page
     assert "best, but not told from others" in page
-    assert "confirmed" not in page
+    assert "confirmed on" not in page and "better on held-out recordings" in page
 
 
 @pytest.mark.parametrize(
