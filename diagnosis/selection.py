@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -22,6 +23,8 @@ NEXT = 9
 """Candidates that are looked at again beside an accepted one: the best of the round before."""
 AGAIN = 15
 """Candidates that are looked at again where the model itself is found to fit better."""
+MUCH = 0.1
+"""Part of what the best candidate gained that a model must gain for them to be looked for anew."""
 SHARED = 0.15
 """The part of what an effect gains that must be left without the recording that gains most."""
 BETTER = 10.0
@@ -123,6 +126,35 @@ def _better_base(
     start = best.estimate.values(0)
     again = settled(model.candidate, bench.series, best.estimate.noises, start, units, turns=2)
     return again if again.cost < model.cost - BETTER else None
+
+
+def _again(
+    bench: Bench,
+    model: Estimate,
+    units: Mapping[str, float],
+    tried: list[Tried],
+    gained: float,
+    tell: Tell,
+) -> list[Tried]:
+    """Return candidates beside a model that was found to fit better: as they were, or better.
+
+    They are looked for again only where the model `gained` [nats] much of what they seemed to.
+    """
+    known = {t.layer.id: t for t in tried}
+    most = max((t.evidence.train for t in tried if t.evidence), default=0.0)
+    if gained > MUCH * most:
+        promising = [other.layer for other in tried if other.promised > 0.0]
+        for new in searched(bench, model, units, promising[:AGAIN], tell):
+            old = known[new.layer.id].estimate
+            if new.estimate and (old is None or new.estimate.cost < old.cost):
+                known[new.layer.id] = new
+    again = [
+        dataclasses.replace(t, evidence=evidence(t.estimate, model, bench.series))
+        if t.estimate
+        else t
+        for t in known.values()
+    ]
+    return sorted(again, key=lambda one: -one.score)
 
 
 def _still_needed(

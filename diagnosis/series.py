@@ -62,7 +62,7 @@ def series_of(
     used = [*fed.values(), *(compared[name] for name in seen if name in compared)]
     end = min(channel.times[-1] for channel in used)
     start = _start([compared[name] for name in seen if name in compared], used)
-    step = period or min(grid_period(channel.times) for channel in used)
+    step = period or min(grid_period(channel.seconds) for channel in used)
     count = int((end - start) / step) + 1
     if count < 2:
         raise ValueError(f"{recording.name}: only {count} samples in common")
@@ -122,10 +122,9 @@ def thinned(series: Series, is_linear: bool = False) -> Series:
     )
 
 
-def grid_period(times: Sequence[Fraction]) -> Fraction:
+def grid_period(times: Reals) -> Fraction:
     """Return the usual distance [s] of time stamps, of a whole rate where it is near one."""
-    gaps = np.diff(np.array([float(time - times[0]) for time in times]))
-    usual = float(np.median(gaps))
+    usual = float(np.median(np.diff(times)))
     rate = round(1.0 / usual)
     if rate > 0 and abs(rate * usual - 1.0) < 0.02:
         return Fraction(1, rate)
@@ -135,14 +134,13 @@ def grid_period(times: Sequence[Fraction]) -> Fraction:
 def _start(compared: Sequence[Channel], used: Sequence[Channel]) -> Fraction:
     """Return the first stamp [s] of the fastest compared channel at which all are known."""
     common = max(channel.times[0] for channel in used)
-    fastest = min(compared, key=lambda channel: grid_period(channel.times))
+    fastest = min(compared, key=lambda channel: grid_period(channel.seconds))
     return next((time for time in fastest.times if time >= common), common)
 
 
 def _places(channel: Channel, start: Fraction, step: Fraction) -> NDArray[np.int64]:
     """The sample that each value of a channel belongs to: the nearest one."""
-    times = np.array([float(time - start) for time in channel.times])
-    return np.rint(times / float(step)).astype(np.int64)
+    return np.rint((channel.seconds - float(start)) / float(step)).astype(np.int64)
 
 
 def _held(

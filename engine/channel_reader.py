@@ -62,13 +62,14 @@ class ChannelReader:
         samples = self.file.read(name)
         found: list[Fraction | None] = []
         last: Fraction | None = None
+        factor = self.mapping.time_unit.factor
         for k in range(len(samples.values)):
             if self.is_full:
                 break
             text = samples.text(k)
             value = _exact(text)
             if value is not None:
-                value = value * self.mapping.time_unit.factor
+                value = value * factor if factor != 1 else value
             elif name == self.mapping.time or text:
                 label = f"the time stamp `{text}` is not a number" if text else "no time stamp"
                 self.problems.error("time", samples.place(k), label)
@@ -121,7 +122,7 @@ class ChannelReader:
             if not math.isfinite(value):
                 place = parts[0].place(k)
                 self.problems.error("value", place, f"`{column.name}` is {value} in SI")
-            times.append(stamp + column.delay)
+            times.append(stamp + column.delay if column.delay else stamp)
             kept.append(value)
         if not times and not self.problems.has_errors:
             label = f"{self.file.noun} `{column.columns[0]}` has no values"
