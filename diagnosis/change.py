@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-from diagnosis.dossier import Dossier
-from diagnosis.layers import laid
+from diagnosis.layers import Layer, laid
+from language.document import Document
 from language.provenance import differences
 
-SECTIONS = ("inputs", "states", "equations", "flow", "terms", "modes", "outputs")
+SECTIONS = ("inputs", "states", "equations", "flow", "terms", "modes", "regions", "outputs")
 """What is told; parameters have a table of their own."""
 
 
@@ -21,12 +22,8 @@ class Change:
     after: str
 
 
-def changes(dossier: Dossier) -> list[Change]:
-    """Return the lines of equations that what was accepted alters."""
-    if dossier.diagnosis is None or not dossier.diagnosis.selection.accepted:
-        return []
-    layers = [tried.layer for tried in dossier.diagnosis.selection.accepted]
-    document = dossier.case.document
+def changes(document: Document, layers: Sequence[Layer]) -> list[Change]:
+    """Return the lines of equations that layers alter in an expanded document. Raises SpecError."""
     found = differences(document.root, laid(document, layers).root)
     return [
         Change(one.path, one.old.value if one.old else "", one.new.value if one.new else "")

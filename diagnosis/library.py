@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from diagnosis.change import Change, changes
 from diagnosis.layers import Layer, automaton, fitting
 from language.document import Document, Table
 from language.effect import TEXT_KEYS, Effect, Fit, read_effect
@@ -17,11 +19,15 @@ HEAD = ("language", "effect", "about", "at", *TEXT_KEYS)
 
 @dataclass(frozen=True)
 class Described:
-    """An effect with its lines of equations, and the places of a spec that it fits."""
+    """An effect with its lines of equations, and the places of a spec that it fits.
+
+    `changes` are the lines of the spec that it alters at each place, by the place's name.
+    """
 
     effect: Effect
     lines: tuple[str, ...] = field(repr=False)
     layers: tuple[Layer, ...] = field(default=(), repr=False)
+    changes: Mapping[str, tuple[Change, ...]] = field(default_factory=dict, repr=False)
 
     @property
     def places(self) -> tuple[str, ...]:
@@ -42,11 +48,12 @@ def described(
     effect: Effect, document: Document | None = None, project: Project | None = None
 ) -> Described:
     """Return an effect as it is told, with its places in an expanded document of a project."""
-    layers: tuple[Layer, ...] = ()
-    if document is not None and project is not None:
-        fits = fitting(document, effect)
-        layers = tuple(layer for layer in fits if _can_be_laid(document, project, layer))
-    return Described(effect, _lines(effect.body), layers)
+    if document is None or project is None:
+        return Described(effect, _lines(effect.body))
+    fits = fitting(document, effect)
+    layers = tuple(layer for layer in fits if _can_be_laid(document, project, layer))
+    altered = {layer.place: tuple(changes(document, [layer])) for layer in layers}
+    return Described(effect, _lines(effect.body), layers, altered)
 
 
 def _can_be_laid(document: Document, project: Project, layer: Layer) -> bool:

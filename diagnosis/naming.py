@@ -13,6 +13,11 @@ from diagnosis.verdict import Named, Quantity
 from language.model import Automaton
 
 Reals = NDArray[np.float64]
+OTHER_NAMES = {
+    "second_gap": ("backlash", "on an elastic element that has a gap"),
+    "added_inertia": ("compliance", "on an inertia"),
+}
+"""Names that verdicts use: of which effect, and where."""
 SECTIONS = {"balance": "flow", "input": "inputs", "output": "outputs", "element": "elements"}
 
 

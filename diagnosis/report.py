@@ -55,18 +55,19 @@ def report_files(dossier: Dossier, variant: str, folder: Path = Path()) -> dict[
 
 def _about_verdict(dossier: Dossier, shown: Sequence[Shown]) -> dict[str, Any]:
     verdict, found = dossier.verdict, dossier.diagnosis
+    layers = [one.layer for one in found.selection.accepted] if found else []
     return {
         "name": dossier.name,
         "about": text_of(dossier.case.document.root, "about"),
         "verdict": verdict,
-        "has_model": bool(found and found.selection.accepted),
-        "laid": [one.layer.id for one in found.selection.accepted] if found else [],
+        "has_model": bool(layers),
+        "laid": [layer.id for layer in layers],
         "headline": listing.in_parts(wording.headline(dossier)),
         "cards": cards_of(dossier),
         "location": wording.location(dossier) if found else "",
         "messages": verdict.messages,
         "abouts": _abouts(dossier),
-        "changes": changes(dossier),
+        "changes": changes(dossier.case.document, layers),
         "places": listing.place_rows(verdict.location[0]) if verdict.location else [],
         "rivals": [wording.effect_at(one) for one in verdict.ambiguous_with],
         "separation": wording.separation(dossier),

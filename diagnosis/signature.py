@@ -36,11 +36,11 @@ BLUE, RED, *_ = PALETTE
 
 @dataclass(frozen=True)
 class Signature:
-    """Runs of a base without and with an effect, its parameters having `values` [SI]."""
+    """Runs of a base without and with an effect; `values` are its parameters, with units."""
 
     layer: Layer
     stepped: str
-    values: Mapping[str, float]
+    values: Mapping[str, str]
     without: Trajectory
     with_it: Trajectory
 
@@ -72,16 +72,19 @@ def _usual_step(base: Automaton, layer: Layer) -> tuple[str, str]:
     return name, f"{USUAL.get(unit, '1')} {unit}"
 
 
-def _visible(whole: Automaton, layer: Layer) -> tuple[Automaton, dict[str, float]]:
+def _visible(whole: Automaton, layer: Layer) -> tuple[Automaton, dict[str, str]]:
     """Return an automaton in which the effect's parameters are away from where it vanishes."""
     brought = [layer.named(name) for name in own_names(layer.effect.body)]
-    parameters, values = dict(whole.parameters), {}
+    parameters, values = dict(whole.parameters), dict[str, str]()
     for one in uncertain_of(whole, brought):
         if one.name in brought:
-            value = one.starts[-1] if one.starts else one.start
+            neutral = parameters[one.name].fitting.neutral
+            is_neutral = neutral == parameters[one.name].value
+            value = one.starts[-1] if one.starts and is_neutral else one.start
             exact = Fraction(repr(value))
             parameters[one.name] = dataclasses.replace(parameters[one.name], value=exact)
-            values[one.name.removesuffix(f"_{layer.ending}")] = value
+            unit = "" if one.unit == "1" else f" {one.unit}"
+            values[one.name.removesuffix(f"_{layer.ending}")] = f"{value:.5g}{unit}"
     return dataclasses.replace(whole, parameters=parameters), values
 
 
@@ -126,7 +129,7 @@ def signature_picture(found: Signature) -> Picture:
         for axis in (above, beneath):
             axis.grid(alpha=0.3)
     rows[0][0].legend(loc="best", fontsize=8)
-    values = ", ".join(f"{name} = {value:.4g}" for name, value in found.values.items())
+    values = ", ".join(f"{name} = {text}" for name, text in found.values.items())
     title = f"{found.layer.id}: {values or 'no parameter'}; steps of {found.stepped}"
     rows[0][0].set_title(title, loc="left", fontsize=11, parse_math=False)
     rows[-1][0].set_xlabel("time [s]")

@@ -19,6 +19,7 @@ MECHANICAL: dict[tuple[int, ...], str] = {
     (1, 1, -2): "N",
     (2, 1, -3): "W",
     (-1, 1, -2): "Pa",
+    (2, 1, 0): "kg*m^2",
 }
 """How dimensions of mechanics are shown: powers of m, kg, s."""
 

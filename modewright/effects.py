@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
+from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 from diagnosis.library import Described, described, library
+from diagnosis.naming import OTHER_NAMES
 from language.document import Document
-from language.problem import Problems, Source, Span, nearest
+from language.problem import Problems, Source, Span, SpecError, nearest
 from language.project import Project, expanded, read_document
 
 if TYPE_CHECKING:
@@ -15,6 +18,8 @@ if TYPE_CHECKING:
 
 USUAL_BASE = "blind_driveline"
 """The spec over which signatures are drawn where none is named."""
+ALIKE = 4
+"""Letters at the start of a word that make two names alike."""
 
 
 def effects(at: str | None = None, root: Path | None = None) -> list[Described]:
@@ -25,18 +30,45 @@ def effects(at: str | None = None, root: Path | None = None) -> list[Described]:
 
 
 def effect(name: str, at: str | None = None, root: Path | None = None) -> Described:
-    """Return one effect; with a spec, the places it fits. Raises SpecError."""
+    """Return one effect; with a spec, the places it fits, or the one of `effect@place`.
+
+    Raises SpecError.
+    """
     project = Project(root or Path())
     document = _base(at, project) if at else None
     known = {one.name: one for one in library(project)}
-    if name in known:
-        return described(known[name], document, project)
+    plain, _, place = name.partition("@")
+    plain, _ = OTHER_NAMES.get(plain, (plain, ""))
+    if plain not in known:
+        _refuse(name, f"there is no effect named `{plain}`", _like(plain, known))
+    found = described(known[plain], document, project)
+    if not place or document is None:
+        return found
+    layers = tuple(layer for layer in found.layers if layer.place == place)
+    if not layers:
+        fits = ", ".join(found.places) or "none"
+        _refuse(name, f"`{plain}` fits no `{place}` of `{document.name}`", f"places: {fits}")
+    return dataclasses.replace(found, layers=layers)
+
+
+def _like(name: str, known: Iterable[str]) -> str:
+    """Return what may have been meant: the nearest name, or those that begin a word alike."""
+    names = sorted({*known, *OTHER_NAMES})
+    near = nearest(name, names)
+    if near:
+        return near
+    start = name[:ALIKE]
+    found = [one for one in names if any(word.startswith(start) for word in one.split("_"))]
+    if len(start) == ALIKE and found:
+        return f"there are {', '.join(f'`{one}`' for one in found)}"
+    return "`modewright effects` lists them"
+
+
+def _refuse(text: str, label: str, help: str) -> NoReturn:
     problems = Problems()
-    span = Span(Source("command line", (name,)), 1, 1, max(1, len(name)))
-    hint = nearest(name, known) or "`modewright effects` lists them"
-    problems.error("name", span, f"there is no effect named `{name}`", hint)
-    problems.stop_if_any()
-    raise AssertionError(name)
+    span = Span(Source("command line", (text,)), 1, 1, max(1, len(text)))
+    problems.error("name", span, label, help)
+    raise SpecError(problems.found)
 
 
 def signature(
@@ -51,12 +83,9 @@ def signature(
 
     project = Project(root or Path())
     document = _base(at or USUAL_BASE, project)
-    plain, _, place = name.partition("@")
-    found = effect(plain, at or USUAL_BASE, root)
-    layers = [layer for layer in found.layers if place in ("", layer.place)]
+    layers = effect(name, at or USUAL_BASE, root).layers
     if not layers:
-        fits = ", ".join(found.places) or "none"
-        raise ValueError(f"`{name}` fits no place of `{document.name}`; places: {fits}")
+        raise ValueError(f"`{name}` fits no place of `{document.name}`")
     return signature_picture(runs(document, project, layers[0], _step(step) if step else None))
 
 

@@ -9,8 +9,9 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from diagnosis.change import Change
 from diagnosis.library import Described, place_kinds
-from diagnosis.naming import place_path
+from diagnosis.naming import OTHER_NAMES, place_path
 
 
 def print_effects(screen: Console, found: Sequence[Described], at: str | None) -> None:
@@ -30,9 +31,14 @@ def print_effect(screen: Console, one: Described, at: str | None) -> None:
     """Print all that is known of an effect."""
     effect = one.effect
     lines = [f"{effect.name}: {effect.about}", f"fits {place_kinds(effect)}"]
+    for name, (other, where) in OTHER_NAMES.items():
+        if other == effect.name:
+            lines.append(f"verdicts call it {name} {where}")
     if at:
         lines.append(f"in {at}: {', '.join(one.places) or 'nowhere'}")
     lines += ["", *(f"  {line}" for line in one.lines), ""]
+    for place in one.places:
+        lines += [f"laid on {place} of {at}:", *_changed(one.changes[place]), ""]
     parts = {
         "signature": effect.signature,
         "confused with": ", ".join(effect.confused_with),
@@ -42,6 +48,15 @@ def print_effect(screen: Console, one: Described, at: str | None) -> None:
     lines += [f"{name}: {text}" for name, text in parts.items() if text]
     for line in lines:
         screen.print(line, highlight=False, markup=False, soft_wrap=True)
+
+
+def _changed(changes: Sequence[Change]) -> list[str]:
+    found = []
+    for change in changes:
+        found.append(f"  {change.path}")
+        found += [f"    - {change.before}"] if change.before else []
+        found += [f"    + {change.after}"] if change.after else []
+    return found
 
 
 def effect_json(one: Described) -> dict[str, Any]:
@@ -57,4 +72,8 @@ def effect_json(one: Described) -> dict[str, Any]:
         "separated_by": list(effect.separated_by),
         "references": list(effect.references),
         "places": [place_path(layer) for layer in one.layers],
+        "changes": {
+            layer.place: [vars(change) for change in one.changes[layer.place]]
+            for layer in one.layers
+        },
     }

@@ -12,9 +12,7 @@ from modewright.files import require_writable, write_files
 
 
 def effects(
-    name: Annotated[
-        str | None, typer.Argument(help="an effect, or `effect@place` for a picture")
-    ] = None,
+    name: Annotated[str | None, typer.Argument(help="an effect, or `effect@place`")] = None,
     at: Annotated[
         str | None, typer.Option("--at", help="a spec: tell which of its places effects fit")
     ] = None,
@@ -27,9 +25,11 @@ def effects(
     """List the effects that can be laid over a model, explain one, draw how it shows.
 
     \b
-    modewright effects
-    modewright effects --at emps
-    modewright effects tyre_slip --at blind_driveline --plot tyre_slip.png
+    modewright effects                                        what can be laid, a line each
+    modewright effects --at emps                              what fits a spec, and where
+    modewright effects tyre_slip --at blind_driveline         what it changes in the equations
+    modewright effects coulomb_friction@w_em --at blind_driveline --plot friction.png
+    modewright effects torque_gain --at blind_driveline --plot gain.png --step 'T_em=80 N*m'
     """
     from modewright import effects as found, show, show_effects
 
@@ -37,14 +37,15 @@ def effects(
         raise typer.BadParameter("name the effect to be drawn", param_hint="--plot")
     form = graphic_format(plot) if plot else ""
     require_writable(plot)
-    plain = name.partition("@")[0] if name else None
-    listed = [found.effect(plain, at)] if plain else found.effects(at)
+    if step and not plot:
+        raise typer.BadParameter("say with --plot where the picture goes", param_hint="--step")
+    listed = [found.effect(name, at)] if name else found.effects(at)
     if plot and name:
         with usage_errors():
             write_files({plot: found.signature(name, at, step=step).data(form)})
     if as_json:
         show.print_json({"effects": [show_effects.effect_json(one) for one in listed]})
-    elif plain:
+    elif name:
         show_effects.print_effect(console(), listed[0], at)
     else:
         show_effects.print_effects(console(), listed, at)

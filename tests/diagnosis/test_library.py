@@ -52,6 +52,33 @@ def test_an_effect_of_the_project_is_one_of_the_library(
     assert "at:" not in told
 
 
+def test_what_an_effect_changes_at_a_place_is_told_line_by_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    project_of(tmp_path, spinner=SPEC, bench_columns=MAP)
+    monkeypatch.chdir(tmp_path)
+    assert run("effects", "torque_gain", "--at", "spinner") == 0
+    told = capsys.readouterr().out
+    lines = ["laid on T of spinner:", "  flow.w", "    - J * der(w) = T - b * w"]
+    lines += ["    + J * der(w) = u_g_T - b * w", "  equations.u_g_T", "    + gain_T * T"]
+    assert "\n".join(lines) in told
+    assert run("effects", "torque_gain@T", "--at", "spinner", "--json") == 0
+    (one,) = json.loads(capsys.readouterr().out)["effects"]
+    assert one["places"] == ["inputs.T"]
+    added = {"path": "equations.u_g_T", "before": "", "after": "gain_T * T"}
+    assert added in one["changes"]["T"]
+
+
+def test_an_effect_is_found_by_the_name_that_verdicts_use(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(ROOT)
+    assert run("effects", "second_gap") == 0
+    told = capsys.readouterr().out
+    assert told.startswith("backlash: ")
+    assert "verdicts call it second_gap on an elastic element that has a gap" in told
+
+
 def test_places_are_those_where_an_effect_can_be_laid() -> None:
     path = SHIPPED.path_of("blind_driveline")
     base = expanded(read_document(path), SHIPPED)
@@ -71,7 +98,7 @@ def test_a_signature_is_what_the_equation_of_the_effect_says(tmp_path: Path) -> 
     (friction,) = (one for one in library(SHIPPED) if one.name == "coulomb_friction")
     (layer,) = described(friction, base, project).layers
     found = signature(base, project, layer, ("T", "10 N*m"))
-    assert found.values == {"T_c": 1.0}
+    assert found.values == {"T_c": "1 N*m"}
     times = found.without.times
     change = found.with_it.signals["spinner.w"] - found.without.signals["spinner.w"]
     place = int(np.searchsorted(times, 0.95))
@@ -83,6 +110,11 @@ def test_a_signature_is_what_the_equation_of_the_effect_says(tmp_path: Path) -> 
     ("words", "told"),
     [
         (["tyre_slp"], "did you mean `tyre_slip`?"),
+        (["fric"], "there are `coulomb_friction`, `stribeck_friction`, `viscous_friction`"),
+        (["second_gp"], "did you mean `second_gap`?"),
+        (["windmill"], "`modewright effects` lists them"),
+        (["torque_gain@w", "--at", "spinner"], "`torque_gain` fits no `w` of `spinner`"),
+        (["torque_gain", "--at", "spinner", "--step", "T=1 N*m"], "say with --plot"),
         (["--plot", "out.png"], "name the effect"),
         (["tyre_slip", "--at", "spinner", "--plot", "out.png"], "fits no place of `spinner`"),
         (["torque_gain", "--at", "spinner", "--plot", "o.png", "--step", "T"], "input=height"),
