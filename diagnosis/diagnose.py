@@ -16,6 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from diagnosis.bench import Bench, balance_drifts
+from diagnosis.description import Description, described
+from diagnosis.doubt import explains_more, is_doubtful, selected_formula
 from diagnosis.estimation import Estimate, adapted
 from diagnosis.evidence import inflation
 from diagnosis.hidden import with_hidden
@@ -61,12 +63,16 @@ class Case:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """A verdict with the models behind it; `bench` holds the training recordings."""
+    """A verdict with the models behind it; `bench` holds the training recordings.
+
+    `description` is the formula that an unknown was turned into: it then is what was accepted.
+    """
 
     verdict: Verdict
     selection: Selection = field(repr=False)
     bench: Bench = field(repr=False)
     held_out: tuple[Series, ...] = field(repr=False)
+    description: Description | None = field(default=None, repr=False)
 
 
 def diagnose(case: Case, tell: Tell = lambda text: None) -> Diagnosis:
@@ -84,6 +90,13 @@ def diagnose(case: Case, tell: Tell = lambda text: None) -> Diagnosis:
     selection = selected(bench, base, units, case.threshold, tell)
     selection = with_hidden(bench, selection, loci, UNKNOWN * case.threshold, tell)
     says = _says(selection, loci, bench, case.threshold)
+    formula = None
+    if is_doubtful(says, selection, loci, bench, case.threshold):
+        formula = described(bench, selection.base, loci, units, case.threshold, tell)
+    if formula is not None and explains_more(formula, selection):
+        says, selection = "unknown", selected_formula(selection, formula)
+    else:
+        formula = None
     loci = led_by(loci, [place_path(tried.layer) for tried in selection.accepted], bench)
     fit = {"train": misfits(base, selection.model, bench.series)}
     verdict = _verdict(says, selection, loci, automaton, fit)
@@ -99,7 +112,7 @@ def diagnose(case: Case, tell: Tell = lambda text: None) -> Diagnosis:
         tell("held out: " + ", ".join(f"{path.name} {_digest(path)}" for path in case.held_out))
         verdict = _confirmed(verdict, selection, held)
     verdict = dataclasses.replace(verdict, runtime_s=time.monotonic() - begun)
-    return Diagnosis(verdict, selection, bench, held)
+    return Diagnosis(verdict, selection, bench, held, formula)
 
 
 def compared(mapping: RecordingMap, automaton: Automaton) -> tuple[str, ...]:
@@ -193,7 +206,7 @@ def _verdict(
         effects if says == "effect" else (),
         ranked,
         probabilities["other"],
-        rivals if says == "effect" else (*effects, *rivals),
+        rivals if says == "effect" else (*effects, *rivals) if says == "ambiguous" else (),
         tuple(loci),
         fit,
         base,

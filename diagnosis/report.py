@@ -30,6 +30,9 @@ def report_files(dossier: Dossier, variant: str, folder: Path = Path()) -> dict[
     shown = shown_of(dossier)
     drawings = drawings_of(dossier, shown) if shown else []
     files = {"variant.yaml": variant.encode()}
+    if dossier.diagnosis and dossier.diagnosis.description:
+        formula = dossier.diagnosis.description.formula
+        files[f"{formula.layer.effect.name}.yaml"] = formula.text.encode()
     for one in drawings:
         files[f"{one.name}.svg"] = one.picture.data("svg")
         files[f"{one.name}.png"] = one.picture.data("png")

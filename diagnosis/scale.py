@@ -11,6 +11,8 @@ from diagnosis.layers import drift
 from language.place import Misfit, place_of
 
 Reals = NDArray[np.float64]
+KINDS = {"flow": "balance", "elements": "element", "outputs": "output"}
+"""Sections of places to kinds of drifts."""
 
 
 def scale_of(bench: Bench, section: str, place: str, model: Estimate) -> float:
@@ -21,7 +23,7 @@ def scale_of(bench: Bench, section: str, place: str, model: Estimate) -> float:
     if section == "outputs":
         column = bench.seen.index(place)
         return float(np.nanstd(np.concatenate([one.measured[:, column] for one in bench.series])))
-    holes = _holes(bench, "balance" if section == "flow" else "element", place)
+    holes = holes_of(bench, section, place)
     factor = _value(bench, model, holes.get("inertia" if section == "flow" else "stiffness", ""))
     name = place if section == "flow" else holes.get("twist", "")
     states = model.candidate.predictor.states
@@ -40,12 +42,14 @@ def scale_of(bench: Bench, section: str, place: str, model: Estimate) -> float:
 
 def unit_of(bench: Bench, section: str, place: str) -> str:
     """Return the unit of what is unknown at a place."""
-    kind = {"flow": "balance", "elements": "element", "outputs": "output"}.get(section)
-    holes = _holes(bench, kind, place) if kind else {}
-    return holes.get("unit" if kind == "output" else "force", "")
+    return holes_of(bench, section, place).get("unit" if section == "outputs" else "force", "")
 
 
-def _holes(bench: Bench, kind: str, place: str) -> dict[str, str]:
+def holes_of(bench: Bench, section: str, place: str) -> dict[str, str]:
+    """Return what effects find at a place, as texts; nothing where no drift can be laid."""
+    kind = KINDS.get(section)
+    if kind is None:
+        return {}
     found = place_of(bench.document.root, drift(kind, place).effect, place)
     if isinstance(found, Misfit):
         return {}

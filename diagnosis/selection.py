@@ -40,7 +40,8 @@ OTHER = 5.0
 class Selection:
     """What was accepted: `model` over `base`, the candidates of the first round, best first.
 
-    `rivals` are those that cannot be told from the first accepted one.
+    `rivals` are those that cannot be told from the first accepted one. `other` is the evidence
+    [nats] for none of the candidates: that of a formula where one explains more.
     """
 
     base: Estimate = field(repr=False)
@@ -48,11 +49,12 @@ class Selection:
     accepted: tuple[Tried, ...]
     first_round: tuple[Tried, ...]
     rivals: tuple[Tried, ...]
+    other: float = 2.0 * THRESHOLD - OTHER
 
     def probabilities(self) -> dict[str, float]:
         """Return the probability of each fitted candidate of the first round, and of `other`."""
         totals = {t.layer.id: t.evidence.total for t in self.first_round if t.evidence}
-        totals["other"] = 2.0 * THRESHOLD - OTHER
+        totals["other"] = self.other
         most = max(totals.values())
         weights = {name: float(np.exp(0.5 * (total - most))) for name, total in totals.items()}
         whole = sum(weights.values())

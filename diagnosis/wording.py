@@ -33,11 +33,20 @@ def headline(dossier: Dossier) -> str:
             f"it is: {'; '.join(names)}."
         )
     if verdict.verdict == "unknown":
-        return f"`{dossier.name}` lacks something that none of the effects tried explains."
+        like = _formula(dossier)
+        return f"`{dossier.name}` lacks something that none of the effects tried explains{like}."
     return (
         f"`{dossier.name}` lacks nothing that these recordings show: with its parameters "
         f"recalibrated no effect gains the {dossier.case.threshold:g} nats asked for."
     )
+
+
+def _formula(dossier: Dossier) -> str:
+    """Return what an unknown was turned into, as the end of a sentence."""
+    found = dossier.diagnosis.description if dossier.diagnosis else None
+    if found is None:
+        return ""
+    return f"; it is like `{found.text}` {PLACES[found.locus.section]} {found.locus.place}"
 
 
 def effect_at(one: Named) -> str:

@@ -1,0 +1,81 @@
+"""Doubt: when a formula is tried beside the effects of the library, and when it is the verdict.
+
+The nearest effect of a library that lacks the true one gains a great deal: what it leaves over
+tells that it is not the right one.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+from diagnosis.bench import Bench
+from diagnosis.description import Description
+from diagnosis.estimation import Estimate
+from diagnosis.evidence import inflation
+from diagnosis.excess import excess_at
+from diagnosis.location import acting
+from diagnosis.locus import Locus
+from diagnosis.naming import place_path
+from diagnosis.regression import ranking
+from diagnosis.search import Tried
+from diagnosis.selection import Selection
+from diagnosis.verdict import Says
+from language.problem import SpecError
+
+UNEXPLAINED = 4.0
+"""Times the threshold that the freedom of a place gains where a formula is tried."""
+LEFT = 3.0
+"""Times the threshold that a term gains where an accepted effect leaves something over."""
+LEFT_PART = 0.15
+"""And this part of what the effect gained: a strong one is never described quite well."""
+MORE = 1.2
+"""A formula is the verdict where it gains so many times as much as what was accepted."""
+
+
+def is_doubtful(
+    says: Says, selection: Selection, loci: Sequence[Locus], bench: Bench, threshold: float
+) -> bool:
+    """Tell whether a formula might say more than the verdict does."""
+    if says in ("unknown", "ambiguous"):
+        return True
+    if says == "nothing_missing":
+        shrink = 1.0 / inflation(selection.base, bench.series)
+        unexplained = max((locus.gain for locus in loci), default=0.0) * shrink
+        return unexplained > UNEXPLAINED * threshold
+    gained = sum(tried.evidence.train for tried in selection.accepted if tried.evidence)
+    return _left_over(bench, selection.model, selection.accepted) > max(
+        LEFT * threshold, LEFT_PART * gained
+    )
+
+
+def _left_over(bench: Bench, model: Estimate, accepted: Sequence[Tried]) -> float:
+    """Return what the best term gains [nats] where effects were accepted, beside them."""
+    most = 0.0
+    for path in {place_path(tried.layer) for tried in accepted}:
+        section, _, place = path.partition(".")
+        section, _, place = acting(bench, section, place).partition(".")
+        try:
+            excess = excess_at(bench, model, section, place)
+        except SpecError:
+            continue
+        most = max(most, ranking(excess.problem, excess.columns)[0][0])
+    return most
+
+
+def explains_more(found: Description, selection: Selection) -> bool:
+    """Tell whether a formula gains clearly more than all that was accepted."""
+    totals = [tried.evidence.total for tried in selection.accepted if tried.evidence]
+    return found.evidence.total > MORE * sum(totals)
+
+
+def selected_formula(selection: Selection, found: Description) -> Selection:
+    """Return a selection in which a formula is what was accepted, and no candidate is likely."""
+    tried = Tried(found.formula.layer, found.evidence.train, found.estimate, found.evidence)
+    return dataclasses.replace(
+        selection,
+        model=found.estimate,
+        accepted=(tried,),
+        rivals=(),
+        other=max(selection.other, found.evidence.total),
+    )
