@@ -61,6 +61,9 @@ def searched(
             found.append(Tried(layer, gain))
             continue
         estimate = fitted(start.candidate, bench.series, base.noises, start.point, units)
+        if not np.isfinite(estimate.cost):
+            found.append(Tried(layer, gain))
+            continue
         known = evidence(estimate, base, bench.series)
         tell(f"{layer.id}: train {known.train:.0f}, left out {known.left_out:.0f} nats")
         found.append(Tried(layer, gain, estimate, known))

@@ -27,6 +27,8 @@ MUCH = 0.1
 """Part of what the best candidate gained that a model must gain for them to be looked for anew."""
 SHARED = 0.15
 """The part of what an effect gains that must be left without the recording that gains most."""
+ALONE = 4.0
+"""Times the threshold that is enough where less than that is left."""
 BETTER = 10.0
 """Nats by which a model must fit better for its candidates to be looked at again."""
 MOST_EFFECTS = 3
@@ -76,16 +78,14 @@ def selected(
     needed = threshold
     while len(accepted) < MOST_EFFECTS:
         tried = searched(bench, model, units, layers, tell)
-        rest: list[Tried] = []
         better = _better_base(bench, model, units, tried)
         if better is not None:
             tell(f"the model itself fits better: {better.cost:.0f} nats; candidates again")
+            gained = model.cost - better.cost
             model = better
             base = base if accepted else better
-            promising = [other.layer for other in tried if other.promised > 0.0]
-            before, tried = tried, searched(bench, model, units, promising[:AGAIN], tell)
-            rest = _passed_over(before, tried)
-        rounds.append([*tried, *rest])
+            tried = _again(bench, model, units, tried, gained, tell)
+        rounds.append(tried)
         layers = [other.layer for other in tried[:NEXT] if other.promised > 0.0]
         enough = (t for t in tried if t.evidence and _is_enough(t.evidence, needed))
         best = next(enough, None)
@@ -100,19 +100,13 @@ def selected(
     return Selection(base, model, kept, first, _rivals(first, kept))
 
 
-def _passed_over(before: list[Tried], again: list[Tried]) -> list[Tried]:
-    """Return those that were not looked at again: they promise less over a better model."""
-    ids = {one.layer.id for one in again}
-    return [Tried(one.layer, one.promised) for one in before if one.layer.id not in ids]
-
-
 def _is_enough(known: Evidence, needed: float) -> bool:
-    """Tell whether an effect gains enough, and not in one recording alone.
+    """Tell whether an effect gains enough; more of it where one recording alone shows it.
 
-    What only one recording shows is more often an accident of it than physics.
+    A little in one recording is more often an accident of it than physics.
     """
     shared = len(known.each) == 1 or known.rest > SHARED * known.left_out
-    return known.least > needed and shared
+    return known.least > (needed if shared else ALONE * needed)
 
 
 def _better_base(
