@@ -125,11 +125,13 @@ class Predictor:
         gains: Reals,
         substeps: int,
         linear: bool,
+        pushes: Reals | None = None,
     ) -> Prediction:
         """Follow a recording; arrays are C-contiguous; inputs are held, or `linear` in between.
 
         `page` (tunables,), `inputs` (samples, inputs), `measured` (samples, seen) with NaN where
         nothing is known, `first_gains` (first, states, seen), `gains` (modes, states, seen).
+        `pushes` (samples, states) are added to the states once they are corrected.
         """
         samples = len(inputs)
         innovations = np.full((samples, len(self.seen)), np.nan)
@@ -146,6 +148,7 @@ class Predictor:
             samples,
             substeps,
             int(linear),
+            None if pushes is None else _at(pushes),
             _at(innovations),
             _at(seen),
             _at(states),
@@ -198,7 +201,7 @@ def _loaded(path: Path) -> Any:
     library.modewright_gains.restype = whole
     library.modewright_predict.argtypes = [
         *(pointer, pointer, pointer, pointer, whole, pointer),
-        *(whole, whole, ctypes.c_int, pointer, pointer, pointer, pointer),
+        *(whole, whole, ctypes.c_int, pointer, pointer, pointer, pointer, pointer),
     ]
     library.modewright_predict.restype = whole
     return library

@@ -56,12 +56,15 @@ def _sure(dossier: Dossier, selection: Selection) -> Card:
             if one.layer.id in shares:
                 lines.append(f"{probability(shares[one.layer.id])} probable: {one.layer.id}")
         lines += [f"best of {count}", *(_gain(one) for one in selection.accepted)]
-        lines.append(f"{dossier.case.threshold:g} nats are needed")
+        lines.append(f"{dossier.case.thresholds.text} nats are needed")
     else:
         lines.append(f"none of {count}, gains enough")
         best = max(fitted, key=_least, default=None)
         if best is not None:
-            lines += [f"best: {_gain(best)}", f"{dossier.case.threshold:g} nats are needed in both"]
+            lines += [
+                f"best: {_gain(best)}",
+                f"{dossier.case.thresholds.text} nats are needed in both",
+            ]
     confirmed = {
         True: "better on recordings that were held out, too",
         False: "not better on recordings that were held out",

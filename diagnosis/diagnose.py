@@ -9,13 +9,15 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
 from diagnosis.bench import Bench, balance_drifts
+from diagnosis.bootstrap import bootstrapped, kept_thresholds
 from diagnosis.description import Description, described
 from diagnosis.doubt import explains_more, is_doubtful, selected_formula
 from diagnosis.estimation import Estimate, adapted
@@ -29,9 +31,10 @@ from diagnosis.naming import named, place_path, quantities_of, verdict_id
 from diagnosis.place_sentence import place_sentence
 from diagnosis.prediction import noises_of
 from diagnosis.search import Tell, Tried
-from diagnosis.selection import THRESHOLD, Selection, selected
+from diagnosis.selection import Selection, selected
 from diagnosis.series import Series, paced, series_of
 from diagnosis.simulation import misfits
+from diagnosis.threshold import EVERYWHERE, USUAL, Thresholds
 from diagnosis.verdict import Misfit, Named, Ranked, Says, Verdict
 from engine.recorded_part import file_of
 from engine.recording import pieces, read_recording
@@ -47,6 +50,9 @@ CLEAR = 3.0
 UNKNOWN = 4.0
 """Times the threshold that a free drift must gain over the base where no effect was accepted."""
 
+Bootstrap = Literal["never", "kept", "made"]
+"""Whether thresholds of a bootstrap are used: never, where one has left them, always."""
+
 
 @dataclass(frozen=True)
 class Case:
@@ -58,7 +64,8 @@ class Case:
     train: tuple[Path, ...]
     held_out: tuple[Path, ...] = ()
     effects: tuple[Effect, ...] | None = None
-    threshold: float = THRESHOLD
+    thresholds: Thresholds = EVERYWHERE
+    bootstrap: Bootstrap = "never"
 
 
 @dataclass(frozen=True)
@@ -73,6 +80,7 @@ class Diagnosis:
     bench: Bench = field(repr=False)
     held_out: tuple[Series, ...] = field(repr=False)
     description: Description | None = field(default=None, repr=False)
+    thresholds: Thresholds = EVERYWHERE
 
 
 def diagnose(case: Case, tell: Tell = lambda text: None) -> Diagnosis:
@@ -87,12 +95,14 @@ def diagnose(case: Case, tell: Tell = lambda text: None) -> Diagnosis:
     units = units_of(base.candidate, bench.series, base.noises, base.values(0))
     loci = located(bench, base)
     tell(place_sentence(loci, bench))
-    selection = selected(bench, base, units, case.threshold, tell)
-    selection = with_hidden(bench, selection, loci, UNKNOWN * case.threshold, tell)
-    says = _says(selection, loci, bench, case.threshold)
+    thresholds = _thresholds(case, bench, base, units, series, tell)
+    most = max(USUAL, thresholds.most)
+    selection = selected(bench, base, units, thresholds, tell)
+    selection = with_hidden(bench, selection, loci, UNKNOWN * most, tell)
+    says = _says(selection, loci, bench, most)
     formula = None
-    if is_doubtful(says, selection, loci, bench, case.threshold):
-        formula = described(bench, selection.base, loci, units, case.threshold, tell)
+    if is_doubtful(says, selection, loci, bench, most):
+        formula = described(bench, selection.base, loci, units, most, tell)
     if formula is not None and explains_more(formula, selection):
         says, selection = "unknown", selected_formula(selection, formula)
     else:
@@ -112,7 +122,7 @@ def diagnose(case: Case, tell: Tell = lambda text: None) -> Diagnosis:
         tell("held out: " + ", ".join(f"{path.name} {_digest(path)}" for path in case.held_out))
         verdict = _confirmed(verdict, selection, held)
     verdict = dataclasses.replace(verdict, runtime_s=time.monotonic() - begun)
-    return Diagnosis(verdict, selection, bench, held, formula)
+    return Diagnosis(verdict, selection, bench, held, formula, thresholds)
 
 
 def compared(mapping: RecordingMap, automaton: Automaton) -> tuple[str, ...]:
@@ -166,11 +176,30 @@ def recalibrated_base(
     return bench, base
 
 
-def _says(selection: Selection, loci: Sequence[Locus], bench: Bench, threshold: float) -> Says:
+def _thresholds(
+    case: Case,
+    bench: Bench,
+    base: Estimate,
+    units: Mapping[str, float],
+    raw: Sequence[Series],
+    tell: Tell,
+) -> Thresholds:
+    """Return the thresholds of a case: given, kept from an earlier bootstrap, or made by one."""
+    if case.bootstrap == "never":
+        return case.thresholds
+    kept = kept_thresholds(bench, raw)
+    if kept is None and case.bootstrap == "made":
+        kept = bootstrapped(bench, base, units, raw, tell)
+    found = kept or case.thresholds
+    tell(f"thresholds of {found.text} nats, {found.origin}")
+    return found
+
+
+def _says(selection: Selection, loci: Sequence[Locus], bench: Bench, needed: float) -> Says:
     if not selection.accepted:
         shrink = 1.0 / inflation(selection.base, bench.series)
         unexplained = max((locus.beyond for locus in loci), default=0.0) * shrink
-        return "unknown" if unexplained > UNKNOWN * threshold else "nothing_missing"
+        return "unknown" if unexplained > UNKNOWN * needed else "nothing_missing"
     best = selection.accepted[0].evidence
     rivals = [tried.evidence for tried in selection.rivals if tried.evidence]
     if best and any(rival.total > best.total - CLEAR for rival in rivals):

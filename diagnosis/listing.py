@@ -94,7 +94,7 @@ def _row(
     assert tried.evidence
     known, share = tried.evidence, shares.get(tried.layer.id)
     is_accepted = tried.layer.id in {one.layer.id for one in selection.accepted}
-    reason = wording.reason(tried, rank, selection, dossier.case.threshold)
+    reason = wording.reason(tried, rank, selection, dossier.case.thresholds)
     if is_accepted and dossier.verdict.verdict == "ambiguous":
         reason = "best, but not told from others: laid in what is shown here"
     effect, _, place = wording.title(tried.layer, dossier).partition("@")
@@ -120,7 +120,7 @@ def unfitted(dossier: Dossier, selection: Selection) -> list[tuple[str, list[str
     ids = {one.layer.id for one in selection.accepted}
     for tried in selection.first_round:
         if not tried.evidence and tried.layer.id not in ids:
-            why = wording.reason(tried, 0, selection, dossier.case.threshold)
+            why = wording.reason(tried, 0, selection, dossier.case.thresholds)
             found.setdefault(why, []).append(wording.title(tried.layer, dossier))
     return list(found.items())
 

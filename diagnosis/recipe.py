@@ -74,8 +74,8 @@ def kept(key: str, make: Callable[[], tuple[Recipe, bytes]]) -> tuple[Recipe, Pa
     recipe, data = make()
     seal = hashlib.sha256(data).hexdigest()
     text = json.dumps({**dataclasses.asdict(recipe), "library": seal})
-    _write(library, data)
-    _write(recipe_path, text.encode())
+    write_whole(library, data)
+    write_whole(recipe_path, text.encode())
     return recipe, library
 
 
@@ -121,7 +121,8 @@ def _recipe(known: dict[str, Any]) -> Recipe:
     )
 
 
-def _write(path: Path, data: bytes) -> None:
+def write_whole(path: Path, data: bytes) -> None:
+    """Write a file of the cache: all of it or nothing."""
     handle, name = tempfile.mkstemp(dir=path.parent)
     try:
         with os.fdopen(handle, "wb") as file:

@@ -112,7 +112,7 @@ def _about_data(dossier: Dossier) -> dict[str, Any]:
         "recordings": listing.recording_rows(dossier),
         "untestable": listing.untestable(dossier),
         "fixed": fixed(dossier),
-        "threshold": dossier.case.threshold,
+        "thresholds": dossier.case.thresholds,
     }
 
 

@@ -46,6 +46,7 @@ def searched(
     units: Mapping[str, float],
     layers: Iterable[Layer],
     tell: Tell = lambda text: None,
+    worth: float = WORTH,
 ) -> list[Tried]:
     """Return the candidates that could be laid on the base's layers, best first."""
     promised: list[tuple[float, Layer, Estimate]] = []
@@ -57,7 +58,7 @@ def searched(
     promised.sort(key=lambda one: -one[0])
     found = []
     for place, (gain, layer, start) in enumerate(promised):
-        if place >= FULL_FITS or gain < WORTH:
+        if place >= FULL_FITS or gain < worth:
             found.append(Tried(layer, gain))
             continue
         estimate = fitted(start.candidate, bench.series, base.noises, start.point, units)

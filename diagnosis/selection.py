@@ -13,9 +13,8 @@ from diagnosis.estimation import Estimate
 from diagnosis.evidence import Evidence, evidence
 from diagnosis.level import settled
 from diagnosis.search import Tell, Tried, searched
+from diagnosis.threshold import EVERYWHERE, USUAL, Thresholds
 
-THRESHOLD = 45.0
-"""Nats that an effect must gain both in training and left out; a bootstrap gives a better one."""
 PART = 0.05
 """A further effect gains at least this part of what the one before it gained: a strong effect is
 never described so well that nothing small is left beside it."""
@@ -51,7 +50,7 @@ class Selection:
     accepted: tuple[Tried, ...]
     first_round: tuple[Tried, ...]
     rivals: tuple[Tried, ...]
-    other: float = 2.0 * THRESHOLD - OTHER
+    other: float = 2.0 * USUAL - OTHER
 
     def probabilities(self) -> dict[str, float]:
         """Return the probability of each fitted candidate of the first round, and of `other`."""
@@ -67,7 +66,7 @@ def selected(
     bench: Bench,
     base: Estimate,
     units: Mapping[str, float],
-    threshold: float = THRESHOLD,
+    thresholds: Thresholds = EVERYWHERE,
     tell: Tell = lambda text: None,
 ) -> Selection:
     """Return the effects that the training recordings ask for: at most three, none too many."""
@@ -75,7 +74,7 @@ def selected(
     accepted: list[Tried] = []
     rounds: list[list[Tried]] = []
     layers = list(bench.layers())
-    needed = threshold
+    needed = 0.0
     while len(accepted) < MOST_EFFECTS:
         tried = searched(bench, model, units, layers, tell)
         better = _better_base(bench, model, units, tried)
@@ -87,15 +86,19 @@ def selected(
             tried = _again(bench, model, units, tried, gained, tell)
         rounds.append(tried)
         layers = [other.layer for other in tried[:NEXT] if other.promised > 0.0]
-        enough = (t for t in tried if t.evidence and _is_enough(t.evidence, needed))
+        enough = (
+            t
+            for t in tried
+            if t.evidence and _is_enough(t.evidence, max(needed, thresholds.of(t.layer)))
+        )
         best = next(enough, None)
         if best is None or best.estimate is None or best.evidence is None:
             break
-        needed = max(threshold, PART * best.evidence.least)
+        needed = PART * best.evidence.least
         tell(f"accepted {best.layer.id}: {best.evidence.least:.0f} nats")
         accepted.append(best)
         model = best.estimate
-    kept, model = _still_needed(bench, base, model, accepted, units, threshold, tell)
+    kept, model = _still_needed(bench, base, model, accepted, units, thresholds, tell)
     first = tuple(rounds[0]) if rounds else ()
     return Selection(base, model, kept, first, _rivals(first, kept))
 
@@ -159,7 +162,7 @@ def _still_needed(
     model: Estimate,
     accepted: list[Tried],
     units: Mapping[str, float],
-    threshold: float,
+    thresholds: Thresholds,
     tell: Tell,
 ) -> tuple[tuple[Tried, ...], Estimate]:
     """Take out what the effects found after it have made needless."""
@@ -170,7 +173,7 @@ def _still_needed(
         if candidate is None:
             continue
         without = settled(candidate, bench.series, base.noises, model.values(0), units, turns=1)
-        if evidence(model, without, bench.series).least <= threshold:
+        if evidence(model, without, bench.series).least <= thresholds.of(tried.layer):
             tell(f"{tried.layer.id} is needless beside the others")
             kept.remove(tried)
             model = without

@@ -12,6 +12,7 @@ from diagnosis.naming import place_path, verdict_id
 from diagnosis.place_sentence import PLACES, place_sentence
 from diagnosis.search import FULL_FITS, WORTH, Tried
 from diagnosis.selection import CLOSE, Selection
+from diagnosis.threshold import Thresholds
 from diagnosis.verdict import Misfit as FitMisfit, Named, Quantity
 
 MOST_NAMED = 4
@@ -37,7 +38,7 @@ def headline(dossier: Dossier) -> str:
         return f"`{dossier.name}` lacks something that none of the effects tried explains{like}."
     return (
         f"`{dossier.name}` lacks nothing that these recordings show: with its parameters "
-        f"recalibrated no effect gains the {dossier.case.threshold:g} nats asked for."
+        f"recalibrated no effect gains the {dossier.case.thresholds.text} nats asked for."
     )
 
 
@@ -113,7 +114,7 @@ def separation(dossier: Dossier) -> list[str]:
     return lines
 
 
-def reason(tried: Tried, place: int, selection: Selection, threshold: float) -> str:
+def reason(tried: Tried, place: int, selection: Selection, thresholds: Thresholds) -> str:
     """Return why a candidate was accepted or not; `place` is its rank."""
     ids = {one.layer.id for one in selection.accepted}
     if tried.layer.id in ids:
@@ -125,10 +126,11 @@ def reason(tried: Tried, place: int, selection: Selection, threshold: float) -> 
         if tried.promised < WORTH:
             return f"not fitted: promises {max(tried.promised, 0.0):.0f} nats at most"
         return f"not fitted: {FULL_FITS} others promise more"
+    threshold = thresholds.of(tried.layer)
     if known.train <= threshold:
-        return f"gains less than {threshold:g} nats in training"
+        return f"gains less than {threshold:.0f} nats in training"
     if known.left_out <= threshold:
-        return f"gains less than {threshold:g} nats on recordings that were left out"
+        return f"gains less than {threshold:.0f} nats on recordings that were left out"
     if not selection.accepted:
         return "ranked behind one that was not accepted"
     return "explains less than what was accepted" if place else "not needed beside the others"

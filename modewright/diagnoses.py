@@ -5,15 +5,16 @@ from __future__ import annotations
 import dataclasses
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from diagnosis.diagnose import Case, diagnose as diagnosed
+from diagnosis.diagnose import Bootstrap, Case, diagnose as diagnosed
 from diagnosis.dossier import Dossier, hashes, undecided, usable
 from diagnosis.finding import told
 from diagnosis.fit import Fit, fit as fitted
 from diagnosis.layers import effects_in
 from diagnosis.library import library
+from diagnosis.threshold import EVERYWHERE, Thresholds, thresholds_in, written
 from diagnosis.variant import needed, variant_text
 from diagnosis.wording import summary
 from engine.recorded_part import overlap
@@ -25,6 +26,9 @@ from modewright.files import make_folder, write_files
 from modewright.recordings import CheckedRecordings, check_recordings
 
 Tell = Callable[[str], None]
+KEPT = "kept"
+BOOTSTRAPS: Mapping[str, Bootstrap] = {KEPT: "kept", "bootstrap": "made", "usual": "never"}
+"""Words for thresholds; anything else is a file."""
 
 
 class BudgetSpent(Exception):
@@ -39,6 +43,7 @@ def diagnose(
     effects: str | Path | None = None,
     root: Path | None = None,
     *,
+    thresholds: str | Path = KEPT,
     out: str | Path | None = None,
     budget: float | None = None,
     anyway: bool = False,
@@ -48,13 +53,17 @@ def diagnose(
 
     Recordings with faults that make a verdict worthless give the verdict `unknown`, unless it is
     wanted `anyway`. `effects` is a folder of effects in place of those shipped, `budget` a time
-    [s]. Raises SpecError, ValueError, ToolMissing, OutputError, BudgetSpent.
+    [s]. `thresholds` are those that a bootstrap has left (`kept`, else the usual one), those of a
+    `bootstrap` made where it has left none, the `usual` one, or a file. Raises SpecError,
+    ValueError, ToolMissing, OutputError, BudgetSpent.
     """
     begun = time.monotonic()
     _require_apart(train, held_out)
+    bootstrap, limits = _wanted(thresholds)
     tell = _within(budget, begun, tell)
     checked = check_recordings(train, map, spec, root=root)
     case, automaton = _case(spec, train, held_out, checked, effects, root)
+    case = dataclasses.replace(case, thresholds=limits, bootstrap=bootstrap)
     tell(f"looked at {len(case.train)} recordings: {len(checked.check.findings)} findings")
     kept = case.train if anyway else usable(checked.check, case.train)
     left_out = tuple(file.name for file in case.train if file not in kept)
@@ -63,6 +72,7 @@ def diagnose(
             tell(f"not used: {', '.join(left_out)}")
         case = dataclasses.replace(case, train=kept)
         found = diagnosed(case, tell)
+        case = dataclasses.replace(case, thresholds=found.thresholds)
         verdict, after = found.verdict, hashes(case.held_out)
         dossier = Dossier(case, automaton, checked.check, verdict, found, after, left_out)
         messages = (*summary(dossier), *needed(dossier))
@@ -87,10 +97,11 @@ def save_diagnosis(dossier: Dossier, out: str | Path, spec: str) -> list[Path]:
     folder = Path(out)
     make_folder(folder)
     variant = variant_text(dossier, base_of(dossier, spec, folder))
-    files = {
-        folder / name: data
-        for name, data in report_files(dossier, variant, Path(shown(folder))).items()
-    }
+    files = {}
+    if dossier.case.thresholds.groups:
+        files[folder / "thresholds.json"] = written(dossier.case.thresholds).encode()
+    for name, data in report_files(dossier, variant, Path(shown(folder))).items():
+        files[folder / name] = data
     write_files(files)
     return list(files)
 
@@ -141,6 +152,16 @@ def _case(
     files = tuple(Path(file) for file in train), tuple(Path(file) for file in held_out)
     candidates = _candidates(effects, project)
     return Case(whole, project, checked.mapping, *files, candidates), automaton
+
+
+def _wanted(thresholds: str | Path) -> tuple[Bootstrap, Thresholds]:
+    """Return whether a bootstrap is used, and the thresholds without one. Raises ValueError."""
+    if thresholds in BOOTSTRAPS:
+        return BOOTSTRAPS[str(thresholds)], EVERYWHERE
+    if not Path(thresholds).is_file():
+        words = ", ".join(BOOTSTRAPS)
+        raise ValueError(f"thresholds `{thresholds}`: neither one of {words} nor a file")
+    return "never", thresholds_in(Path(thresholds))
 
 
 def _candidates(folder: str | Path | None, project: Project) -> tuple[Effect, ...]:

@@ -37,6 +37,13 @@ def diagnose(
     effects: Annotated[
         Path | None, typer.Option("--effects", help="a folder of effects in place of those shipped")
     ] = None,
+    thresholds: Annotated[
+        str,
+        typer.Option(
+            "--thresholds",
+            help="what effects must gain: kept (by an earlier bootstrap), bootstrap, usual, a file",
+        ),
+    ] = "kept",
     budget: Annotated[
         str, typer.Option("--budget", help="the longest time it may take: '90 s', '10min'")
     ] = "10min",
@@ -56,6 +63,7 @@ def diagnose(
     \b
     modewright diagnose blind_driveline --train a.csv --train b.csv --held-out c.csv --out found
     modewright diagnose emps --train run.csv --map my_columns --effects my_effects --out found
+    modewright diagnose plant.yaml --train a.csv --train b.csv --thresholds bootstrap --out found
     modewright diagnose plant.yaml --train night.csv --out found --fail-on effect --json
     """
     from diagnosis.dossier import verdict_json
@@ -72,7 +80,7 @@ def diagnose(
         with usage_errors():
             found = diagnosed(
                 spec, train, held_out or (), mapping, effects,
-                budget=seconds, anyway=anyway, tell=tell,
+                thresholds=thresholds, budget=seconds, anyway=anyway, tell=tell,
             )  # fmt: skip
     except BudgetSpent as error:
         print(f"error: no verdict within --budget: {error}", file=sys.stderr)
