@@ -29,6 +29,7 @@ from diagnosis.location import led_by, located
 from diagnosis.locus import Locus
 from diagnosis.naming import named, place_path, quantities_of, verdict_id
 from diagnosis.place_sentence import place_sentence
+from diagnosis.plan import Plan, planned
 from diagnosis.prediction import noises_of
 from diagnosis.search import Tell, Tried
 from diagnosis.selection import Selection, selected
@@ -73,6 +74,7 @@ class Diagnosis:
     """A verdict with the models behind it; `bench` holds the training recordings.
 
     `description` is the formula that an unknown was turned into: it then is what was accepted.
+    `plan` is what would tell an accepted effect from those that do nearly as well.
     """
 
     verdict: Verdict
@@ -81,6 +83,7 @@ class Diagnosis:
     held_out: tuple[Series, ...] = field(repr=False)
     description: Description | None = field(default=None, repr=False)
     thresholds: Thresholds = EVERYWHERE
+    plan: Plan | None = field(default=None, repr=False)
 
 
 def diagnose(case: Case, tell: Tell = lambda text: None) -> Diagnosis:
@@ -107,6 +110,9 @@ def diagnose(case: Case, tell: Tell = lambda text: None) -> Diagnosis:
         says, selection = "unknown", selected_formula(selection, formula)
     else:
         formula = None
+    plan = planned(bench, _told_apart(selection, automaton))
+    if plan is not None:
+        tell(plan.sentence())
     loci = led_by(loci, [place_path(tried.layer) for tried in selection.accepted], bench)
     fit = {"train": misfits(base, selection.model, bench.series)}
     verdict = _verdict(says, selection, loci, automaton, fit)
@@ -122,7 +128,7 @@ def diagnose(case: Case, tell: Tell = lambda text: None) -> Diagnosis:
         tell("held out: " + ", ".join(f"{path.name} {_digest(path)}" for path in case.held_out))
         verdict = _confirmed(verdict, selection, held)
     verdict = dataclasses.replace(verdict, runtime_s=time.monotonic() - begun)
-    return Diagnosis(verdict, selection, bench, held, formula, thresholds)
+    return Diagnosis(verdict, selection, bench, held, formula, thresholds, plan)
 
 
 def compared(mapping: RecordingMap, automaton: Automaton) -> tuple[str, ...]:
@@ -205,6 +211,16 @@ def _says(selection: Selection, loci: Sequence[Locus], bench: Bench, needed: flo
     if best and any(rival.total > best.total - CLEAR for rival in rivals):
         return "ambiguous"
     return "effect"
+
+
+def _told_apart(selection: Selection, automaton: Automaton) -> list[tuple[str, Estimate]]:
+    """Return the first accepted effect and its rivals, by name."""
+    some = (*selection.accepted[:1], *selection.rivals)
+    return [
+        (f"{verdict_id(tried.layer, automaton)}@{place_path(tried.layer)}", tried.estimate)
+        for tried in some
+        if tried.estimate is not None and tried.estimate.normal is not None
+    ]
 
 
 def _verdict(

@@ -12,6 +12,7 @@ import numpy as np
 from diagnosis.digits import per_cent, significant
 from diagnosis.dossier import Dossier
 from diagnosis.locus_picture import locus_picture
+from diagnosis.plan_picture import plan_picture
 from diagnosis.shown import Shown
 from diagnosis.whiteness_picture import whiteness_picture
 from diagnosis.window_picture import window_picture
@@ -48,6 +49,11 @@ def drawings_of(dossier: Dossier, shown: Sequence[Shown]) -> list[Drawing]:
     found.append(_whiteness(shown[0], is_same))
     if any(locus.gain > 0.0 for locus in dossier.verdict.location):
         found.append(_places(dossier))
+    if dossier.diagnosis.plan is not None:
+        signals = list(zip(shown[0].window.signals, shown[0].window.units, strict=True))
+        caption = f"{dossier.diagnosis.plan.sentence()}; what each would show of it"
+        picture = plan_picture(dossier.diagnosis.plan, inputs, signals)
+        found.append(Drawing("plan", f"{caption[0].upper()}{caption[1:]}.", caption, picture))
     return found
 
 

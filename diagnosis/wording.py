@@ -104,7 +104,7 @@ def separation(dossier: Dossier) -> list[str]:
     if dossier.diagnosis is None:
         return []
     selection = dossier.diagnosis.selection
-    lines = []
+    lines = [plan(dossier)] if plan(dossier) else []
     for tried in (*selection.accepted, *selection.rivals):
         effect = tried.layer.effect
         if effect.separated_by and effect.confused_with:
@@ -112,6 +112,12 @@ def separation(dossier: Dossier) -> list[str]:
             others = ", ".join(effect.confused_with)
             lines.append(f"{name} from {others}: {'; '.join(effect.separated_by)}")
     return lines
+
+
+def plan(dossier: Dossier) -> str:
+    """Return what to record to be sure, as it was simulated; empty where there is no doubt."""
+    found = dossier.diagnosis.plan if dossier.diagnosis else None
+    return found.sentence() if found else ""
 
 
 def reason(tried: Tried, place: int, selection: Selection, thresholds: Thresholds) -> str:
@@ -142,8 +148,9 @@ def title(layer: Layer, dossier: Dossier) -> str:
 
 
 def summary(dossier: Dossier) -> list[str]:
-    """Return at most four lines: the verdict, where, how much better, what is to be known."""
+    """Return at most five lines: the verdict, where, how much better, doubts, what to record."""
     lines = [headline(dossier), location(dossier), improvement(dossier), _doubt(dossier)]
+    lines += [plan(dossier)] if dossier.verdict.verdict == "ambiguous" else []
     return [line for line in lines if line]
 
 
