@@ -129,6 +129,7 @@ def place_rows(locus: Locus, most: int = MOST_WINDOWS) -> list[tuple[str, str]]:
     """Return what is known of what is missing at a place: modes, windows, companions."""
     modes = sorted(locus.modes.items(), key=lambda pair: -pair[1])
     shares = [f"{name} {per_cent(share)}" for name, share in modes if share >= 0.005]
+    shares = shares if len(modes) > 1 else []
     windows = [f"{file} {start:.2f}-{end:.2f} s" for start, end, file in locus.windows]
     more = len(windows) - most
     told = ", ".join(windows[:most]) + (f" and {more} more" if more > 0 else "")

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from diagnosis.dossier import Dossier
-from diagnosis.variant import variant_name
+from diagnosis.variant import missing, variant_name
 from diagnosis.worst_window import WorstWindow
 from language.known import unit_text
 
@@ -72,7 +72,7 @@ def scenario_text(dossier: Dossier, window: WorstWindow) -> str:
 def commands(dossier: Dossier, folder: Path) -> list[tuple[str, str]]:
     """Return what can be done with the variant: words, and the command."""
     variant, scenario = (shlex.quote(str(folder / name)) for name in (VARIANT, SCENARIO))
-    found = [("look for problems", f"modewright check {variant}")]
+    found = [*_laying(dossier, folder), ("look for problems", f"modewright check {variant}")]
     if dossier.diagnosis is not None:
         run = f"{variant} -s {scenario}"
         found += [
@@ -81,6 +81,17 @@ def commands(dossier: Dossier, folder: Path) -> list[tuple[str, str]]:
             ("compare engine and C, bit by bit", f"modewright lockstep {run}"),
             ("list what differs", f"modewright explain {dossier.name} {variant}"),
         ]
+    return found
+
+
+def _laying(dossier: Dossier, folder: Path) -> list[tuple[str, str]]:
+    """Return how effects that the project does not have are put where a variant finds them."""
+    formula = dossier.diagnosis.description if dossier.diagnosis else None
+    own = formula.formula.layer.effect.name if formula else ""
+    found = []
+    for effect in missing(dossier):
+        file = folder / f"{own}.yaml" if effect.name == own else effect.body.span.source.name
+        found.append(("lay its effect below spec/", f"cp {shlex.quote(str(file))} spec/"))
     return found
 
 

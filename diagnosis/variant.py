@@ -16,6 +16,7 @@ from diagnosis.uncertain import si_unit
 from diagnosis.verdict import Quantity
 from diagnosis.wording import rounded
 from language.declaration import Parameter
+from language.effect import Effect
 from language.model import Automaton
 from language.project import read_document
 
@@ -53,15 +54,21 @@ def variant_text(dossier: Dossier, extends: str) -> str:
 
 def needed(dossier: Dossier) -> list[str]:
     """Return what has to be done before the variant can be read: its effects found by name."""
+    names = [effect.body.span.source.name for effect in missing(dossier)]
+    return [f"{name} has to be below spec/: the variant lays this effect by name" for name in names]
+
+
+def missing(dossier: Dossier) -> list[Effect]:
+    """Return the accepted effects that the project does not have, or has with another text."""
     project = dossier.case.project
     accepted = dossier.diagnosis.selection.accepted if dossier.diagnosis else ()
-    told = []
+    found = []
     for effect in (tried.layer.effect for tried in accepted):
         own = effect.body.span.source
         files = [read_document(path) for path in project.effects.get(effect.name, ())]
         if not any(file.source.lines == own.lines for file in files):
-            told.append(f"{own.name} has to be below spec/: the variant lays this effect by name")
-    return told
+            found.append(effect)
+    return found
 
 
 def _about(dossier: Dossier) -> str:
