@@ -26,11 +26,11 @@ from diagnosis.prediction import noises_of
 from diagnosis.recipe import node_text, recipe_key, write_whole
 from diagnosis.replicate import replicate
 from diagnosis.search import Tell, Tried, searched
-from diagnosis.selection import SHARED, selected
+from diagnosis.selection import counted, looked_again
 from diagnosis.series import Series, paced
 from diagnosis.threshold import Thresholds, group_of
 
-REPLICATES = 20
+REPLICATES = 16
 """Simulated sets of recordings; each costs a recalibration and a search."""
 LEVEL = 0.975
 """The part of recordings without a missing effect in which none is to be accepted."""
@@ -38,6 +38,8 @@ MIDDLE = 0.5
 """The part of the replicates below the tail, which is taken for an exponential one."""
 FLOOR = 25.0
 """The least threshold [nats]: a real machine is never quite the model that is fitted to it."""
+CEILING = 135.0
+"""The most: in replicates that ask for more the observer has lost its way in the base itself."""
 OFTEN = 0.9
 LEAST_SCALE = 2.0
 """The least that an effect gains so often [nats]; what is below it is not told from nothing."""
@@ -107,24 +109,23 @@ def gains_in(
     """Return what each group of effects gains in recordings by accident [nats].
 
     What promises less than the least threshold is not fitted; where something gains more than
-    that, the search is made as it is for recordings, with the base looked at again.
+    that, the base is looked at again as it is for recordings.
     """
     series = paced(made, bench.automaton, bench.seen, bench.series[0].is_linear)
     own = dataclasses.replace(bench, series=series)
     noises = dataclasses.replace(noises_of(series, base.noises.drifts), limits=base.noises.limits)
     model = settled(base.candidate, series, noises, base.point, units, turns=1)
-    found = _best_of(searched(own, model, units, own.layers(), worth=FLOOR))
-    if any(gain > FLOOR for gain in found.values()):
-        never = Thresholds(usual=math.inf)
-        found = _best_of(selected(own, model, units, never).first_round)
-    return found
+    tried = searched(own, model, units, own.layers(), worth=FLOOR)
+    if any(gain > FLOOR for gain in _best_of(tried).values()):
+        _, tried = looked_again(own, model, units, tried)
+    return _best_of(tried)
 
 
 def _best_of(tried: Sequence[Tried]) -> Gains:
     found: dict[str, float] = {}
     for one in tried:
         name = group_of(one.layer)
-        found[name] = max(found.get(name, 0.0), _gain(one))
+        found[name] = max(found.get(name, 0.0), counted(one.evidence) if one.evidence else 0.0)
     return {name: round(gain, 2) for name, gain in found.items() if gain > 0.0}
 
 
@@ -137,9 +138,13 @@ def thresholds_of(replicates: Sequence[Gains]) -> Thresholds:
         for gains in replicates
     ]
     times = tail(worst, LEVEL)
-    groups = {name: max(FLOOR, times * scale) for name, scale in scales.items()}
+    groups = {name: _bounded(times * scale) for name, scale in scales.items()}
     origin = f"by {len(replicates)} replicates of the recalibrated model"
-    return Thresholds(groups, max(FLOOR, times * LEAST_SCALE), origin)
+    return Thresholds(groups, _bounded(times * LEAST_SCALE), origin)
+
+
+def _bounded(value: float) -> float:
+    return min(max(FLOOR, value), CEILING)
 
 
 def tail(values: Sequence[float], level: float) -> float:
@@ -160,14 +165,6 @@ def tail(values: Sequence[float], level: float) -> float:
 def _scale(gains: Sequence[float]) -> float:
     """What an effect gains by accident in one replicate out of ten."""
     return max(LEAST_SCALE, float(np.quantile(gains, OFTEN)))
-
-
-def _gain(tried: Tried) -> float:
-    """What would have been enough to accept a candidate [nats]."""
-    known = tried.evidence
-    if known is None or not (len(known.each) == 1 or known.rest > SHARED * known.left_out):
-        return 0.0
-    return known.least
 
 
 def _best(gains: Gains) -> str:

@@ -77,19 +77,16 @@ def selected(
     needed = 0.0
     while len(accepted) < MOST_EFFECTS:
         tried = searched(bench, model, units, layers, tell)
-        better = _better_base(bench, model, units, tried)
+        better, tried = looked_again(bench, model, units, tried, tell)
         if better is not None:
-            tell(f"the model itself fits better: {better.cost:.0f} nats; candidates again")
-            gained = model.cost - better.cost
             model = better
             base = base if accepted else better
-            tried = _again(bench, model, units, tried, gained, tell)
         rounds.append(tried)
         layers = [other.layer for other in tried[:NEXT] if other.promised > 0.0]
         enough = (
             t
             for t in tried
-            if t.evidence and _is_enough(t.evidence, max(needed, thresholds.of(t.layer)))
+            if t.evidence and counted(t.evidence) > max(needed, thresholds.of(t.layer))
         )
         best = next(enough, None)
         if best is None or best.estimate is None or best.evidence is None:
@@ -103,13 +100,28 @@ def selected(
     return Selection(base, model, kept, first, _rivals(first, kept))
 
 
-def _is_enough(known: Evidence, needed: float) -> bool:
-    """Tell whether an effect gains enough; more of it where one recording alone shows it.
+def counted(known: Evidence) -> float:
+    """Return what an effect gains [nats] as it counts: less where one recording alone shows it.
 
     A little in one recording is more often an accident of it than physics.
     """
     shared = len(known.each) == 1 or known.rest > SHARED * known.left_out
-    return known.least > (needed if shared else ALONE * needed)
+    return known.least if shared else known.least / ALONE
+
+
+def looked_again(
+    bench: Bench,
+    model: Estimate,
+    units: Mapping[str, float],
+    tried: list[Tried],
+    tell: Tell = lambda text: None,
+) -> tuple[Estimate | None, list[Tried]]:
+    """Return a better fit of the model itself, if there is one, and the candidates beside it."""
+    better = _better_base(bench, model, units, tried)
+    if better is None:
+        return None, tried
+    tell(f"the model itself fits better: {better.cost:.0f} nats; candidates again")
+    return better, _again(bench, better, units, tried, model.cost - better.cost, tell)
 
 
 def _better_base(

@@ -14,6 +14,7 @@ import pytest
 import diagnosis.bootstrap as bootstrap
 from diagnosis.bench import Bench, balance_drifts
 from diagnosis.bootstrap import (
+    CEILING,
     FLOOR,
     bootstrapped,
     kept_thresholds,
@@ -189,6 +190,8 @@ def test_what_gains_often_needs_more_and_nothing_needs_less_than_the_floor() -> 
     assert found.groups["slow"] > 24.0
     assert found.groups["brisk"] == FLOOR
     assert found.usual == FLOOR
+    lost = [{"slow": 900.0}] * 10 + [{}] * 6
+    assert thresholds_of(lost).groups["slow"] == CEILING
     assert thresholds_of([{}] * 30) == Thresholds({}, FLOOR, found.origin)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from diagnosis.evidence import Evidence
-from diagnosis.selection import _is_enough
+from diagnosis.selection import counted
 from diagnosis.threshold import USUAL
 
 
@@ -22,7 +22,7 @@ from diagnosis.threshold import USUAL
 def test_what_gains_in_one_recording_alone_is_not_enough(
     train: float, each: tuple[float, ...], wanted: bool
 ) -> None:
-    assert _is_enough(Evidence(train, sum(each), each), USUAL) == wanted
+    assert (counted(Evidence(train, sum(each), each)) > USUAL) == wanted
 
 
 def test_the_rest_is_what_the_best_recording_leaves() -> None:
