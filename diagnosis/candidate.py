@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.predictor import Predictor, built, columns_of
-from diagnosis.layers import DRIFT, Layer, automaton, stepped
+from diagnosis.layers import DRIFT, Layer, automaton, fewest_steps, stepped
 from diagnosis.recipe import Recipe, kept, node_text, recipe_key
 from diagnosis.series import Series
 from diagnosis.uncertain import Uncertain, uncertain_of
@@ -104,7 +104,8 @@ def _compiled(
     started = _with_starts(made, seen)
     starts = [name for name in started.parameters if name not in made.parameters]
     names = [*(one.name for one in uncertain), *starts]
-    program, substeps = stepped(started, names, brought, period)
+    fewest = fewest_steps(made, layers)
+    program, substeps = stepped(started, names, brought, period, fewest)
     columns = columns_of(program, seen)
     ranges = [made.states[name].range for name in columns.states]
     recipe = Recipe(

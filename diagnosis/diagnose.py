@@ -9,7 +9,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
@@ -24,19 +24,19 @@ from diagnosis.estimation import Estimate, adapted
 from diagnosis.evidence import inflation
 from diagnosis.hidden import with_hidden
 from diagnosis.layers import shipped_effects
-from diagnosis.level import first_fit, recalibrated, units_of
+from diagnosis.level import units_of
 from diagnosis.location import led_by, located
 from diagnosis.locus import Locus
 from diagnosis.naming import named, place_path, quantities_of, verdict_id
 from diagnosis.place_sentence import place_sentence
 from diagnosis.plan import Plan, planned
-from diagnosis.prediction import noises_of
 from diagnosis.search import Tell, Tried
-from diagnosis.selection import Selection, selected
+from diagnosis.selection import Selection
 from diagnosis.series import Series, paced, series_of
 from diagnosis.simulation import misfits
 from diagnosis.threshold import EVERYWHERE, USUAL, Thresholds
 from diagnosis.verdict import Misfit, Named, Ranked, Says, Verdict
+from diagnosis.ways import better_way, chosen, ways_of
 from engine.recorded_part import file_of
 from engine.recording import pieces, read_recording
 from language.document import Document
@@ -94,13 +94,13 @@ def diagnose(case: Case, tell: Tell = lambda text: None) -> Diagnosis:
     if not seen:
         raise ValueError(f"map `{case.mapping.name}` compares no output of `{automaton.name}`")
     series = [one for path in case.train for one in read_series(path, case, automaton, seen)]
-    bench, base = recalibrated_base(case, automaton, series, seen, tell)
+    ways = ways_of(case_bench(case, automaton, series, seen), tell)
+    thresholds = _thresholds(case, *better_way(ways), series, tell)
+    most = max(USUAL, thresholds.most)
+    bench, base, selection = chosen(ways, thresholds, tell)
     units = units_of(base.candidate, bench.series, base.noises, base.values(0))
     loci = located(bench, base)
     tell(place_sentence(loci, bench))
-    thresholds = _thresholds(case, bench, base, units, series, tell)
-    most = max(USUAL, thresholds.most)
-    selection = selected(bench, base, units, thresholds, tell)
     selection = with_hidden(bench, selection, loci, UNKNOWN * most, tell)
     says = _says(selection, loci, bench, most)
     formula = None
@@ -162,31 +162,19 @@ def read_series(
     )
 
 
-def recalibrated_base(
-    case: Case, automaton: Automaton, series: Sequence[Series], seen: tuple[str, ...], tell: Tell
-) -> tuple[Bench, Estimate]:
-    """Fit the base with inputs held, and straight between samples: the better one stays."""
+def case_bench(
+    case: Case, automaton: Automaton, series: Sequence[Series], seen: tuple[str, ...]
+) -> Bench:
+    """Return the bench of a case for some recordings as they were read."""
     effects = case.effects if case.effects is not None else shipped_effects()
     drifts = balance_drifts(case.document, automaton)
-    found = []
-    for is_linear in (False, True):
-        own = paced(series, automaton, seen, is_linear)
-        bench = Bench(case.document, case.project, automaton, effects, own, seen, drifts)
-        candidate = bench.candidate(())
-        units = units_of(candidate, own, noises_of(own, {}), {})
-        found.append((bench, first_fit(candidate, own, units), units))
-    bench, first, units = min(found, key=lambda one: one[1].likelihood)
-    base = recalibrated(first, bench.series, units)
-    held = "straight between samples" if bench.series[0].is_linear else "held"
-    tell(f"recalibrated, inputs {held}: {base.cost:.0f} nats")
-    return bench, base
+    return Bench(case.document, case.project, automaton, effects, tuple(series), seen, drifts)
 
 
 def _thresholds(
     case: Case,
     bench: Bench,
     base: Estimate,
-    units: Mapping[str, float],
     raw: Sequence[Series],
     tell: Tell,
 ) -> Thresholds:
@@ -195,6 +183,7 @@ def _thresholds(
         return case.thresholds
     kept = kept_thresholds(bench, raw)
     if kept is None and case.bootstrap == "made":
+        units = units_of(base.candidate, bench.series, base.noises, base.values(0))
         kept = bootstrapped(bench, base, units, raw, tell)
     found = kept or case.thresholds
     tell(f"thresholds of {found.text} nats, {found.origin}")

@@ -11,7 +11,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from diagnosis.diagnose import Case, compared, read_series, recalibrated_base
+from diagnosis.diagnose import Case, case_bench, compared, read_series
 from diagnosis.dossier import hashes
 from diagnosis.estimation import Estimate, looked_at
 from diagnosis.naming import correlations_of, quantities_of
@@ -21,6 +21,7 @@ from diagnosis.simulation import misfits
 from diagnosis.uncertain import Uncertain
 from diagnosis.variant import value_text
 from diagnosis.verdict import Misfit, Quantity
+from diagnosis.ways import better_way, ways_of
 from language.document import Document, Table
 from language.load import automaton_of
 from language.model import Automaton
@@ -100,7 +101,7 @@ def fit(case: Case, parameters: Sequence[str] | None = None, tell: Tell = lambda
         raise ValueError(f"map `{case.mapping.name}` compares no output of `{automaton.name}`")
     case = dataclasses.replace(case, effects=())
     series = [one for path in case.train for one in read_series(path, case, automaton, seen)]
-    bench, found = recalibrated_base(case, automaton, series, seen, tell)
+    bench, found = better_way(ways_of(case_bench(case, automaton, series, seen), tell))
     if not found.candidate.uncertain:
         raise ValueError(f"no parameter of `{automaton.name}` has a `range` to be fitted in")
     start = point_of(found.candidate, len(bench.series), {})

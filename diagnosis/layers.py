@@ -25,8 +25,10 @@ from language.place import Misfit, place_of
 from language.problem import Problems, Source, Span
 from language.program import Program
 from language.project import Project, read_document
+from language.units import parse_unit
 
 DRIFT = "drift"
+SECONDS = parse_unit("s").dimension.powers
 KINDS = ("balance", "element", "output")
 LONGEST_STEP = Fraction(5, 1000)
 """Longest major step [s] of a prediction; events inside it are located."""
@@ -35,7 +37,9 @@ STABLE_PART = Fraction(1, 2)
 FAR = Fraction(4)
 """How far an effect's parameter may move while it is fitted, as a factor."""
 DELAYED_STEPS = 4
-"""Fewest major steps between two samples of a model with a delay."""
+"""Fewest major steps between two samples of a model with a delay: none is shorter than a step."""
+TURNING_STEPS = 8
+"""Fewest of one with an input that goes along with an angle: motors turn by much in a sample."""
 MOST_STEPS = 40
 """Most major steps between two samples."""
 
@@ -104,19 +108,23 @@ def automaton(document: Document, project: Project, layers: Sequence[Layer]) -> 
 
 
 def stepped(
-    given: Automaton, names: Sequence[str], brought: Sequence[str], period: Fraction
+    given: Automaton,
+    names: Sequence[str],
+    brought: Sequence[str],
+    period: Fraction,
+    fewest: int = 1,
 ) -> tuple[Program, int]:
     """Return the Program in which `names` are tunable, and its steps in a period [s].
 
-    The step is a whole part of the period, a short one where there is a delay: none is shorter than
-    a step. It is stable for parameters that effects `brought` at a quarter and at four times their
-    value.
+    The step is a whole part of the period, one of at least `fewest`; it is stable for parameters
+    that effects `brought` at a quarter and at four times their value, and no longer than a time
+    that they brought: where a rate is limited, stability is not known beforehand.
     """
-    longest = min(
+    stable = (
         _stable(_scaled(given, brought, factor), LONGEST_STEP)
         for factor in (Fraction(1), FAR, 1 / FAR)
     )
-    fewest = DELAYED_STEPS if applications(given, ("delay",)) else 1
+    longest = min(*stable, *_times(given, brought))
     substeps = min(max(fewest, -(-period // longest)), MOST_STEPS)
     parameters = {
         name: dataclasses.replace(parameter, kind="tunable") if name in names else parameter
@@ -124,6 +132,24 @@ def stepped(
     }
     tuned = dataclasses.replace(given, parameters=parameters, step=period / substeps)
     return program_of(tuned), int(substeps)
+
+
+def _times(given: Automaton, names: Sequence[str]) -> list[Fraction]:
+    """Return the values [s] of those parameters that are times."""
+    known = [given.parameters[name] for name in names if name in given.parameters]
+    return [
+        parameter.value
+        for parameter in known
+        if parameter.value and parameter.unit.dimension.powers == SECONDS
+    ]
+
+
+def fewest_steps(given: Automaton, layers: Sequence[Layer]) -> int:
+    """Return how many major steps there are to be between two samples at least."""
+    at_input = any(layer.effect.fits[0].kind == "input" for layer in layers)
+    if at_input and applications(given, ("floor",)):
+        return TURNING_STEPS
+    return DELAYED_STEPS if applications(given, ("delay",)) else 1
 
 
 def _stable(given: Automaton, longest: Fraction) -> Fraction:

@@ -1,0 +1,64 @@
+"""Ways: the base recalibrated with inputs held from sample to sample, and straight in between.
+
+Which one a recording asks for cannot always be told before something missing is found: half a
+sample is a delay as well.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+from diagnosis.bench import Bench
+from diagnosis.estimation import Estimate
+from diagnosis.level import first_fit, recalibrated, units_of
+from diagnosis.prediction import noises_of
+from diagnosis.search import Tell
+from diagnosis.selection import Selection, selected
+from diagnosis.series import paced
+from diagnosis.threshold import Thresholds
+
+Way = tuple[Bench, Estimate]
+
+
+def ways_of(bench: Bench, tell: Tell = lambda text: None) -> list[Way]:
+    """Return benches of paced recordings with their recalibrated bases, to be tried in turn.
+
+    With inputs that run straight between samples the truth is reached sooner; held ones are tried
+    beside it where the base alone is better with them.
+    """
+    firsts = []
+    for is_linear in (True, False):
+        own = paced(bench.series, bench.automaton, bench.seen, is_linear)
+        way = dataclasses.replace(bench, series=own)
+        candidate = way.candidate(())
+        units = units_of(candidate, own, noises_of(own, {}), {})
+        firsts.append((way, first_fit(candidate, own, units), units))
+    straight, held = firsts
+    if straight[1].likelihood <= held[1].likelihood:
+        firsts = [straight]
+    found = [(way, recalibrated(first, way.series, units)) for way, first, units in firsts]
+    for way, base in found:
+        text = "straight between samples" if way.series[0].is_linear else "held"
+        tell(f"recalibrated, inputs {text}: {base.cost:.0f} nats")
+    is_straight = better_way(found)[0].series[0].is_linear
+    return found[:1] if is_straight else found
+
+
+def better_way(ways: Sequence[Way]) -> Way:
+    """Return the way whose base foresees the recordings better."""
+    return min(ways, key=lambda way: way[1].likelihood)
+
+
+def chosen(
+    ways: Sequence[Way], thresholds: Thresholds, tell: Tell = lambda text: None
+) -> tuple[Bench, Estimate, Selection]:
+    """Return the way in which the recordings are foreseen best with what is missing, and that."""
+    found = []
+    for bench, base in ways:
+        units = units_of(base.candidate, bench.series, base.noises, base.values(0))
+        selection = selected(bench, base, units, thresholds, tell)
+        cost = selection.model.cost + thresholds.usual * len(selection.accepted)
+        found.append((cost, bench, base, selection))
+    _, bench, base, selection = min(found, key=lambda one: one[0])
+    return bench, base, selection
