@@ -1,4 +1,4 @@
-"""An effect is accepted where it gains enough, and not in one recording alone."""
+"""An effect is accepted where it gains enough, and more than that in one recording alone."""
 
 from __future__ import annotations
 
@@ -13,13 +13,14 @@ from diagnosis.threshold import USUAL
     ("train", "each", "wanted"),
     [
         (200.0, (60.0, 50.0, 90.0), True),
-        (200.0, (-27.0, 19.0, 957.0), False),
+        (170.0, (-27.0, 19.0, 957.0), False),
+        (190.0, (-27.0, 19.0, 957.0), True),
         (200.0, (20.0, 15.0, 5.0), False),
         (30.0, (60.0, 50.0, 90.0), False),
         (200.0, (300.0,), True),
     ],
 )
-def test_what_gains_in_one_recording_alone_is_not_enough(
+def test_what_gains_in_one_recording_alone_has_to_gain_four_times_as_much(
     train: float, each: tuple[float, ...], wanted: bool
 ) -> None:
     assert (counted(Evidence(train, sum(each), each)) > USUAL) == wanted
