@@ -96,16 +96,19 @@ def fitted(
     noises: Noises,
     start: Mapping[str, float] | Point,
     units: Mapping[str, float],
+    known: float = -np.inf,
 ) -> Estimate:
-    """Return the better of two fits: with the drifts that `noises` has, and with next to none.
+    """Return a fit with next to no drift at first, or a better one with those that `noises` has.
 
     What a model explains it has to explain without drifts; a fit with much does not find there.
+    The other one is tried where the first does not come below a `known` cost [nats].
     """
     quiet = {**noises.drifts, **{name: QUIET * unit for name, unit in units.items()}}
     first = settled(
         candidate, series, dataclasses.replace(noises, drifts=quiet), start, units, turns=2
     )
-    if all(noises.drifts.get(name, 0.0) <= quiet[name] for name in units):
+    is_quiet = all(noises.drifts.get(name, 0.0) <= quiet[name] for name in units)
+    if is_quiet or first.cost < known:
         return first
     second = settled(candidate, series, noises, start, units, turns=1)
     return min(first, second, key=lambda one: one.cost)

@@ -18,6 +18,9 @@ from diagnosis.series import Series
 
 FULL_FITS = 7
 """Candidates that are fitted to the end, best foreseen first."""
+FEW_FITS = 4
+LITTLE = 0.02
+"""Those that promise less than this part of what the best does are only fitted if they are few."""
 STARTS = 2
 """Starts of a candidate from which steps are made, the best ones."""
 WORTH = 10.0
@@ -61,7 +64,9 @@ def searched(
         if place >= FULL_FITS or gain < worth:
             found.append(Tried(layer, gain))
             continue
-        estimate = fitted(start.candidate, bench.series, base.noises, start.point, units)
+        estimate = fitted(
+            start.candidate, bench.series, base.noises, start.point, units, start.cost - WORTH
+        )
         if not np.isfinite(estimate.cost):
             found.append(Tried(layer, gain))
             continue

@@ -18,6 +18,8 @@ from diagnosis.threshold import EVERYWHERE, USUAL, Thresholds
 PART = 0.05
 """A further effect gains at least this part of what the one before it gained: a strong effect is
 never described so well that nothing small is left beside it."""
+HOPE = 0.25
+"""Part of what it needs to gain that a candidate must promise to be fitted."""
 NEXT = 9
 """Candidates that are looked at again beside an accepted one: the best of the round before."""
 AGAIN = 15
@@ -76,7 +78,8 @@ def selected(
     layers = list(bench.layers())
     needed = 0.0
     while len(accepted) < MOST_EFFECTS:
-        tried = searched(bench, model, units, layers, tell)
+        worth = HOPE * max(needed, thresholds.usual)
+        tried = searched(bench, model, units, layers, tell, worth)
         better, tried = looked_again(bench, model, units, tried, tell)
         if better is not None:
             model = better
