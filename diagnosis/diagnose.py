@@ -9,7 +9,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
@@ -32,13 +32,13 @@ from diagnosis.place_sentence import place_sentence
 from diagnosis.plan import Plan, planned
 from diagnosis.search import Tell, Tried
 from diagnosis.selection import Selection
-from diagnosis.series import Series, paced, series_of
+from diagnosis.series import Series, compared, paced, pieces_of
 from diagnosis.simulation import misfits
 from diagnosis.threshold import EVERYWHERE, USUAL, Thresholds
 from diagnosis.verdict import Misfit, Named, Ranked, Says, Verdict
 from diagnosis.ways import better_way, chosen, ways_of
 from engine.recorded_part import file_of
-from engine.recording import pieces, read_recording
+from engine.recording import read_recording
 from language.document import Document
 from language.effect import Effect
 from language.experiment import RecordingMap
@@ -57,7 +57,10 @@ Bootstrap = Literal["never", "kept", "made"]
 
 @dataclass(frozen=True)
 class Case:
-    """What is diagnosed: an expanded automaton, a map, and recordings."""
+    """What is diagnosed: an expanded automaton, a map, and recordings.
+
+    `names` are those of files whose bare name is not theirs alone.
+    """
 
     document: Document
     project: Project
@@ -67,6 +70,11 @@ class Case:
     effects: tuple[Effect, ...] | None = None
     thresholds: Thresholds = EVERYWHERE
     bootstrap: Bootstrap = "never"
+    names: Mapping[Path, str] = field(default_factory=dict)
+
+    def name_of(self, path: Path) -> str:
+        """Return what a recording is called."""
+        return self.names.get(path, path.name)
 
 
 @dataclass(frozen=True)
@@ -116,7 +124,7 @@ def diagnose(case: Case, tell: Tell = lambda text: None) -> Diagnosis:
     loci = led_by(loci, [place_path(tried.layer) for tried in selection.accepted], bench)
     fit = {"train": misfits(base, selection.model, bench.series)}
     verdict = _verdict(says, selection, loci, automaton, fit)
-    hashes = {path.name: _digest(path) for path in case.train}
+    hashes = {case.name_of(path): _digest(path) for path in case.train}
     verdict = dataclasses.replace(verdict, inputs=hashes, messages=(place_sentence(loci, bench),))
     is_linear = bench.series[0].is_linear
     held = tuple(
@@ -125,16 +133,13 @@ def diagnose(case: Case, tell: Tell = lambda text: None) -> Diagnosis:
         for one in paced(read_series(path, case, automaton, seen), automaton, seen, is_linear)
     )
     if held:
-        tell("held out: " + ", ".join(f"{path.name} {_digest(path)}" for path in case.held_out))
+        tell(
+            "held out: "
+            + ", ".join(f"{case.name_of(path)} {_digest(path)}" for path in case.held_out)
+        )
         verdict = _confirmed(verdict, selection, held)
     verdict = dataclasses.replace(verdict, runtime_s=time.monotonic() - begun)
     return Diagnosis(verdict, selection, bench, held, formula, thresholds, plan)
-
-
-def compared(mapping: RecordingMap, automaton: Automaton) -> tuple[str, ...]:
-    """Return the outputs that a map compares, in the order of the automaton."""
-    wanted = {column.compare for column in mapping.columns.values() if column.compare}
-    return tuple(name for name in automaton.outputs if name in wanted)
 
 
 def read_series(
@@ -150,16 +155,8 @@ def read_series(
         if column.to in automaton.inputs or column.compare in seen
     ]
     recording = read_recording(path, case.mapping, used)
-    constants = {name: float(value) for name, (value, _) in case.mapping.constants.items()}
-    declared = {
-        name: float(thing.default)
-        for name, thing in automaton.inputs.items()
-        if thing.default is not None
-    }
-    known = {**declared, **constants}
-    return tuple(
-        series_of(piece, list(automaton.inputs), seen, known) for piece in pieces(recording)
-    )
+    named = dataclasses.replace(recording, name=case.name_of(path))
+    return pieces_of(named, case.mapping, automaton, seen)
 
 
 def case_bench(

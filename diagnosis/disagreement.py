@@ -27,6 +27,8 @@ ODD_SCALE = 2.5
 """Ratio of measured to simulated above which, or below whose inverse, the scale is told."""
 NEAR_FACTOR = 0.3
 """Relative distance from a factor of units; parameters of a naive model are 20 per cent wrong."""
+NEAR_TOGETHER = 0.5
+"""The same where all outputs are off alike: what the model lacks seldom does that."""
 FACTORS: Sequence[tuple[float, str, str]] = (
     (30.0 / math.pi, "rad/s", "rpm taken for rad/s"),
     (math.pi / 30.0, "rad/s", "rad/s taken for rpm"),
@@ -69,6 +71,10 @@ def disagreements(
     outputs = {relation.channel for relation in found}
     told = {kind for f in shared if f.channel not in outputs for kind in _alike(f.kind)}
     rest = [f for fs in own.values() for f in fs if not _has(shared, f) and f.kind not in told]
+    units = [f for findings in own.values() for f in findings if f.kind == "unit"]
+    if 2 * len({f.recording for f in units}) >= len(recordings):
+        units = [f for f in shared if f.kind == "unit"] or units
+        return units  # single recordings say which unit it is
     if any(finding.kind != "clock_offset" for finding in shared):
         return shared  # what else is odd follows from that
     sure = {r.recording for r in found if r.is_clear and r.improvement > MUCH_CLEARER}
@@ -179,11 +185,26 @@ class _Recorded:
         found = []
         for group in [odd] if together else [[name] for name in odd]:
             channel, called = self._blamed(group) if together else (group[0], f"`{group[0]}`")
+            if together and channel not in sizes:
+                found.append(self._shared_scale(group, channel, called))
+                continue
             size = median(sizes[name] for name in group)
-            if channel not in sizes:
-                size = 1.0 / size  # an input too large makes all outputs look too small
-            found.append(self._scale(channel, called, size, channel in sizes))
+            found.append(self._scale(channel, called, size, True))
         return found
+
+    def _shared_scale(self, outputs: Sequence[str], channel: str, called: str) -> Finding:
+        """Tell what makes all outputs too large: an input too small, or a unit that they share."""
+        size = median(abs(self.gains[name]) for name in outputs)
+        if not _reason(1.0 / size, column_dimension(self.mapping.columns[channel])):
+            reasons = {
+                _reason(size, column_dimension(self.mapping.columns[name]), NEAR_TOGETHER)
+                for name in outputs
+            }
+            if len(reasons) == 1 and reasons != {""}:
+                both = " and ".join(f"`{name}`" for name in outputs)
+                text = f"{both} are {size:.3g} times what the model gives: {reasons.pop()}?"
+                return self._tell("unit", outputs[0], text, "error")
+        return self._scale(channel, called, 1.0 / size, False)
 
     def _scale(self, channel: str, called: str, size: float, is_output: bool) -> Finding:
         dimension = column_dimension(self.mapping.columns[channel])
@@ -227,7 +248,7 @@ def _varies(recording: Recording, name: str) -> bool:
     return channel is not None and len(set(channel.values)) > 1
 
 
-def _reason(size: float, dimension: Dimension) -> str:
+def _reason(size: float, dimension: Dimension, most: float = NEAR_FACTOR) -> str:
     """Return what makes a channel `size` times as large as it should be; empty if not known."""
     near = [
         (abs(math.log(size / factor)), reason)
@@ -235,4 +256,4 @@ def _reason(size: float, dimension: Dimension) -> str:
         if not unit or fits(parse_unit(unit).dimension, dimension)
     ]
     distance, reason = min(near)
-    return reason if distance < math.log(1.0 + NEAR_FACTOR) else ""
+    return reason if distance < math.log(1.0 + most) else ""

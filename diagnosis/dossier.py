@@ -61,30 +61,34 @@ def finite(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def usable(check: RecordingCheck, files: tuple[Path, ...]) -> tuple[Path, ...]:
+def usable(check: RecordingCheck, case: Case) -> tuple[Path, ...]:
     """Return the recordings to conclude from: none where half of them or more have an error.
 
     A mistake in a few is one of these files, which are left out; in many it is one of the map.
     """
-    errors = [finding for finding in check.findings if finding.severity == "error"]
-    bad = {finding.recording for finding in errors}
-    kept = tuple(file for file in files if file.name not in bad)
-    if "" in bad or 2 * len(kept) <= len(files):
-        return () if bad else files
+    bad = {finding.recording for finding in errors_of(check)}
+    kept = tuple(file for file in case.train if case.name_of(file) not in bad)
+    if "" in bad or 2 * len(kept) <= len(case.train):
+        return () if bad else case.train
     return kept
+
+
+def errors_of(check: RecordingCheck) -> list[Finding]:
+    """Return what makes recordings worthless."""
+    return [finding for finding in check.findings if finding.severity == "error"]
 
 
 def undecided(check: RecordingCheck, train: Mapping[str, str], runtime_s: float) -> Verdict:
     """Return the verdict on recordings that no conclusion can be drawn from."""
-    worst = [finding for finding in check.findings if finding.severity == "error"]
-    messages = ("the recordings are not usable", *(text for _, text in told(worst)))
+    messages = ("the recordings are not usable", *(text for _, text in told(errors_of(check))))
     return Verdict(
         "unknown", (), (), 1.0, (), (), {"train": {}}, {}, None, runtime_s, messages, train
     )
 
 
-def hashes(files: tuple[Path, ...]) -> dict[str, str]:
+def hashes(case: Case, files: tuple[Path, ...]) -> dict[str, str]:
     """Return the first 16 hexadecimal digits of SHA-256 of each file, by name."""
     return {
-        path.name: hashlib.sha256(file_of(path).read_bytes()).hexdigest()[:16] for path in files
+        case.name_of(path): hashlib.sha256(file_of(path).read_bytes()).hexdigest()[:16]
+        for path in files
     }

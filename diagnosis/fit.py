@@ -11,12 +11,13 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from diagnosis.diagnose import Case, case_bench, compared, read_series
+from diagnosis.diagnose import Case, case_bench, read_series
 from diagnosis.dossier import hashes
 from diagnosis.estimation import Estimate, looked_at
 from diagnosis.naming import correlations_of, quantities_of
 from diagnosis.point import point_of
 from diagnosis.search import Tell
+from diagnosis.series import compared
 from diagnosis.simulation import misfits
 from diagnosis.uncertain import Uncertain
 from diagnosis.variant import value_text
@@ -111,7 +112,7 @@ def fit(case: Case, parameters: Sequence[str] | None = None, tell: Tell = lambda
         _fitted(automaton, found),
         correlations_of(found),
         misfits(declared, found, bench.series),
-        hashes(case.train),
+        hashes(case, case.train),
         found,
     )
 

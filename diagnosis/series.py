@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
-from engine.recording import Channel, Recording
+from engine.recording import Channel, Recording, pieces
+from language.experiment import RecordingMap
 from language.graph import reachable
 from language.model import Automaton
 
@@ -44,6 +45,31 @@ class Series:
     def count(self) -> int:
         """The number of samples."""
         return len(self.inputs)
+
+
+def compared(mapping: RecordingMap, automaton: Automaton) -> tuple[str, ...]:
+    """Return the outputs that a map compares, in the order of the automaton."""
+    wanted = {column.compare for column in mapping.columns.values() if column.compare}
+    return tuple(name for name in automaton.outputs if name in wanted)
+
+
+def pieces_of(
+    recording: Recording, mapping: RecordingMap, automaton: Automaton, seen: Sequence[str]
+) -> tuple[Series, ...]:
+    """Return a recording on its grid, a series for each window that is used of it.
+
+    Raises ValueError.
+    """
+    constants = {name: float(value) for name, (value, _) in mapping.constants.items()}
+    declared = {
+        name: float(thing.default)
+        for name, thing in automaton.inputs.items()
+        if thing.default is not None
+    }
+    known = {**declared, **constants}
+    return tuple(
+        series_of(piece, list(automaton.inputs), seen, known) for piece in pieces(recording)
+    )
 
 
 def series_of(

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import os
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from diagnosis.diagnose import Bootstrap, Case, diagnose as diagnosed
-from diagnosis.dossier import Dossier, hashes, undecided, usable
+from diagnosis.dossier import Dossier, errors_of, hashes, undecided, usable
+from diagnosis.file_names import file_names
 from diagnosis.finding import told
 from diagnosis.fit import Fit, fit as fitted
 from diagnosis.layers import effects_in
@@ -65,22 +67,23 @@ def diagnose(
     case, automaton = _case(spec, train, held_out, checked, effects, root)
     case = dataclasses.replace(case, thresholds=limits, bootstrap=bootstrap)
     tell(f"looked at {len(case.train)} recordings: {len(checked.check.findings)} findings")
-    kept = case.train if anyway else usable(checked.check, case.train)
-    left_out = tuple(file.name for file in case.train if file not in kept)
+    kept = case.train if anyway else usable(checked.check, case)
+    left_out = tuple(case.name_of(file) for file in case.train if file not in kept)
     if kept:
-        if left_out:
-            tell(f"not used: {', '.join(left_out)}")
+        reasons = [f"left out: {text}" for _, text in told(errors_of(checked.check)) if left_out]
+        for text in reasons:
+            tell(text)
         case = dataclasses.replace(case, train=kept)
         found = diagnosed(case, tell)
         case = dataclasses.replace(case, thresholds=found.thresholds)
-        verdict, after = found.verdict, hashes(case.held_out)
+        verdict, after = found.verdict, hashes(case, case.held_out)
         dossier = Dossier(case, automaton, checked.check, verdict, found, after, left_out)
-        messages = (*summary(dossier), *needed(dossier))
+        messages = (*reasons, *summary(dossier), *needed(dossier))
         dossier = dataclasses.replace(
             dossier, verdict=dataclasses.replace(verdict, messages=messages)
         )
     else:
-        verdict = undecided(checked.check, hashes(case.train), time.monotonic() - begun)
+        verdict = undecided(checked.check, hashes(case, case.train), time.monotonic() - begun)
         dossier = Dossier(case, automaton, checked.check, verdict)
     if out is not None:
         save_diagnosis(dossier, out, spec)
@@ -117,10 +120,12 @@ def base_of(dossier: Dossier, spec: str, folder: Path) -> str:
 
 def _require_apart(train: Sequence[str | Path], held_out: Sequence[str | Path]) -> None:
     """Raise ValueError where a recording is named twice, or is both learnt from and held out."""
-    names = [Path(file).name for file in train]
-    for name in names:
-        if names.count(name) > 1:
-            raise ValueError(f"two recordings to learn from are called `{name}`: rename one")
+    for one, other in itertools.combinations(train, 2):
+        if overlap(Path(one), Path(other)):
+            raise ValueError(f"{other} is named twice: each recording counts once")
+    for one, other in itertools.combinations(held_out, 2):
+        if overlap(Path(one), Path(other)):
+            raise ValueError(f"{other} is held out twice: each recording counts once")
     for file in held_out:
         if any(overlap(Path(file), Path(learnt)) for learnt in train):
             raise ValueError(f"{file} is learnt from: it cannot be held out")
@@ -151,7 +156,8 @@ def _case(
     whole = expanded(document, project)
     files = tuple(Path(file) for file in train), tuple(Path(file) for file in held_out)
     candidates = _candidates(effects, project)
-    return Case(whole, project, checked.mapping, *files, candidates), automaton
+    names = {**file_names(files[0]), **file_names(files[1])}
+    return Case(whole, project, checked.mapping, *files, candidates, names=names), automaton
 
 
 def _wanted(thresholds: str | Path) -> tuple[Bootstrap, Thresholds]:

@@ -2,23 +2,36 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from codegen.build import BuildError
+from codegen.stepper import CompiledStepper
+from diagnosis.file_names import file_names
 from diagnosis.guessed_map import guessed_map
-from diagnosis.recording_check import RecordingCheck, check_recordings as checked
+from diagnosis.mistakes import mistakes_of
+from diagnosis.recording_check import RecordingCheck, check_recordings as checked, used_columns
+from engine.interpreter import Interpreter, Stepper
 from engine.recording import Recording, read_recording
 from language.experiment import RecordingMap
 from language.load import automaton_of
 from language.map import read_map
+from language.missing import ToolMissing
 from language.model import Automaton
 from language.problem import Problems, SpecError
-from language.project import Project, read_document
+from language.program import Program
+from language.project import Project, expanded, read_document
 
 if TYPE_CHECKING:
     from engine.plot import Picture
+
+
+LACKING = ("column", "empty")
+"""Problems of a file that lacks a column, or has no value in it."""
 
 
 @dataclass(frozen=True)
@@ -62,21 +75,47 @@ def check_recordings(
         mapping = read_map(read_document(project.path_of(named)), project)
     else:
         mapping = guessed_map(Path(files[0]), databases)
-    used = _used(mapping, automaton)
-    recordings = tuple(read_recording(Path(file), mapping, used) for file in files)
-    return CheckedRecordings(checked(recordings, mapping, automaton), mapping, recordings)
+    used = used_columns(mapping, automaton)
+    names = file_names([Path(file) for file in files])
+    recordings = tuple(_read(path, name, mapping, used) for path, name in names.items())
+    if spec is None or automaton is None:
+        return CheckedRecordings(checked(recordings, mapping, automaton), mapping, recordings)
+    document = expanded(read_document(project.path_of(spec)), project)
+    mistakes = partial(mistakes_of, document, project, automaton, mapping)
+    check = checked(recordings, mapping, automaton, stepper_of, mistakes)
+    return CheckedRecordings(check, mapping, recordings)
+
+
+def stepper_of(program: Program) -> Stepper:
+    """Return a Program in C, interpreted where there is no compiler; both have the same bits."""
+    try:
+        return CompiledStepper(program)
+    except (ToolMissing, BuildError, OSError):
+        return Interpreter(program)
+
+
+def _read(path: Path, name: str, mapping: RecordingMap, used: Sequence[str]) -> Recording:
+    """Read a recording, without the columns that it has not got. Raises SpecError, ToolMissing.
+
+    What else is wrong with a file is a problem of the file.
+    """
+    try:
+        recording = read_recording(path, mapping, used)
+    except SpecError as error:
+        kept = [column for column in used if _has(path, mapping, column)]
+        if not kept or any(problem.kind not in LACKING for problem in error.problems):
+            raise
+        recording = read_recording(path, mapping, kept)
+    return dataclasses.replace(recording, name=name)
+
+
+def _has(path: Path, mapping: RecordingMap, column: str) -> bool:
+    try:
+        read_recording(path, mapping, [column])
+    except SpecError as error:
+        return any(problem.kind not in LACKING for problem in error.problems)
+    return True
 
 
 def _automaton(spec: str, project: Project) -> Automaton:
     return automaton_of(read_document(project.path_of(spec)), project)
-
-
-def _used(mapping: RecordingMap, automaton: Automaton | None) -> list[str]:
-    """Return the columns that an automaton reads or compares; all of them without one."""
-    if automaton is None:
-        return list(mapping.columns)
-    return [
-        column.name
-        for column in mapping.columns.values()
-        if column.to in automaton.inputs or column.compare in automaton.outputs
-    ] or list(mapping.columns)

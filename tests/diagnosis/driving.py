@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from diagnosis.free_run import free_run
 from engine.recording import Channel, Recording
+from language.document import Document
 from language.experiment import RecordingMap
 from language.finding import document_of
 from language.load import automaton_of, command_line_value
@@ -65,9 +66,13 @@ TRUE = {"J_em": "0.057 kg*m^2", "k": "5000 N*m/rad", "J_v": "155 kg*m^2"}
 
 @cache
 def driveline(*values: tuple[str, str]) -> Automaton:
-    document = document_of(Source("small_driveline.yaml", tuple(SPEC.splitlines())), SPEC)
     given = {key: command_line_value(text, name=key) for key, text in values}
-    return automaton_of(document, Project(Path()), given)
+    return automaton_of(document(), Project(Path()), given)
+
+
+@cache
+def document() -> Document:
+    return document_of(Source("small_driveline.yaml", tuple(SPEC.splitlines())), SPEC)
 
 
 @cache

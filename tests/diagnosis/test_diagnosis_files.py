@@ -325,7 +325,8 @@ def test_recordings_with_errors_are_left_out_unless_they_are_most(
     errors = tuple(Finding("sign", name, "w", "is upside down", "error") for name in bad)
     noted = Finding("jitter", "a", "w", "wobbles", "warning")
     check = dataclasses.replace(dossier.check, findings=(*errors, noted))
-    assert usable(check, (Path("a"), Path("b"), Path("c"))) == tuple(Path(name) for name in kept)
+    case = dataclasses.replace(dossier.case, train=(Path("a"), Path("b"), Path("c")))
+    assert usable(check, case) == tuple(Path(name) for name in kept)
 
 
 def test_a_model_that_lacks_nothing_is_told_so(tmp_path: Path) -> None:
@@ -364,7 +365,7 @@ def test_no_physics_is_blamed_for_a_wrong_unit(
         (["--fail-on", "doubt"], 2, "one of effect"),
         (["--effects", "spec/none"], 2, "there is no effect in"),
         (["--held-out", "./run_0.csv"], 2, "cannot be held out"),
-        (["--train", "spec/run_1.csv"], 2, "are called `run_1.csv`"),
+        (["--train", "./run_1.csv"], 2, "is named twice"),
     ],
 )
 def test_what_is_asked_for_wrongly_is_told(

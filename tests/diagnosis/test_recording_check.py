@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from codegen.stepper import CompiledStepper
 from diagnosis.finding import told
+from diagnosis.mistakes import mistakes_of
 from diagnosis.needs import EFFECTS, NEEDS
 from diagnosis.recording_check import RecordingCheck, check_recordings
 from engine.recording import Recording
@@ -17,6 +20,7 @@ from tests.diagnosis.driving import (
     Spoil,
     Values,
     bench,
+    document,
     driveline,
     later,
     recording_of,
@@ -30,7 +34,8 @@ RPM = 30.0 / math.pi
 
 
 def check(*recordings: Recording) -> RecordingCheck:
-    return check_recordings(recordings, bench(), driveline())
+    mistakes = partial(mistakes_of, document(), Project(Path()), driveline(), bench())
+    return check_recordings(recordings, bench(), driveline(), CompiledStepper, mistakes)
 
 
 def seen(found: RecordingCheck) -> set[tuple[str, str, str]]:
@@ -88,7 +93,7 @@ def test_a_mistake_in_one_of_two_recordings_is_told_of_that_one() -> None:
 
 
 def test_parameters_that_are_a_fifth_off_and_a_small_delay_are_no_mistake_of_the_data() -> None:
-    found = check_recordings([spoiled(later("wheel", 0.03))], bench(), driveline())
+    found = check(spoiled(later("wheel", 0.03)))
     assert found.is_usable and not found.findings
 
 

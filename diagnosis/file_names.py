@@ -1,0 +1,17 @@
+"""File names: what recordings are called where bare names would not tell them apart."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+
+def file_names(paths: Sequence[Path]) -> Mapping[Path, str]:
+    """Return a name for each path: the bare one, or with as many folders as tell all apart."""
+    absolute = {path: path.absolute().parts for path in paths}
+    names: dict[Path, str] = {}
+    for count in range(1, max((len(parts) for parts in absolute.values()), default=0) + 1):
+        names = {path: "/".join(parts[-count:]) for path, parts in absolute.items()}
+        if len(set(names.values())) == len(names):
+            break
+    return names
