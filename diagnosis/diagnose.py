@@ -33,6 +33,7 @@ from diagnosis.plan import Plan, planned
 from diagnosis.search import Tell, Tried
 from diagnosis.selection import Selection
 from diagnosis.series import Series, compared, paced, pieces_of
+from diagnosis.shuffle import Shuffle, shuffle_of
 from diagnosis.simulation import misfits
 from diagnosis.threshold import EVERYWHERE, USUAL, Thresholds
 from diagnosis.verdict import Misfit, Named, Ranked, Says, Verdict
@@ -82,7 +83,8 @@ class Diagnosis:
     """A verdict with the models behind it; `bench` holds the training recordings.
 
     `description` is the formula that an unknown was turned into: it then is what was accepted.
-    `plan` is what would tell an accepted effect from those that do nearly as well.
+    `plan` is what would tell an accepted effect from those that do nearly as well. `shuffles` is
+    what follows the largest step: of the base, then of the model with what was accepted.
     """
 
     verdict: Verdict
@@ -92,6 +94,7 @@ class Diagnosis:
     description: Description | None = field(default=None, repr=False)
     thresholds: Thresholds = EVERYWHERE
     plan: Plan | None = field(default=None, repr=False)
+    shuffles: tuple[Shuffle, ...] = field(default=(), repr=False)
 
 
 def diagnose(case: Case, tell: Tell = lambda text: None) -> Diagnosis:
@@ -139,7 +142,8 @@ def diagnose(case: Case, tell: Tell = lambda text: None) -> Diagnosis:
         )
         verdict = _confirmed(verdict, selection, held)
     verdict = dataclasses.replace(verdict, runtime_s=time.monotonic() - begun)
-    return Diagnosis(verdict, selection, bench, held, formula, thresholds, plan)
+    shuffles = _shuffles(selection, bench)
+    return Diagnosis(verdict, selection, bench, held, formula, thresholds, plan, shuffles)
 
 
 def read_series(
@@ -197,6 +201,12 @@ def _says(selection: Selection, loci: Sequence[Locus], bench: Bench, needed: flo
     if best and any(rival.total > best.total - CLEAR for rival in rivals):
         return "ambiguous"
     return "effect"
+
+
+def _shuffles(selection: Selection, bench: Bench) -> tuple[Shuffle, ...]:
+    models = [selection.base, *([selection.model] if selection.accepted else [])]
+    found = [shuffle_of(model, bench.series) for model in models]
+    return tuple(one for one in found if one is not None) if found[0] is not None else ()
 
 
 def _told_apart(selection: Selection, automaton: Automaton) -> list[tuple[str, Estimate]]:

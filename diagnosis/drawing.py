@@ -9,11 +9,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from diagnosis import wording
 from diagnosis.digits import per_cent, significant
 from diagnosis.dossier import Dossier
 from diagnosis.locus_picture import locus_picture
 from diagnosis.plan_picture import plan_picture
 from diagnosis.shown import Shown
+from diagnosis.shuffle_picture import shuffle_picture
 from diagnosis.whiteness_picture import whiteness_picture
 from diagnosis.window_picture import window_picture
 from diagnosis.worst_window import WorstWindow
@@ -49,6 +51,7 @@ def drawings_of(dossier: Dossier, shown: Sequence[Shown]) -> list[Drawing]:
     found.append(_whiteness(shown[0], is_same))
     if any(locus.gain > 0.0 for locus in dossier.verdict.location):
         found.append(_places(dossier))
+    found += _shuffle(dossier, shown[0])
     if dossier.diagnosis.plan is not None:
         signals = list(zip(shown[0].window.signals, shown[0].window.units, strict=True))
         caption = f"{dossier.diagnosis.plan.sentence()}; what each would show of it"
@@ -84,6 +87,17 @@ def _whiteness(one: Shown, is_same: bool) -> Drawing:
     )
     picture = whiteness_picture(one.before, one.after, is_same)
     return Drawing("whiteness", caption, caption, picture)
+
+
+def _shuffle(dossier: Dossier, shown: Shown) -> list[Drawing]:
+    """Return how the frequency goes with the amplitude, where the model has another one."""
+    text = wording.oscillation(dossier)
+    if not text or dossier.diagnosis is None:
+        return []
+    found = dossier.diagnosis.shuffles
+    units = dict(zip(shown.window.signals, shown.window.units, strict=True))
+    caption = f"{text[0].upper()}{text[1:]}."
+    return [Drawing("shuffle", caption, text, shuffle_picture(found, units[found[0].signal]))]
 
 
 def _places(dossier: Dossier) -> Drawing:

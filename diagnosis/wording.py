@@ -114,6 +114,19 @@ def separation(dossier: Dossier) -> list[str]:
     return lines
 
 
+def oscillation(dossier: Dossier) -> str:
+    """Return until when the model follows the largest step; empty where nothing is missing."""
+    found = dossier.diagnosis.shuffles if dossier.diagnosis else ()
+    if not found or not found[0].differs or dossier.verdict.verdict == "nothing_missing":
+        return ""
+    text = found[0].sentence()
+    if len(found) > 1:
+        after = found[1]
+        end = "to the end" if after.until >= after.length else f"until t = {after.until:.2f} s"
+        text += f"; with what was found it fits {end}"
+    return text
+
+
 def plan(dossier: Dossier) -> str:
     """Return what to record to be sure, as it was simulated; empty where there is no doubt."""
     found = dossier.diagnosis.plan if dossier.diagnosis else None
@@ -148,9 +161,10 @@ def title(layer: Layer, dossier: Dossier) -> str:
 
 
 def summary(dossier: Dossier) -> list[str]:
-    """Return at most five lines: the verdict, where, how much better, doubts, what to record."""
-    lines = [headline(dossier), location(dossier), improvement(dossier), _doubt(dossier)]
-    lines += [plan(dossier)] if dossier.verdict.verdict == "ambiguous" else []
+    """Return at most five lines: verdict, place, what else is to be told, improvement, doubt."""
+    is_ambiguous = dossier.verdict.verdict == "ambiguous"
+    more = plan(dossier) if is_ambiguous else oscillation(dossier)
+    lines = [headline(dossier), location(dossier), more, improvement(dossier), _doubt(dossier)]
     return [line for line in lines if line]
 
 
