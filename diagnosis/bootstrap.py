@@ -91,10 +91,10 @@ def bootstrapped(
     is_linear = bench.series[0].is_linear
     source = [dataclasses.replace(one, is_linear=is_linear) for one in raw]
     place = (bench.document, bench.project, (), bench.drifts, bench.seen, raw[0].period)
-    model, noises = candidate(*place), noises_of(source, {})
+    model = candidate(*place)
     for number in range(len(known), REPLICATES):
         random = np.random.default_rng((SEED, number))
-        made = replicate(model, base, source, noises, random)
+        made = replicate(model, base, source, random)
         known.append({} if made is None else gains_in(bench, base, units, made))
         if file is not None:
             with suppress(OSError):

@@ -1,7 +1,8 @@
 """Replicate: recordings as the recalibrated base would have given them, from random numbers.
 
-The base runs freely over the inputs that were recorded, from where each recording starts, with the
-slow torques that its drifts stand for; signals and inputs get new noise and are quantised.
+The base runs freely over the inputs that were recorded, without their noise, from where each
+recording starts, with the slow torques that its drifts stand for; signals and inputs get new noise
+and are quantised.
 """
 
 from __future__ import annotations
@@ -11,33 +12,37 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter
 
 from diagnosis.candidate import Candidate
 from diagnosis.estimation import Estimate
-from diagnosis.noise import quantum_of
+from diagnosis.noise import QUIET, STRETCH, quantum_of
 from diagnosis.prediction import Noises
 from diagnosis.series import Series
 
 Reals = NDArray[np.float64]
+CALM = 9
+"""Samples of the median that takes the noise from an input."""
 
 
 def replicate(
     model: Candidate,
     base: Estimate,
     series: Sequence[Series],
-    noises: Noises,
     random: np.random.Generator,
 ) -> tuple[Series, ...] | None:
     """Return simulated recordings on the grid of `series`, None where the base leaves all bounds.
 
-    `model` is the base compiled for that grid, `noises` are those of the recordings on it.
+    `model` is the base compiled for that grid.
     """
     found = []
-    none = np.zeros((len(model.predictor.modes), len(model.predictor.states), len(noises.seen)))
+    predictor = model.predictor
+    none = np.zeros((len(predictor.modes), len(predictor.states), len(predictor.seen)))
     for place, one in enumerate(series):
-        run = model.predictor.predict(
+        calm = np.ascontiguousarray(np.stack([_calm(column) for column in one.inputs.T], axis=1))
+        run = predictor.predict(
             model.page(base.values(place), one),
-            one.inputs,
+            calm,
             one.measured,
             none[:0],
             none,
@@ -48,8 +53,8 @@ def replicate(
         if run.done < one.count:
             return None
         shown = np.where(np.isfinite(one.measured), run.seen, np.nan)
-        measured = _noisy(shown, one.measured, noises.seen, random)
-        inputs = _noisy(one.inputs, one.inputs, noises.inputs, random)
+        measured = _noisy(shown, one.measured, random)
+        inputs = _noisy(calm, one.inputs, random)
         found.append(dataclasses.replace(one, inputs=inputs, measured=measured))
     return tuple(found)
 
@@ -66,14 +71,34 @@ def _pushes(model: Candidate, noises: Noises, one: Series, random: np.random.Gen
     return pushes
 
 
-def _noisy(values: Reals, like: Reals, noise: Reals, random: np.random.Generator) -> Reals:
+def _calm(values: Reals) -> Reals:
+    """Return an input without its noise; steps stay. In a gap noise alone would move a shaft."""
+    if _white(values) == 0.0:
+        return values
+    return np.asarray(median_filter(values, CALM, mode="nearest"), dtype=np.float64)
+
+
+def _noisy(values: Reals, like: Reals, random: np.random.Generator) -> Reals:
     """Return signals (samples, signals) with noise, in the quanta of those that they are like."""
     found = values.copy()
-    for column, size in enumerate(noise):
+    for column in range(found.shape[1]):
         known = like[:, column][np.isfinite(like[:, column])]
         quantum = quantum_of(known)
-        white = np.sqrt(max(float(size) ** 2 - quantum**2 / 12.0, 0.0))
+        white = np.sqrt(max(_white(known) ** 2 - quantum**2 / 12.0, 0.0))
         found[:, column] += white * random.standard_normal(len(found))
         if quantum > 0.0:
             found[:, column] = quantum * np.round(found[:, column] / quantum)
     return np.ascontiguousarray(found)
+
+
+def _white(values: Reals) -> float:
+    """Return the standard deviation of the noise of a signal, that of its quanta in it.
+
+    By mean squares of second differences: their median is one of a few values where quanta are
+    as large as noise.
+    """
+    second = np.diff(values, n=2)
+    if len(second) == 0:
+        return 0.0
+    parts = np.array_split(second, max(1, len(second) // STRETCH))
+    return float(np.quantile([np.sqrt(np.mean(part**2) / 6.0) for part in parts], QUIET))
