@@ -16,6 +16,7 @@ from typing import Literal
 
 import numpy as np
 
+from diagnosis.alone import LEFT_OUT, SIMULATED, alone, forgets
 from diagnosis.bench import Bench, balance_drifts
 from diagnosis.bootstrap import bootstrapped, kept_thresholds
 from diagnosis.description import Description, described
@@ -31,13 +32,13 @@ from diagnosis.naming import named, place_path, quantities_of, verdict_id
 from diagnosis.place_sentence import place_sentence
 from diagnosis.plan import Plan, planned
 from diagnosis.search import Tell, Tried
-from diagnosis.selection import Selection
+from diagnosis.selection import Selection, selected
 from diagnosis.series import Series, compared, paced, pieces_of
 from diagnosis.shuffle import Shuffle, shuffle_of
 from diagnosis.simulation import misfits
 from diagnosis.threshold import EVERYWHERE, USUAL, Thresholds
 from diagnosis.verdict import Misfit, Named, Ranked, Says, Verdict
-from diagnosis.ways import better_way, chosen, ways_of
+from diagnosis.ways import Way, better_way, chosen, ways_of
 from engine.recorded_part import file_of
 from engine.recording import read_recording
 from language.document import Document
@@ -105,28 +106,18 @@ def diagnose(case: Case, tell: Tell = lambda text: None) -> Diagnosis:
     if not seen:
         raise ValueError(f"map `{case.mapping.name}` compares no output of `{automaton.name}`")
     series = [one for path in case.train for one in read_series(path, case, automaton, seen)]
-    ways = ways_of(case_bench(case, automaton, series, seen), tell)
-    thresholds = _thresholds(case, *better_way(ways), series, tell)
-    most = max(USUAL, thresholds.most)
-    bench, base, selection = chosen(ways, thresholds, tell)
-    units = units_of(base.candidate, bench.series, base.noises, base.values(0))
-    loci = located(bench, base)
-    tell(place_sentence(loci, bench))
-    selection = with_hidden(bench, selection, loci, UNKNOWN * most, tell)
-    says = _says(selection, loci, bench, most)
-    formula = None
-    if is_doubtful(says, selection, loci, bench, most):
-        formula = described(bench, selection.base, loci, units, most, tell)
-    if formula is not None and explains_more(formula, selection):
-        says, selection = "unknown", selected_formula(selection, formula)
-    else:
-        formula = None
+    raw = case_bench(case, automaton, series, seen)
+    ways = ways_of(raw, tell)
+    bench, base = better_way(ways)
+    judge = _judged_alone if forgets(base, bench.series) else _judged
+    judged = judge(case, raw, ways, tell)
+    bench, selection, loci = judged.bench, judged.selection, judged.loci
     plan = planned(bench, _told_apart(selection, automaton))
     if plan is not None:
         tell(plan.sentence())
     loci = led_by(loci, [place_path(tried.layer) for tried in selection.accepted], bench)
-    fit = {"train": misfits(base, selection.model, bench.series)}
-    verdict = _verdict(says, selection, loci, automaton, fit)
+    fit = {"train": misfits(judged.base, selection.model, bench.series)}
+    verdict = _verdict(judged.says, selection, loci, automaton, fit)
     hashes = {case.name_of(path): _digest(path) for path in case.train}
     verdict = dataclasses.replace(verdict, inputs=hashes, messages=(place_sentence(loci, bench),))
     is_linear = bench.series[0].is_linear
@@ -143,7 +134,55 @@ def diagnose(case: Case, tell: Tell = lambda text: None) -> Diagnosis:
         verdict = _confirmed(verdict, selection, held)
     verdict = dataclasses.replace(verdict, runtime_s=time.monotonic() - begun)
     shuffles = _shuffles(selection, bench)
-    return Diagnosis(verdict, selection, bench, held, formula, thresholds, plan, shuffles)
+    known = judged.description, judged.thresholds, plan, shuffles
+    return Diagnosis(verdict, selection, bench, held, *known)
+
+
+@dataclass(frozen=True)
+class _Judged:
+    """What selection has come to; `bench` has the recordings as they were judged."""
+
+    bench: Bench
+    base: Estimate
+    selection: Selection
+    loci: tuple[Locus, ...]
+    says: Says
+    thresholds: Thresholds
+    description: Description | None = None
+
+
+def _judged(case: Case, raw: Bench, ways: Sequence[Way], tell: Tell) -> _Judged:
+    """Judge models by what an observer foresees from sample to sample."""
+    thresholds = _thresholds(case, *better_way(ways), raw.series, tell)
+    most = max(USUAL, thresholds.most)
+    bench, base, selection = chosen(ways, thresholds, tell)
+    units = units_of(base.candidate, bench.series, base.noises, base.values(0))
+    loci = located(bench, base)
+    tell(place_sentence(loci, bench))
+    selection = with_hidden(bench, selection, loci, UNKNOWN * most, tell)
+    says = _says(selection, loci, bench, most)
+    formula = None
+    if is_doubtful(says, selection, loci, bench, most):
+        formula = described(bench, selection.base, loci, units, most, tell)
+    if formula is not None and explains_more(formula, selection):
+        says, selection = "unknown", selected_formula(selection, formula)
+    else:
+        formula = None
+    return _Judged(bench, base, selection, loci, says, thresholds, formula)
+
+
+def _judged_alone(case: Case, raw: Bench, ways: Sequence[Way], tell: Tell) -> _Judged:
+    """Judge models by simulations of whole recordings, in which nothing is fed back."""
+    bench, base = better_way(ways)
+    loci = located(bench, base)
+    tell(place_sentence(loci, bench))
+    tell("what happened long ago does not matter here: whole simulations are judged")
+    thresholds = SIMULATED if case.thresholds is EVERYWHERE else case.thresholds
+    found = alone(raw, base)
+    selection = selected(found.bench, found.base, {}, thresholds, tell, LEFT_OUT)
+    says = _says(selection, loci, found.bench, max(USUAL, thresholds.most))
+    bench = dataclasses.replace(bench, series=found.bench.series)
+    return _Judged(bench, found.base, selection, loci, says, thresholds)
 
 
 def read_series(

@@ -14,6 +14,7 @@ from fractions import Fraction
 from importlib import resources
 from pathlib import Path
 
+from diagnosis.series import shows_inputs
 from language.continuous import step_limits
 from language.document import Document
 from language.effect import Effect, Laying, read_effect
@@ -144,12 +145,16 @@ def _times(given: Automaton, names: Sequence[str]) -> list[Fraction]:
     ]
 
 
-def fewest_steps(given: Automaton, layers: Sequence[Layer]) -> int:
-    """Return how many major steps there are to be between two samples at least."""
+def fewest_steps(given: Automaton, layers: Sequence[Layer], seen: Sequence[str]) -> int:
+    """Return how many major steps there are to be between two samples at least.
+
+    Several where what is `seen` shows an input at once as well: it is held within a step.
+    """
     at_input = any(layer.effect.fits[0].kind == "input" for layer in layers)
     if at_input and applications(given, ("floor",)):
         return TURNING_STEPS
-    return DELAYED_STEPS if applications(given, ("delay",)) else 1
+    is_short = applications(given, ("delay",)) or shows_inputs(given, seen)
+    return DELAYED_STEPS if is_short else 1
 
 
 def _stable(given: Automaton, longest: Fraction) -> Fraction:

@@ -41,13 +41,15 @@ class Noises:
     """What is known of noise: of the `seen` signals, of the inputs, and of each drift [SI].
 
     Innovations beyond `limits` (seen,) count in proportion, not as squares: an event that is
-    foreseen a sample late must not outweigh all others.
+    foreseen a sample late must not outweigh all others. With `is_alone` nothing is corrected once
+    the states have been found: an innovation is then what a simulation misses.
     """
 
     seen: Reals
     inputs: Reals
     drifts: Mapping[str, float]
     limits: Reals
+    is_alone: bool = False
 
 
 @dataclass(frozen=True)
@@ -190,7 +192,7 @@ def gains_of(
             found[mode] = gains[1]
     nothing = np.zeros((len(candidate.spans), len(noises.seen)))
     usual = next(iter(found.values()), nothing)
-    steady = np.array([found.get(mode, usual) for mode in modes])
+    steady = np.array([nothing if noises.is_alone else found.get(mode, usual) for mode in modes])
     return Gains(first, np.ascontiguousarray(steady))
 
 

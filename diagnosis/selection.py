@@ -13,6 +13,7 @@ from diagnosis.estimation import Estimate
 from diagnosis.evidence import Evidence, evidence
 from diagnosis.level import settled
 from diagnosis.search import Tell, Tried, searched
+from diagnosis.swap import swapped
 from diagnosis.threshold import EVERYWHERE, USUAL, Thresholds
 
 PART = 0.05
@@ -70,8 +71,12 @@ def selected(
     units: Mapping[str, float],
     thresholds: Thresholds = EVERYWHERE,
     tell: Tell = lambda text: None,
+    left_out: float = 1.0,
 ) -> Selection:
-    """Return the effects that the training recordings ask for: at most three, none too many."""
+    """Return the effects that the training recordings ask for: at most three, none too many.
+
+    `left_out` is the part of the threshold that is asked for what is left out.
+    """
     model = base
     accepted: list[Tried] = []
     rounds: list[list[Tried]] = []
@@ -89,27 +94,35 @@ def selected(
         enough = (
             t
             for t in tried
-            if t.evidence and counted(t.evidence) > max(needed, thresholds.of(t.layer))
+            if t.evidence and counted(t.evidence, left_out) > max(needed, thresholds.of(t.layer))
         )
         best = next(enough, None)
         if best is None or best.estimate is None or best.evidence is None:
             break
         needed = PART * best.evidence.least
         tell(f"accepted {best.layer.id}: {best.evidence.least:.0f} nats")
-        accepted.append(best)
-        model = best.estimate
+        before = [*accepted, best]
+        accepted, model = swapped(bench, best.estimate, before, rounds[0], units, tell)
+        rounds[0] = _refuted(rounds[0], before, accepted)
     kept, model = _still_needed(bench, base, model, accepted, units, thresholds, tell)
     first = tuple(rounds[0]) if rounds else ()
     return Selection(base, model, kept, first, _rivals(first, kept))
 
 
-def counted(known: Evidence) -> float:
+def _refuted(first: list[Tried], before: list[Tried], after: list[Tried]) -> list[Tried]:
+    """Return the candidates of the first round; those that stood aside for another are none."""
+    out = {tried.layer.id for tried in before} - {tried.layer.id for tried in after}
+    return [Tried(t.layer, t.promised) if t.layer.id in out else t for t in first]
+
+
+def counted(known: Evidence, left_out: float = 1.0) -> float:
     """Return what an effect gains [nats] as it counts: less where one recording alone shows it.
 
     A little in one recording is more often an accident of it than physics.
     """
     shared = len(known.each) == 1 or known.rest > SHARED * known.left_out
-    return known.least if shared else known.least / ALONE
+    least = min(known.train, known.left_out / left_out)
+    return least if shared else least / ALONE
 
 
 def looked_again(

@@ -1,7 +1,8 @@
 """Simulation: how far a model goes astray when nothing corrects it, before and after.
 
 An observer runs for a second, then the model is alone for one and a half: the difference to what
-was recorded there, over the spread of the recorded signal.
+was recorded there, over the spread of the recorded signal. A model that forgets where it started
+is alone for the whole of each recording, once its states have been found.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.estimation import Estimate
-from diagnosis.prediction import predicted
+from diagnosis.prediction import BURN_IN, predicted
 from diagnosis.series import Series
 from diagnosis.verdict import Misfit
 
@@ -29,22 +30,28 @@ def misfits(before: Estimate, after: Estimate, series: Sequence[Series]) -> dict
     first, second = nrmse(before, series), nrmse(after, series)
     names = before.candidate.predictor.seen
     return {
-        name: Misfit(float(a), float(b)) for name, a, b in zip(names, first, second, strict=True)
+        name: Misfit(float(a), float(b), float(a * of), float(b * of))
+        for name, a, b, of in zip(names, first, second, spread_of(series), strict=True)
     }
 
 
 def nrmse(model: Estimate, series: Sequence[Series]) -> Reals:
     """Return the normalised root mean square of free simulation by signal (seen,)."""
-    squares, counts, spreads = [], [], []
+    squares, counts = [], []
     for one, simulated in zip(series, free(model, series), strict=True):
-        alone = is_free(one)[:, None] & np.isfinite(one.measured) & np.isfinite(simulated)
+        counted = is_later(one) if model.noises.is_alone else is_free(one)
+        alone = counted[:, None] & np.isfinite(one.measured) & np.isfinite(simulated)
         error = np.where(alone, one.measured - simulated, 0.0)
         squares.append(np.sum(error**2, axis=0))
         counts.append(np.sum(alone, axis=0))
-        spreads.append(one.measured)
-    spread = np.nanstd(np.concatenate(spreads), axis=0)
     mean = np.sum(squares, axis=0) / np.maximum(np.sum(counts, axis=0), 1)
-    return np.asarray(np.sqrt(mean) / np.maximum(spread, 1e-12), dtype=np.float64)
+    return np.asarray(np.sqrt(mean) / spread_of(series), dtype=np.float64)
+
+
+def spread_of(series: Sequence[Series]) -> Reals:
+    """Return the standard deviation of each compared signal [SI] (seen,)."""
+    spread = np.nanstd(np.concatenate([one.measured for one in series]), axis=0)
+    return np.asarray(np.maximum(spread, 1e-12), dtype=np.float64)
 
 
 def free(model: Estimate, series: Sequence[Series]) -> list[Reals]:
@@ -59,6 +66,11 @@ def free(model: Estimate, series: Sequence[Series]) -> list[Reals]:
     ]
     outcome = predicted(model.candidate, hidden, values, model.gains, model.noises.limits)
     return [p.seen for p in outcome.predictions]
+
+
+def is_later(series: Series) -> NDArray[np.bool_]:
+    """Return the samples (samples,) behind those in which the states are found."""
+    return np.asarray(np.arange(series.count) >= round(BURN_IN / float(series.period)))
 
 
 def is_free(series: Series) -> NDArray[np.bool_]:

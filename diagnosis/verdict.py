@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -43,10 +44,15 @@ class Ranked:
 
 @dataclass(frozen=True)
 class Misfit:
-    """Normalised root mean square of free simulation, before and after."""
+    """Root mean square of what free simulation misses, before and after.
+
+    As a part of the standard deviation of the recorded signal, and in SI.
+    """
 
     nrmse_before: float
     nrmse_after: float
+    rmse_before: float
+    rmse_after: float
 
 
 @dataclass(frozen=True)
@@ -97,10 +103,7 @@ class Verdict:
                 "windows": [list(window) for window in worst.windows] if worst else [],
             },
             "fit": {
-                part: {
-                    signal: {"nrmse_before": one.nrmse_before, "nrmse_after": one.nrmse_after}
-                    for signal, one in signals.items()
-                }
+                part: {signal: dataclasses.asdict(one) for signal, one in signals.items()}
                 for part, signals in self.fit.items()
             },
             "base": {
