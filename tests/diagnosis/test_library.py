@@ -98,7 +98,7 @@ def test_a_signature_is_what_the_equation_of_the_effect_says(tmp_path: Path) -> 
     (friction,) = (one for one in library(SHIPPED) if one.name == "coulomb_friction")
     (layer,) = described(friction, base, project).layers
     found = signature(base, project, layer, ("T", "10 N*m"))
-    assert found.values == {"T_c": "1 N*m"}
+    assert found.values == {"T_c": "1 N*m", "w_s": "0.1 rad/s"}
     times = found.without.times
     change = found.with_it.signals["spinner.w"] - found.without.signals["spinner.w"]
     place = int(np.searchsorted(times, 0.95))

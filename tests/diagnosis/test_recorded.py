@@ -66,8 +66,9 @@ def test_the_nominal_driveline_reads_the_columns_of_a_blind_case(tmp_path: Path)
 def test_without_a_gap_the_motor_of_the_leaf_is_missed_by_some_rpm(
     recordings: Path, file: str
 ) -> None:
-    (run,) = runs("leaf_motor_side", recordings / "nissan_leaf" / file)
-    assert 10.0 < run.compared["em_speed_rpm"].rms / RPM < 35.0
+    found = runs("leaf_motor_side", recordings / "nissan_leaf" / file)
+    missed = [run.compared["em_speed_rpm"].rms / RPM for run in found]
+    assert 5.0 < max(missed) < 35.0
 
 
 @pytest.mark.recordings

@@ -30,7 +30,10 @@ def case_of(spec: str) -> tuple[Case, Automaton]:
 
 
 def leaf_like(path: Path) -> Path:
-    """Motor speed rises by 1 rpm in 10 ms; wheel frames every 20 ms, 4 ms behind, 0.1 km/h up."""
+    """Motor speed rises by 1 rpm in 10 ms; wheel frames every 20 ms, 4 ms behind, 0.1 km/h up.
+
+    The map takes the motor's speed to be from 10 ms later than its stamp.
+    """
     rows = ["t_s,em_torque_Nm,em_speed_rpm,wheel_a_kmh,wheel_b_kmh,t_wheel_s"]
     for k in range(100):
         wheel = f"{0.1 * k:.1f},{0.1 * k:.1f},{0.01 * k + 0.004:.3f}" if k % 2 else ",,"
@@ -46,7 +49,7 @@ def test_a_grid_begins_with_a_compared_value_and_linear_inputs_run_between_stamp
     (one,) = read_series(leaf_like(tmp_path / "drive.csv"), case, automaton, ("w_em",))
     assert one.start == Fraction(2, 100)
     rpm = one.measured[:, 0] * 30.0 / np.pi
-    assert rpm == pytest.approx(np.arange(2.0, 2.0 + one.count))
+    assert rpm == pytest.approx(np.arange(1.0, 1.0 + one.count))
     assert one.inputs[:, 0] == pytest.approx(np.arange(2, 2 + one.count) % 7)
     wheel = 0.1 * (np.arange(2, 2 + one.count) - 0.4)
     assert one.inputs[:, 1] * 3.6 == pytest.approx(wheel)
@@ -85,11 +88,11 @@ def test_what_is_shown_follows_from_the_input_of_its_own_sample() -> None:
     case, _ = case_of("emps")
     one = candidate(case.document, PROJECT, (), (), ("F_m",), Fraction(1, 1000))
     ramp = 1e-3 * np.arange(50.0).reshape(-1, 1) ** 2
-    nothing = np.zeros((1, 2, 1))
+    nothing = np.zeros((1, 3, 1))
     blank, substeps = np.full((50, 1), np.nan), one.recipe.substeps
     page = np.array(list(one.predictor.page.values()))
     found = one.predictor.predict(page, ramp, blank, nothing[:0], nothing, substeps, linear=True)
-    q, v = found.states.T
+    q, v, _ = found.states.T
     force = 35.1507 * (160.18 * 243.45 * (ramp[:, 0] - q) - 243.45 * v)
     assert found.seen[:, 0] == pytest.approx(force, rel=1e-12)
     assert np.all(np.abs(force[10:]) > 100.0)
