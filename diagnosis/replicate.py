@@ -18,7 +18,7 @@ from diagnosis.candidate import Candidate
 from diagnosis.estimation import Estimate
 from diagnosis.noise import QUIET, STRETCH, quantum_of
 from diagnosis.prediction import Noises
-from diagnosis.series import Series
+from diagnosis.series import PACE, Series
 
 Reals = NDArray[np.float64]
 CALM = 9
@@ -33,13 +33,16 @@ def replicate(
 ) -> tuple[Series, ...] | None:
     """Return simulated recordings on the grid of `series`, None where the base leaves all bounds.
 
-    `model` is the base compiled for that grid.
+    `model` is the base compiled for that grid. The first inputs stay as they were: on which side
+    of a gap a shaft starts may hang on their sign.
     """
     found = []
     predictor = model.predictor
     none = np.zeros((len(predictor.modes), len(predictor.states), len(predictor.seen)))
     for place, one in enumerate(series):
+        begun = max(1, int(PACE / one.period))
         calm = np.ascontiguousarray(np.stack([_calm(column) for column in one.inputs.T], axis=1))
+        calm[:begun] = np.mean(one.inputs[:begun], axis=0)
         run = predictor.predict(
             model.page(base.values(place), one),
             calm,
@@ -55,6 +58,7 @@ def replicate(
         shown = np.where(np.isfinite(one.measured), run.seen, np.nan)
         measured = _noisy(shown, one.measured, random)
         inputs = _noisy(calm, one.inputs, random)
+        inputs[:begun] = one.inputs[:begun]
         found.append(dataclasses.replace(one, inputs=inputs, measured=measured))
     return tuple(found)
 
