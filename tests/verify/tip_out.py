@@ -1,0 +1,78 @@
+"""Verify the paper's own mismatch: a shaft that depends on the amplitude, hidden in tip-outs at
+100 Hz, is told, named and repaired; into docs/evidence/5.json.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+from pathlib import Path
+
+import modewright as mw
+from diagnosis.dossier import Dossier
+from diagnosis.wording import oscillation
+from tests.open_generator.case import courses
+from tests.open_generator.recording import write_case
+from tests.open_generator.tip_out import SHAFT, VARIANT, tip_outs
+from tests.verify.store import ROOT, Figure, measured
+
+LESS = 0.6
+"""Most of the held-out misfit of free simulation that is left with the effect."""
+
+
+def main() -> int:
+    """Measure what is not measured yet; return 0 if the bar is met."""
+    os.chdir(ROOT)
+    return measured(5, {"paper_tip_out": paper_tip_out})
+
+
+def paper_tip_out() -> Figure:
+    """Diagnose three tip-outs, with a fourth held out, and the same without what is hidden."""
+    hidden, clean = diagnosed(hidden=True), diagnosed(hidden=False)
+    verdict, found = hidden.verdict, hidden.diagnosis
+    assert found
+    before, after = found.shuffles
+    fit = verdict.fit["held_out"].values()
+    left = [one.nrmse_after / one.nrmse_before for one in fit]
+    names = [(one.id, one.place) for one in verdict.effects]
+    told = oscillation(hidden)
+    met = (
+        names == [(SHAFT.name, "elements.half_shaft")]
+        and verdict.confirmed is True
+        and "growing as the amplitude falls" in told
+        and after.until > before.until
+        and max(left) < LESS
+        and clean.verdict.verdict == "nothing_missing"
+    )
+    return {
+        "met": met,
+        "told": told,
+        "effects": [f"{name}@{place}" for name, place in names],
+        "fits_until_s": [round(before.until, 2), round(after.until, 2)],
+        "held_out_misfit_left": [round(one, 2) for one in left],
+        "confirmed": verdict.confirmed,
+        "clean": clean.verdict.verdict,
+    }
+
+
+def diagnosed(hidden: bool) -> Dossier:
+    """Return the diagnosis of the tip-outs."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        case = tip_outs(hidden)
+        write_case(folder, case, courses([case])[0])
+        spec = folder / "spec"
+        spec.mkdir()
+        (spec / "paper_driveline.yaml").write_text(VARIANT)
+        base = (ROOT / "spec" / "recorded" / "blind_driveline.yaml").read_text()
+        (spec / "blind_driveline.yaml").write_text(base)
+        columns = (ROOT / "spec" / "recorded" / "map_blind.yaml").read_text()
+        (spec / "map_blind.yaml").write_text(columns)
+        train = sorted((folder / "train").glob("*.csv"))
+        held_out = sorted((folder / "held_out").glob("*.csv"))
+        return mw.diagnose("paper_driveline", train, held_out, root=folder)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
