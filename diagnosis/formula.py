@@ -15,8 +15,8 @@ from diagnosis.probe import torques_of
 from diagnosis.scale import unit_of
 from diagnosis.term import Term
 from diagnosis.verdict import Quantity
-from language.document import Scalar
-from language.effect import read_effect
+from language.document import Document, Scalar
+from language.effect import foreign_names, read_effect
 from language.finding import document_of
 from language.known import Known, unit_text
 from language.problem import Problems, Source, Span
@@ -65,15 +65,29 @@ def formula_of(
         for k, pair in enumerate(zip(terms, weights, strict=True), 1)
     ]
     name = f"unknown_{number}_at_{place}"
-    text = _text(bench, name, section, terms, made)
-    lines = tuple(text.splitlines())
-    effect = read_effect(document_of(Source(f"{name}.yaml", lines), text), Problems())
+    text = _reading(_text(bench, name, section, terms, made))
+    problems = Problems()
+    effect = read_effect(_document(name, text), problems)
+    problems.stop_if_any()
     layer = Layer(effect, place, place)
     start, phases = {}, {}
     for part in made:
         start.update({layer.named(name): value for name, value in part.start.items()})
         phases.update({layer.named(name): value for name, value in part.phases.items()})
     return Formula(layer, text, tuple(terms), start, phases)
+
+
+def _document(name: str, text: str) -> Document:
+    return document_of(Source(f"{name}.yaml", tuple(text.splitlines())), text)
+
+
+def _reading(text: str) -> str:
+    """Return the text of an effect that says which names of the model it reads."""
+    foreign = foreign_names(_document("formula", text).root)
+    head, sign, rest = text.partition("\nat: ")
+    place, _, more = rest.partition("\n")
+    reads = f"\nreads: [{', '.join(foreign)}]" if foreign else ""
+    return f"{head}{sign}{place}{reads}\n{more}"
 
 
 @dataclass(frozen=True)

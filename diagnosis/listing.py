@@ -97,6 +97,8 @@ def _row(
     reason = wording.reason(tried, rank, selection, dossier.case.thresholds)
     if is_accepted and dossier.verdict.verdict == "ambiguous":
         reason = "best, but not told from others: laid in what is shown here"
+    if is_accepted and dossier.verdict.verdict == "unknown":
+        reason = "a formula, no effect of the library: laid in what is shown here"
     effect, _, place = wording.title(tried.layer, dossier).partition("@")
     return CandidateRow(
         effect,

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from diagnosis.estimation import Estimate
 from diagnosis.layers import Layer
 from diagnosis.verdict import Named, Quantity
+from language.effect import own_names
 from language.model import Automaton
 
 Reals = NDArray[np.float64]
@@ -39,10 +40,11 @@ def place_path(layer: Layer) -> str:
 def named(layer: Layer, model: Estimate, automaton: Automaton) -> Named:
     """Return an effect of a model with its parameters, named as the effect names them."""
     quantities = quantities_of(model)
+    brought = {layer.named(name): name for name in own_names(layer.effect.body)}
     own = {
-        name.removesuffix(f"_{layer.ending}"): quantity
+        brought[name]: quantity
         for name, quantity in quantities.items()
-        if name.endswith(f"_{layer.ending}") and name not in automaton.parameters
+        if name in brought and name not in automaton.parameters
     }
     return Named(verdict_id(layer, automaton), place_path(layer), own)
 

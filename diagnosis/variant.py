@@ -16,7 +16,7 @@ from diagnosis.uncertain import si_unit
 from diagnosis.verdict import Quantity
 from diagnosis.wording import rounded
 from language.declaration import Parameter
-from language.effect import Effect
+from language.effect import Effect, own_names
 from language.model import Automaton
 from language.project import read_document
 
@@ -107,14 +107,14 @@ def _effects(dossier: Dossier, selection: Selection, fitted: Mapping[str, Quanti
 def _effect(
     tried: Tried, whole: Automaton, selection: Selection, fitted: Mapping[str, Quantity]
 ) -> list[str]:
-    layer = tried.layer
+    layer, brought = tried.layer, own_names(tried.layer.effect.body)
     lines = [f"  {layer.id}:  # {layer.effect.about}"]
     each = [selection.model.values(k) for k in range(len(selection.model.point.own))]
     values = []
     for final, quantity in fitted.items():
         own = final.removesuffix(f"_{layer.ending}")
         parameter = whole.parameters.get(final)
-        if own == final or layer.named(own) != final or parameter is None:
+        if own not in brought or layer.named(own) != final or parameter is None:
             continue
         text = value_text(quantity.value, parameter)
         note = f"sd {rounded(quantity.std)}"

@@ -19,7 +19,7 @@ FindEffect = Callable[[str, Span], Document]
 
 TEXT_KEYS = ("signature", "confused_with", "separated_by", "references")
 ADDED = ("parameters", "states", "equations", "flow", "terms", "discrete", "elements", "regions")
-EFFECT_KEYS = ("language", "effect", "at", *ADDED, "redirect", "move", *TEXT_KEYS)
+EFFECT_KEYS = ("language", "effect", "at", "reads", *ADDED, "redirect", "move", *TEXT_KEYS)
 FIT_KEYS = {
     "balance": ("of", "unit", "has"),
     "input": ("unit", "has"),
@@ -128,6 +128,20 @@ def own_names(body: Table) -> dict[str, Span]:
     return found
 
 
+def foreign_names(body: Table) -> list[str]:
+    """Return the names that expressions of an effect read, neither holes nor its own."""
+    own, found = own_names(body), dict[str, None]()
+
+    def look(path: Path, scalar: Scalar) -> Scalar:
+        for name in _names_of(path, scalar, Problems()):
+            if not (name.path.startswith("$") or name.path in own or name.path == "base"):
+                found.setdefault(name.path)
+        return scalar
+
+    changed(body, EFFECT, look)
+    return list(found)
+
+
 def _region_equations(node: Node | None) -> Iterator[Entry]:
     for owner in _entries(node):
         if isinstance(owner.node, Table):
@@ -211,14 +225,20 @@ class _EffectReader(Reader):
         self.table(tree.get("move"), "move")
 
     def _names(self, tree: Table, fits: tuple[Fit, ...]) -> None:
-        """Expressions read what the effect brings and holes; nothing else of the model."""
+        """Expressions read what the effect brings, holes, and what it `reads` of a model."""
         own = own_names(tree)
+        reads = {item.text: item for item in self.items(tree.get("reads"), "reads")}
+        for name, item in reads.items():
+            check_name(name, item.span, self.problems)
+            if name in own:
+                label = f"`{name}` is the effect's own: it is not read of the model"
+                self.problems.error("effect", item.span, label)
         known = {f"${hole}" for fit in fits for hole in (*HOLES[fit.kind], *fit.has)}
 
         def check(path: Path, scalar: Scalar) -> Scalar:
             if path[:2] == ("redirect", "except"):
                 return scalar
-            allowed = {*known, *own}
+            allowed = {*known, *own, *reads}
             if path[0] == "equations" and path[1].startswith("$"):
                 allowed.add("base")
             for name in _names_of(path, scalar, self.problems):
@@ -236,6 +256,8 @@ class _EffectReader(Reader):
         else:
             label = f"`{name.path}` is neither a hole nor a name of this effect"
             hint = nearest(name.path, allowed)
+            if not hint and name.path != "base":
+                hint = f"or `reads: [{name.path}]` says that it is one of the model"
         self.problems.error("effect", name.span, label, hint)
 
 
