@@ -52,7 +52,7 @@ def drawings_of(dossier: Dossier, shown: Sequence[Shown]) -> list[Drawing]:
     if any(locus.gain > 0.0 for locus in dossier.verdict.location):
         found.append(_places(dossier))
     found += _shuffle(dossier, shown[0])
-    if dossier.diagnosis.plan is not None:
+    if dossier.diagnosis.plan is not None and dossier.diagnosis.plan.tells:
         signals = list(zip(shown[0].window.signals, shown[0].window.units, strict=True))
         caption = f"{dossier.diagnosis.plan.sentence()}; what each would show of it"
         picture = plan_picture(dossier.diagnosis.plan, inputs, signals)

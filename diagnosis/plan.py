@@ -48,12 +48,17 @@ class Plan:
     names: tuple[str, ...]
     options: tuple[Option, ...]
 
+    @property
+    def tells(self) -> bool:
+        """Whether the best manoeuvre would tell the candidates apart."""
+        return bool(self.options) and self.options[0].nats >= ENOUGH
+
     def sentence(self) -> str:
         """Return what to record, in one sentence."""
         names = " from ".join((self.names[0], " and ".join(self.names[1:])))
-        best = self.options[0] if self.options else None
-        if best is None or best.nats < ENOUGH:
+        if not self.tells:
             return f"no manoeuvre that was tried would tell {names}"
+        best = self.options[0]
         return (
             f"to tell {names}, record: {best.manoeuvre.name} "
             f"({best.nats:.0f} nats expected, {ENOUGH:.0f} are enough)"

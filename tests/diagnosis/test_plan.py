@@ -39,9 +39,11 @@ def test_a_model_is_not_told_from_itself_but_from_one_without_friction(bench: Be
     same = planned(hidden, [("a", friction), ("b", friction)])
     assert same is not None
     assert same.options[0].nats < 1.0
+    assert not same.tells
     assert same.sentence() == "no manoeuvre that was tried would tell a from b"
     plan = planned(hidden, [("friction", friction), ("none", base)])
     assert plan is not None
+    assert plan.tells
     nats = [option.nats for option in plan.options]
     assert nats == sorted(nats, reverse=True)
     assert nats[0] > max(ENOUGH, 3.0 * nats[-1])
