@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 
 from diagnosis.candidate import Candidate, candidate
+from diagnosis.estimation import Estimate
 from diagnosis.layers import Layer, drift, fitting
 from diagnosis.series import Series
+from diagnosis.shelf import NOWHERE, Shelf
 from language.document import Document, Table
 from language.effect import Effect
 from language.model import Automaton
@@ -17,6 +19,7 @@ from language.problem import SpecError
 from language.project import Project
 from language.units import parse_unit
 
+Fit = Callable[[], Estimate]
 FORCES = (parse_unit("N*m").dimension.powers, parse_unit("N").dimension.powers)
 """What a balance of forces or torques is in: drifts act there, a sensor's filter is none."""
 NOT_CANDIDATES = ("unknown_input", "sensor_quantisation")
@@ -34,7 +37,14 @@ class Bench:
     series: tuple[Series, ...]
     seen: tuple[str, ...]
     drifts: tuple[Layer, ...]
+    shelf: Shelf = NOWHERE
     _made: dict[tuple[str, ...], Candidate] = field(default_factory=dict, repr=False)
+
+    def kept(
+        self, words: str, candidate: Candidate, given: Sequence[object], make: Fit
+    ) -> Estimate:
+        """Return a fit to the recordings, as it was kept or made now; it follows from `given`."""
+        return self.shelf.kept(words, candidate, self.series, given, make)
 
     @property
     def period(self) -> Fraction:

@@ -28,6 +28,7 @@ from diagnosis.replicate import replicate
 from diagnosis.search import Tell, Tried, searched
 from diagnosis.selection import counted, looked_again
 from diagnosis.series import Series, paced
+from diagnosis.shelf import NOWHERE
 from diagnosis.threshold import Thresholds, group_of
 
 REPLICATES = 16
@@ -112,7 +113,7 @@ def gains_in(
     that, the base is looked at again as it is for recordings.
     """
     series = paced(made, bench.automaton, bench.seen, bench.series[0].is_linear)
-    own = dataclasses.replace(bench, series=series)
+    own = dataclasses.replace(bench, series=series, shelf=NOWHERE)
     noises = dataclasses.replace(noises_of(series, base.noises.drifts), limits=base.noises.limits)
     model = settled(base.candidate, series, noises, base.point, units, turns=1)
     tried = searched(own, model, units, own.layers(), worth=FLOOR)

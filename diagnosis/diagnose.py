@@ -31,9 +31,11 @@ from diagnosis.locus import Locus
 from diagnosis.naming import named, place_path, quantities_of, verdict_id
 from diagnosis.place_sentence import place_sentence
 from diagnosis.plan import Plan, planned
+from diagnosis.recipe import node_text
 from diagnosis.search import Tell, Tried
 from diagnosis.selection import Selection, selected
 from diagnosis.series import Series, compared, paced, pieces_of
+from diagnosis.shelf import Shelf, hash_of
 from diagnosis.shuffle import Shuffle, shuffle_of
 from diagnosis.simulation import misfits
 from diagnosis.threshold import EVERYWHERE, USUAL, Thresholds
@@ -61,7 +63,8 @@ Bootstrap = Literal["never", "kept", "made"]
 class Case:
     """What is diagnosed: an expanded automaton, a map, and recordings.
 
-    `names` are those of files whose bare name is not theirs alone.
+    `names` are those of files whose bare name is not theirs alone; in the folder `stages` it is
+    kept what was found, so that a diagnosis that was ended goes on from there.
     """
 
     document: Document
@@ -73,6 +76,7 @@ class Case:
     thresholds: Thresholds = EVERYWHERE
     bootstrap: Bootstrap = "never"
     names: Mapping[Path, str] = field(default_factory=dict)
+    stages: Path | None = None
 
     def name_of(self, path: Path) -> str:
         """Return what a recording is called."""
@@ -208,7 +212,11 @@ def case_bench(
     """Return the bench of a case for some recordings as they were read."""
     effects = case.effects if case.effects is not None else shipped_effects()
     drifts = balance_drifts(case.document, automaton)
-    return Bench(case.document, case.project, automaton, effects, tuple(series), seen, drifts)
+    bodies = [f"{one.name} {node_text(one.body)}" for one in effects]
+    shelf = Shelf(case.stages, hash_of(node_text(case.document.root), bodies))
+    return Bench(
+        case.document, case.project, automaton, effects, tuple(series), seen, drifts, shelf
+    )
 
 
 def _thresholds(

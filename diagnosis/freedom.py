@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
+from functools import partial
 
 from diagnosis.bench import Bench
+from diagnosis.candidate import Candidate
 from diagnosis.estimation import Estimate, estimated, looked_at
 from diagnosis.layers import DRIFT, Layer
 from diagnosis.level import FREE_LEVELS, units_of
@@ -32,6 +34,12 @@ def freed(bench: Bench, base: Estimate, layer: Layer | None = None) -> Estimate:
     known = layer is None or any(layer.id == other.id for other in bench.drifts)
     drifts = bench.drifts if known or layer is None else (*bench.drifts, layer)
     candidate = bench.candidate((), drifts)
+    make = partial(_freed, bench, base, candidate, layer)
+    return bench.kept("freed", candidate, [base.values(0), base.noises, layer and layer.id], make)
+
+
+def _freed(bench: Bench, base: Estimate, candidate: Candidate, layer: Layer | None) -> Estimate:
+    """Return a candidate with the drift of a layer free, its parameters fitted."""
     name = layer.named(DRIFT) if layer else None
     units = units_of(candidate, bench.series, base.noises, base.values(0))
     levels = dict.fromkeys(units, SMALL_LEVEL) | ({name: START_LEVEL} if name else {})

@@ -46,7 +46,7 @@ class Recipe:
 
 def recipe_key(*parts: str) -> str:
     """Return the key of what candidates of this code are made from."""
-    digest = hashlib.sha256(_code().encode())
+    digest = hashlib.sha256(code_digest().encode())
     for part in parts:
         digest.update(part.encode() + b"\\0")
     return digest.hexdigest()
@@ -92,7 +92,8 @@ def _folder() -> Path:
 
 
 @cache
-def _code() -> str:
+def code_digest() -> str:
+    """Return the hash of the code that candidates and fits follow from."""
     digest = hashlib.sha256()
     for package in (language, codegen, diagnosis):
         for path in sorted(_sources(Path(str(package.__file__)).parent)):

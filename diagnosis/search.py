@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -56,7 +57,9 @@ def searched(
     for layer in layers:
         candidate = _possible(bench, base, layer)
         if candidate is not None:
-            start = screened(bench, candidate, base)
+            make = partial(screened, bench, candidate, base)
+            known = [base.candidate, base.point, base.noises, base.columns]
+            start = bench.kept("screened", candidate, known, make)
             promised.append((base.cost - start.cost, layer, start))
     promised.sort(key=lambda one: -one[0])
     found = []
@@ -64,15 +67,15 @@ def searched(
         if place >= FULL_FITS or gain < worth:
             found.append(Tried(layer, gain))
             continue
-        estimate = fitted(
-            start.candidate, bench.series, base.noises, start.point, units, start.cost - WORTH
-        )
+        given = (base.noises, start.point, units, start.cost - WORTH)
+        make = partial(fitted, start.candidate, bench.series, *given)
+        estimate = bench.kept("fitted", start.candidate, given, make)
         if not np.isfinite(estimate.cost):
             found.append(Tried(layer, gain))
             continue
-        known = evidence(estimate, base, bench.series)
-        tell(f"{layer.id}: train {known.train:.0f}, left out {known.left_out:.0f} nats")
-        found.append(Tried(layer, gain, estimate, known))
+        gains = evidence(estimate, base, bench.series)
+        tell(f"{layer.id}: train {gains.train:.0f}, left out {gains.left_out:.0f} nats")
+        found.append(Tried(layer, gain, estimate, gains))
     return sorted(found, key=lambda one: -one.score)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -151,7 +152,9 @@ def _better_base(
     if best is None or best.estimate is None:
         return None
     start = best.estimate.values(0)
-    again = settled(model.candidate, bench.series, best.estimate.noises, start, units, turns=2)
+    given = (best.estimate.noises, start, units, 2)
+    make = partial(settled, model.candidate, bench.series, *given)
+    again = bench.kept("settled", model.candidate, given, make)
     return again if again.cost < model.cost - BETTER else None
 
 
@@ -200,7 +203,9 @@ def _still_needed(
         candidate = bench.possible(rest)
         if candidate is None:
             continue
-        without = settled(candidate, bench.series, base.noises, model.values(0), units, turns=1)
+        given = (base.noises, model.values(0), units, 1)
+        make = partial(settled, candidate, bench.series, *given)
+        without = bench.kept("settled", candidate, given, make)
         if evidence(model, without, bench.series).least <= thresholds.of(tried.layer):
             tell(f"{tried.layer.id} is needless beside the others")
             kept.remove(tried)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
+from functools import partial
 
 from diagnosis.bench import Bench
 from diagnosis.estimation import Estimate
@@ -33,11 +34,16 @@ def ways_of(bench: Bench, tell: Tell = lambda text: None) -> list[Way]:
         way = dataclasses.replace(bench, series=own)
         candidate = way.candidate(())
         units = units_of(candidate, own, noises_of(own, {}), {})
-        firsts.append((way, first_fit(candidate, own, units), units))
+        make = partial(first_fit, candidate, own, units)
+        firsts.append((way, way.kept("first fit", candidate, [units], make), units))
     straight, held = firsts
     if straight[1].likelihood <= held[1].likelihood:
         firsts = [straight]
-    found = [(way, recalibrated(first, way.series, units)) for way, first, units in firsts]
+    found = []
+    for way, first, units in firsts:
+        make = partial(recalibrated, first, way.series, units)
+        given = [first.point, first.noises, units]
+        found.append((way, way.kept("recalibrated", first.candidate, given, make)))
     for way, base in found:
         text = "straight between samples" if way.series[0].is_linear else "held"
         tell(f"recalibrated, inputs {text}: {base.cost:.0f} nats")

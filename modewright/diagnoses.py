@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import os
+import shutil
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -29,6 +30,8 @@ from modewright.recordings import CheckedRecordings, check_recordings
 
 Tell = Callable[[str], None]
 KEPT = "kept"
+STAGES = "stages"
+"""Where a folder of results keeps what a diagnosis that was ended goes on from."""
 BOOTSTRAPS: Mapping[str, Bootstrap] = {KEPT: "kept", "bootstrap": "made", "usual": "never"}
 """Words for thresholds; anything else is a file."""
 
@@ -65,7 +68,8 @@ def diagnose(
     tell = _within(budget, begun, tell)
     checked = check_recordings(train, map, spec, root=root)
     case, automaton = _case(spec, train, held_out, checked, effects, root)
-    case = dataclasses.replace(case, thresholds=limits, bootstrap=bootstrap)
+    stages = Path(out) / STAGES if out is not None else None
+    case = dataclasses.replace(case, thresholds=limits, bootstrap=bootstrap, stages=stages)
     tell(f"looked at {len(case.train)} recordings: {len(checked.check.findings)} findings")
     kept = case.train if anyway else usable(checked.check, case)
     left_out = tuple(case.name_of(file) for file in case.train if file not in kept)
@@ -106,6 +110,7 @@ def save_diagnosis(dossier: Dossier, out: str | Path, spec: str) -> list[Path]:
     for name, data in report_files(dossier, variant, Path(shown(folder))).items():
         files[folder / name] = data
     write_files(files)
+    shutil.rmtree(folder / STAGES, ignore_errors=True)
     return list(files)
 
 

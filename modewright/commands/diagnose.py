@@ -69,7 +69,7 @@ def diagnose(
     from diagnosis.dossier import verdict_json
     from diagnosis.variant import needed
     from modewright import show, show_diagnosis
-    from modewright.diagnoses import BudgetSpent, diagnose as diagnosed, save_diagnosis
+    from modewright.diagnoses import BudgetSpent, diagnose as diagnosed
 
     verdicts = ("effect", "nothing_missing", "unknown", "ambiguous")
     if fail_on is not None and fail_on not in verdicts:
@@ -80,19 +80,18 @@ def diagnose(
         with usage_errors():
             found = diagnosed(
                 spec, train, held_out or (), mapping, effects,
-                thresholds=thresholds, budget=seconds, anyway=anyway, tell=tell,
+                thresholds=thresholds, out=out, budget=seconds, anyway=anyway, tell=tell,
             )  # fmt: skip
     except BudgetSpent as error:
         print(f"error: no verdict within --budget: {error}", file=sys.stderr)
         raise typer.Exit(PROBLEMS) from None
-    files = save_diagnosis(found, out, spec)
     for text in needed(found):
         print(f"note: {text}", file=sys.stderr)
     if as_json:
         show.print_json(verdict_json(found.verdict))
     else:
         show_diagnosis.print_dossier(console(), found)
-        announce([file for file in files if file.name == "report.html"])
+        announce([out / "report.html"])
     if found.verdict.verdict == fail_on:
         raise typer.Exit(PROBLEMS)
 

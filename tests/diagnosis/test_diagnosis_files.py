@@ -26,6 +26,7 @@ import modewright as mw
 from diagnosis.dossier import usable, verdict_json
 from diagnosis.finding import Finding
 from diagnosis.report import report_files
+from diagnosis.shelf import Shelf, hash_of
 from diagnosis.variant import needed
 from diagnosis.wording import headline, separation
 from modewright.cli import app
@@ -84,13 +85,14 @@ def run(folder: Path, *arguments: str) -> int:
 
 
 def _killed(folder: Path) -> None:
-    """Kill a run when it has recalibrated the base: it leaves no file."""
+    """Kill a run when it has recalibrated the base: it leaves what it goes on from, no more."""
     words = [sys.executable, "-m", "modewright", *COMMAND, "--out", "found"]
     with subprocess.Popen(words, cwd=folder, stderr=subprocess.PIPE, text=True) as process:
         assert process.stderr
         next(line for line in process.stderr if line.startswith("recalibrated"))
         process.send_signal(signal.SIGKILL)
-    assert not list((folder / "found").glob("*"))
+    assert [file.name for file in (folder / "found").glob("*")] == ["stages"]
+    assert list((folder / "found" / "stages").glob("*.npz"))
 
 
 @pytest.fixture(scope="module")
@@ -292,6 +294,30 @@ def test_killed_and_run_again_it_says_the_same(found: Found, dossier: mw.Dossier
     """The fixture's first run was killed."""
     again = verdict_json(dossier.verdict)
     assert {**again, "runtime_s": 0} == {**found.verdict, "runtime_s": 0}
+
+
+def test_a_fit_that_was_kept_has_the_bits_of_the_one_that_was_made(
+    dossier: mw.Dossier, tmp_path: Path
+) -> None:
+    assert dossier.diagnosis
+    series, model = dossier.diagnosis.bench.series, dossier.diagnosis.selection.model
+    shelf = Shelf(tmp_path, "key")
+
+    def kept(given: float, make: Callable[[], Any]) -> Any:
+        return shelf.kept("fit", model.candidate, series, [given], make)
+
+    def unwanted() -> None:
+        raise AssertionError
+
+    assert kept(1.0, lambda: model) is model
+    again = kept(1.0, unwanted)
+    assert again is not model
+    assert hash_of(again) == hash_of(model)
+    with pytest.raises(AssertionError):
+        kept(1.5, unwanted)
+    (file,) = tmp_path.glob("*")
+    file.write_bytes(file.read_bytes()[:-100])
+    assert kept(1.0, lambda: model) is model
 
 
 def test_what_cannot_be_told_apart_is_told_with_what_would_separate_it(dossier: mw.Dossier) -> None:
