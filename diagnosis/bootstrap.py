@@ -37,7 +37,7 @@ LEVEL = 0.975
 """The part of recordings without a missing effect in which none is to be accepted."""
 MIDDLE = 0.5
 """The part of the replicates below the tail, which is taken for an exponential one."""
-FLOOR = 25.0
+FLOOR = 40.0
 """The least threshold [nats]: a real machine is never quite the model that is fitted to it."""
 CEILING = 135.0
 """The most: in replicates that ask for more the observer has lost its way in the base itself."""
