@@ -61,6 +61,7 @@ verify: setup ## measure every acceptance figure; with recordings: ARGS="--recor
 	$(BIN)/python tests/verify/variants.py
 	$(BIN)/python tests/verify/tip_out.py
 	$(BIN)/python tests/verify/kept_stages.py
+	$(BIN)/python tests/verify/machines.py $(ARGS)
 
 verify-part: setup ## measure a fixed part of the figures, as CI does
 	$(BIN)/python tests/verify/first_drive.py
