@@ -31,7 +31,7 @@ from diagnosis.series import Series, paced
 from diagnosis.shelf import NOWHERE
 from diagnosis.threshold import Thresholds, group_of
 
-REPLICATES = 16
+REPLICATES = 14
 """Simulated sets of recordings; each costs a recalibration and a search."""
 LEVEL = 0.975
 """The part of recordings without a missing effect in which none is to be accepted."""
@@ -39,8 +39,8 @@ MIDDLE = 0.5
 """The part of the replicates below the tail, which is taken for an exponential one."""
 FLOOR = 40.0
 """The least threshold [nats]: a real machine is never quite the model that is fitted to it."""
-CEILING = 135.0
-"""The most: in replicates that ask for more the observer has lost its way in the base itself."""
+CEILING = 300.0
+"""The most: where replicates ask for more the observer has lost its way in the base itself."""
 OFTEN = 0.9
 LEAST_SCALE = 2.0
 """The least that an effect gains so often [nats]; what is below it is not told from nothing."""
