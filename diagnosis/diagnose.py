@@ -38,6 +38,7 @@ from diagnosis.series import Series, compared, paced, pieces_of
 from diagnosis.shelf import Shelf, hash_of
 from diagnosis.shuffle import Shuffle, shuffle_of
 from diagnosis.simulation import misfits
+from diagnosis.starting import settled_at_start, started
 from diagnosis.threshold import EVERYWHERE, USUAL, Thresholds
 from diagnosis.verdict import Misfit, Named, Ranked, Says, Verdict
 from diagnosis.ways import Way, better_way, chosen, ways_of
@@ -135,6 +136,7 @@ def diagnose(case: Case, tell: Tell = lambda text: None) -> Diagnosis:
             "held out: "
             + ", ".join(f"{case.name_of(path)} {_digest(path)}" for path in case.held_out)
         )
+        held = started(selection.base, [settled_at_start(one) for one in held])
         verdict = _confirmed(verdict, selection, held)
     verdict = dataclasses.replace(verdict, runtime_s=time.monotonic() - begun)
     shuffles = _shuffles(selection, bench)

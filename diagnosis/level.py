@@ -28,6 +28,9 @@ FREE_LEVELS = (*LEVELS, 10.0, 30.0, 100.0)
 """Those for locating."""
 FAR = 4.0
 """Standard deviations beyond which an innovation counts as that far."""
+SCALE = 1.5
+"""Factor by which the noise of inputs or of a signal is changed at a time."""
+MOST_SCALES = 5
 ENOUGH = 2.0
 """Another level is taken where it gains this much [nats]."""
 
@@ -57,7 +60,8 @@ def levelled(
 ) -> Estimate:
     """Return an estimate with the drifts that the recordings ask for, its parameters held.
 
-    Only drifts that have a unit are moved.
+    Only drifts that have a unit are moved. What is known of the noise of inputs and signals is
+    known to a factor only: with a gain that is not the best, anything would seem to gain.
     """
     for name in units:
         here = _place(now.noises.drifts.get(name, 0.0), units[name], levels)
@@ -69,7 +73,29 @@ def levelled(
                 if not tried.cost < now.cost - ENOUGH:
                     break
                 now, here = tried, here + direction
+    return _tuned(now, series)
+
+
+def _tuned(now: Estimate, series: Sequence[Series]) -> Estimate:
+    """Return an estimate with the noise of its inputs, then of each signal, scaled."""
+    for place in range(-1, len(now.noises.seen)):
+        for factor in (SCALE, 1.0 / SCALE):
+            for _ in range(MOST_SCALES):
+                noises = _scaled(now.noises, place, factor)
+                tried = looked_at(now.candidate, series, noises, now.point, now.outcome)
+                if not tried.cost < now.cost - ENOUGH:
+                    break
+                now = tried
     return now
+
+
+def _scaled(noises: Noises, place: int, factor: float) -> Noises:
+    """Return noises with that of the inputs (-1) or of a signal by its place scaled."""
+    if place < 0:
+        return dataclasses.replace(noises, inputs=factor * noises.inputs)
+    seen = noises.seen.copy()
+    seen[place] *= factor
+    return dataclasses.replace(noises, seen=seen)
 
 
 def settled(

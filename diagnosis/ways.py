@@ -17,6 +17,7 @@ from diagnosis.prediction import noises_of
 from diagnosis.search import Tell
 from diagnosis.selection import Selection, selected
 from diagnosis.series import paced
+from diagnosis.starting import settled_at_start, started
 from diagnosis.threshold import Thresholds
 
 Way = tuple[Bench, Estimate]
@@ -30,12 +31,15 @@ def ways_of(bench: Bench, tell: Tell = lambda text: None) -> list[Way]:
     """
     firsts = []
     for is_linear in (True, False):
-        own = paced(bench.series, bench.automaton, bench.seen, is_linear)
+        paced_ones = paced(bench.series, bench.automaton, bench.seen, is_linear)
+        own = tuple(settled_at_start(one) for one in paced_ones)
         way = dataclasses.replace(bench, series=own)
         candidate = way.candidate(())
         units = units_of(candidate, own, noises_of(own, {}), {})
         make = partial(first_fit, candidate, own, units)
-        firsts.append((way, way.kept("first fit", candidate, [units], make), units))
+        first = way.kept("first fit", candidate, [units], make)
+        way = dataclasses.replace(way, series=started(first, own))
+        firsts.append((way, first, units))
     straight, held = firsts
     if straight[1].likelihood <= held[1].likelihood:
         firsts = [straight]
