@@ -99,22 +99,31 @@ class Predictor:
         return to, seen
 
     def gains(
-        self, phi: Reals, c: Reals, q: Reals, r: Reals, start: Reals, first: int
-    ) -> tuple[Reals, Reals] | None:
-        """Return the Kalman gains of the `first` samples (first, states, seen) and the steady one.
+        self,
+        phi: Reals,
+        c: Reals,
+        q: Reals,
+        r: Reals,
+        start: Reals,
+        first: int,
+        most: int = MOST_SAMPLES,
+    ) -> tuple[Reals, Reals, Reals] | None:
+        """Return the Kalman gains of the `first` samples (first, states, seen), the one that stays,
+        and the covariance then.
 
         Of x(k+1) = phi x(k) + w, y = c x + v with covariance `q` of w, variances `r` (seen,) of v,
-        from a covariance `start`. None where they grow beyond all bounds.
+        from a covariance `start`. One that still changes after `most` samples is taken as it is
+        then. None where they grow beyond all bounds.
         """
         shape = (len(self.states), len(self.seen))
         firsts, steady = np.empty((first, *shape)), np.empty(shape)
         covariance = np.ascontiguousarray(start, dtype=np.float64).copy()
         given = [np.ascontiguousarray(a, dtype=np.float64) for a in (phi, c, q, r)]
         done = self._library.modewright_gains(
-            *(_at(a) for a in given), _at(covariance), first, MOST_SAMPLES, CLOSE,
+            *(_at(a) for a in given), _at(covariance), first, most, CLOSE,
             _at(firsts), _at(steady),
         )  # fmt: skip
-        return (firsts, steady) if done >= 0 else None
+        return (firsts, steady, covariance) if done >= 0 else None
 
     def predict(
         self,

@@ -31,7 +31,7 @@ from language.units import parse_unit
 DRIFT = "drift"
 SECONDS = parse_unit("s").dimension.powers
 KINDS = ("balance", "element", "output")
-LONGEST_STEP = Fraction(25, 10000)
+LONGEST_STEP = Fraction(5, 1000)
 """Longest major step [s] of a prediction; events inside it are located."""
 STABLE_PART = Fraction(1, 2)
 """A step is at most this part of the largest stable one: parameters move while they are fitted."""

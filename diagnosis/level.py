@@ -39,8 +39,9 @@ def units_of(
     candidate: Candidate, series: Sequence[Series], noises: Noises, start: Mapping[str, float]
 ) -> dict[str, float]:
     """Return the unit [SI] of each drift of a candidate."""
-    mode, (states, inputs) = next(iter(points_of(candidate, series, None).items()))
-    linear = near(candidate, candidate.page(start, series[0]), mode, states, inputs)
+    mode, seen_there = next(iter(points_of(candidate, series, None).items()))
+    page = candidate.page(start, series[0])
+    linear = near(candidate, page, mode, seen_there.states, seen_there.inputs)
     if linear is None:
         raise ValueError("the base is unstable where the first recording starts")
     count = max(1, round(REACH / float(series[0].period)))

@@ -7,7 +7,7 @@ itself, so a wrong model cannot hide behind the gain of another one.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -167,7 +167,9 @@ def gains_of(
 ) -> Gains:
     """Return the gains of a candidate at `values`, near where `outcome` saw each mode.
 
-    Delays are left out of them: what is shown late would seem to know nothing of the states.
+    Delays are left out of them: what is shown late would seem to know nothing of the states. In
+    another mode than the one that lasts longest the gain is that at the usual length of a stay,
+    which began with what was known before: in a gap it would never be steady.
     """
     prompt = dict.fromkeys(candidate.recipe.delays, 0.0)
     page = candidate.page({**values, **prompt}, series[0])
@@ -177,18 +179,21 @@ def gains_of(
     points = points_of(candidate, series, outcome)
     found: dict[int, Reals] = {}
     first = np.zeros((0, len(candidate.spans), len(noises.seen)))
-    for mode, (states, inputs) in points.items():
-        linear = near(candidate, page, mode, states, inputs)
+    before = np.zeros(0)
+    for mode, point in points.items():
+        linear = near(candidate, page, mode, point.states, point.inputs)
         if linear is None:
             continue
         unsure = np.where(_turns(candidate, linear), 0.0, candidate.spans)
-        start = np.diag((START_PART * unsure) ** 2)
         q = _process_noise(candidate, linear, noises, period, unsure)
-        gains = candidate.predictor.gains(
-            linear.phi, linear.c, q, noises.seen**2, start, 0 if found else count
-        )
+        given = linear.phi, linear.c, q, noises.seen**2
+        if found:
+            gains = candidate.predictor.gains(*given, before, 0, point.stay)
+        else:
+            start = np.diag((START_PART * unsure) ** 2)
+            gains = candidate.predictor.gains(*given, start, count)
         if gains is not None:
-            first = first if found else gains[0]
+            first, before = (first, before) if found else (gains[0], gains[2])
             found[mode] = gains[1]
     nothing = np.zeros((len(candidate.spans), len(noises.seen)))
     usual = next(iter(found.values()), nothing)
@@ -226,40 +231,48 @@ def _process_noise(
     return q
 
 
+@dataclass(frozen=True)
+class Seen:
+    """Where a mode was seen: `states` and `inputs` there, and the usual `stay` in it [samples]."""
+
+    states: Reals
+    inputs: Reals
+    stay: int
+
+
 def points_of(
     candidate: Candidate, series: Sequence[Series], outcome: Outcome | None
-) -> dict[int, tuple[Reals, Reals]]:
-    """Return states and inputs during the longest stay in each mode, the longest stay first.
+) -> dict[int, Seen]:
+    """Return where each mode was seen, in its longest stay; the mode with the longest first.
 
     Where the first compared signal is largest: friction is steep near rest alone.
     """
-    predictor = candidate.predictor
     if outcome is None:
-        page = candidate.page({}, series[0])
-        nothing = np.zeros((len(predictor.states), len(predictor.seen)))
-        none = np.zeros((len(predictor.modes), *nothing.shape))
-        short = series[0].inputs[:2].copy()
-        run = predictor.predict(
-            page,
-            short,
-            series[0].measured[:2].copy(),
-            none[:0],
-            none,
-            candidate.recipe.substeps,
-            False,
-        )
-        return {int(run.modes[0]): (run.states[0].copy(), short[0])}
-    longest: dict[int, tuple[int, Reals, Reals]] = {}
+        return _first_seen(candidate, series[0])
+    stays: dict[int, list[int]] = {}
+    longest: dict[int, Seen] = {}
     for one, prediction in zip(series, outcome.predictions, strict=True):
         modes = prediction.modes[: prediction.done]
-        edges = np.flatnonzero(np.diff(modes)) + 1
-        for low, high in zip([0, *edges], [*edges, len(modes)], strict=True):
-            stay, mode = int(high - low), int(modes[low]) if low < len(modes) else 0
-            if stay >= SHORT_STAY and stay > longest.get(mode, (0,))[0]:
-                k = _away(one.measured, int(low), int(high))
-                longest[mode] = (stay, prediction.states[k].copy(), one.inputs[k].copy())
-    ordered = sorted(longest.items(), key=lambda item: -item[1][0])
-    return {mode: (states, inputs) for mode, (_, states, inputs) in ordered}
+        edges = [0, *(np.flatnonzero(np.diff(modes)) + 1).tolist(), len(modes)]
+        for low, high in pairwise(edges if len(modes) else [0]):
+            mode, stay = int(modes[low]), high - low
+            if stay >= SHORT_STAY and stay > max(stays.get(mode, [0])):
+                k = _away(one.measured, low, high)
+                longest[mode] = Seen(prediction.states[k].copy(), one.inputs[k].copy(), stay)
+            stays.setdefault(mode, []).append(stay)
+    ordered = sorted(longest, key=lambda mode: -longest[mode].stay)
+    usual = {mode: round(float(np.median(stays[mode]))) for mode in ordered}
+    return {mode: replace(longest[mode], stay=max(1, usual[mode])) for mode in ordered}
+
+
+def _first_seen(candidate: Candidate, series: Series) -> dict[int, Seen]:
+    """Return where a recording starts."""
+    predictor = candidate.predictor
+    page = candidate.page({}, series)
+    none = np.zeros((len(predictor.modes), len(predictor.states), len(predictor.seen)))
+    short, measured = series.inputs[:2].copy(), series.measured[:2].copy()
+    run = predictor.predict(page, short, measured, none[:0], none, candidate.recipe.substeps, False)
+    return {int(run.modes[0]): Seen(run.states[0].copy(), short[0], 1)}
 
 
 def _away(measured: Reals, low: int, high: int) -> int:

@@ -46,7 +46,7 @@ def test_the_first_gains_become_the_steady_one(predictor: Predictor) -> None:
     phi, c, q, r = system(len(predictor.states))
     found = predictor.gains(phi, c, q, r, 100.0 * np.eye(len(phi)), 400)
     assert found is not None
-    first, steady = found
+    first, steady, _ = found
     assert first.shape == (400, len(phi), SEEN)
     assert np.allclose(first[-1], steady, rtol=1e-5, atol=1e-7)
     assert np.linalg.norm(first[0]) > np.linalg.norm(steady)
