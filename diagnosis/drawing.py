@@ -96,8 +96,8 @@ def _shuffle(dossier: Dossier, shown: Shown) -> list[Drawing]:
         return []
     found = dossier.diagnosis.shuffles
     units = dict(zip(shown.window.signals, shown.window.units, strict=True))
-    caption = f"{text[0].upper()}{text[1:]}."
-    return [Drawing("shuffle", caption, text, shuffle_picture(found, units[found[0].signal]))]
+    caption = f"How the frequency goes with the amplitude: {text}."
+    return [Drawing("shuffle", caption, caption, shuffle_picture(found, units[found[0].signal]))]
 
 
 def _places(dossier: Dossier) -> Drawing:

@@ -143,7 +143,7 @@ def reason(tried: Tried, place: int, selection: Selection, thresholds: Threshold
     known = tried.evidence
     if known is None:
         if tried.promised < WORTH:
-            return f"not fitted: promises {max(tried.promised, 0.0):.0f} nats at most"
+            return f"not fitted: promises less than {WORTH:g} nats"
         return f"not fitted: {FULL_FITS} others promise more"
     threshold = thresholds.of(tried.layer)
     if known.train <= threshold:
@@ -161,10 +161,16 @@ def title(layer: Layer, dossier: Dossier) -> str:
 
 
 def summary(dossier: Dossier) -> list[str]:
-    """Return at most five lines: verdict, place, what else is to be told, improvement, doubt."""
+    """Return at most four lines: verdict, place, what else is to be told, improvement, doubt.
+
+    Where all five are to be told, the second and third are one.
+    """
     is_ambiguous = dossier.verdict.verdict == "ambiguous"
     more = plan(dossier) if is_ambiguous else oscillation(dossier)
-    lines = [headline(dossier), location(dossier), more, improvement(dossier), _doubt(dossier)]
+    place, doubt = location(dossier), _doubt(dossier)
+    if place and more and doubt:
+        place, more = f"{place}; {more}", ""
+    lines = [headline(dossier), place, more, improvement(dossier), doubt]
     return [line for line in lines if line]
 
 

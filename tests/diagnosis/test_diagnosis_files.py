@@ -23,6 +23,7 @@ import numpy as np
 import pytest
 
 import modewright as mw
+from diagnosis import wording
 from diagnosis.dossier import usable, verdict_json
 from diagnosis.finding import Finding
 from diagnosis.report import report_files
@@ -338,6 +339,20 @@ def test_what_cannot_be_told_apart_is_told_with_what_would_separate_it(dossier: 
     assert "These recordings cannot tell apart: coulomb friction" in page
     assert "best, but not told from others" in page
     assert "confirmed on" not in page and "better on held-out recordings" in page
+
+
+def test_however_much_is_to_be_told_it_is_four_lines(
+    dossier: mw.Dossier, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(wording, "oscillation", lambda dossier: "w fits until t = 0.3 s")
+    lines = wording.summary(dossier)
+    assert len(lines) == 4 and lines[2] == "w fits until t = 0.3 s"
+    odd = dataclasses.replace(
+        dossier.check, findings=(Finding("gap", "a", "w", "has gaps", "warning"),)
+    )
+    told = wording.summary(dataclasses.replace(dossier, check=odd))
+    assert len(told) == 4 and told[1].endswith("; w fits until t = 0.3 s")
+    assert "has gaps" in told[3]
 
 
 @pytest.mark.parametrize(
