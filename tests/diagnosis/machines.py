@@ -52,3 +52,16 @@ def leaf(recordings: Path, train: str, other: str) -> Figure:
         "falls_by": 1.0 - shown.rmse_after / shown.rmse_before,
         "confirmed": verdict.confirmed,
     }
+
+
+def damper(recordings: Path, file: str) -> Figure:
+    """The gap of the friction damper in eight seconds of one series."""
+    train = f"{recordings / 'brfd_damper' / file}@2..10"
+    verdict = mw.diagnose("brfd_damper", [train]).verdict
+    shown = verdict.fit["train"]["F"]
+    gaps = [e.parameters["alpha"].value for e in verdict.effects if e.id == "backlash"]
+    return {
+        "effects": [effect.id for effect in verdict.effects],
+        "half_gap": gaps[0] if gaps else None,
+        "nrmse": [shown.nrmse_before, shown.nrmse_after],
+    }

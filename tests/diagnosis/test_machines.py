@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.diagnosis.machines import Figure, emps, leaf
+from tests.diagnosis.machines import Figure, damper, emps, leaf
 
 
 @pytest.mark.recordings
@@ -39,3 +39,20 @@ def test_either_drive_of_the_leaf_shows_the_same_gap(recordings: Path) -> None:
     assert max(gaps) < 1.35 * min(gaps)
     stiffness = [found["k_hs"] for found in drives]
     assert max(stiffness) < 1.2 * min(stiffness)
+
+
+@pytest.mark.recordings
+@pytest.mark.parametrize(
+    ("file", "half_gap", "least"),
+    [
+        ("sine_0.5Hz_36lb_0.5in_1024Hz.csv.gz", 2.7e-3, 0.087),
+        ("sine_0.5Hz_80lb_1in_1024Hz.csv.gz", 1.9e-3, 0.125),
+    ],
+)
+def test_the_gap_of_the_damper_is_named_in_both_series(
+    recordings: Path, file: str, half_gap: float, least: float
+) -> None:
+    found = damper(recordings, file)
+    assert found["effects"] == ["backlash"]
+    assert found["half_gap"] == pytest.approx(half_gap, rel=0.25)
+    assert found["nrmse"][1] < least
