@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+import modewright as mw
 from tests.diagnosis.machines import Figure, damper, emps, leaf
 
 
@@ -56,3 +57,11 @@ def test_the_gap_of_the_damper_is_named_in_both_series(
     assert found["effects"] == ["backlash"]
     assert found["half_gap"] == pytest.approx(half_gap, rel=0.25)
     assert found["nrmse"][1] < least
+
+
+@pytest.mark.recordings
+def test_the_i3_is_said_to_have_driven_on_a_road_with_grades(recordings: Path) -> None:
+    verdict = mw.diagnose("bmw_i3", [recordings / "bmw_i3" / "trip_a11.csv.gz"]).verdict
+    assert [f"{e.id}@{e.place}" for e in verdict.effects] == ["road_grade@flow.v"]
+    shown = verdict.fit["train"]["v"]
+    assert shown.nrmse_after < 0.6 * shown.nrmse_before
