@@ -9,7 +9,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
@@ -49,6 +49,7 @@ from language.effect import Effect
 from language.experiment import RecordingMap
 from language.load import automaton_of
 from language.model import Automaton
+from language.problem import SpecError
 from language.project import Project
 
 CLEAR = 3.0
@@ -65,7 +66,8 @@ class Case:
     """What is diagnosed: an expanded automaton, a map, and recordings.
 
     `names` are those of files whose bare name is not theirs alone; in the folder `stages` it is
-    kept what was found, so that a diagnosis that was ended goes on from there.
+    kept what was found, so that a diagnosis that was ended goes on from there. `before` is called
+    before each fit: it may raise what ends the diagnosis.
     """
 
     document: Document
@@ -78,6 +80,7 @@ class Case:
     bootstrap: Bootstrap = "never"
     names: Mapping[Path, str] = field(default_factory=dict)
     stages: Path | None = None
+    before: Callable[[], None] = lambda: None
 
     def name_of(self, path: Path) -> str:
         """Return what a recording is called."""
@@ -101,6 +104,7 @@ class Diagnosis:
     thresholds: Thresholds = EVERYWHERE
     plan: Plan | None = field(default=None, repr=False)
     shuffles: tuple[Shuffle, ...] = field(default=(), repr=False)
+    unread: tuple[str, ...] = ()
 
 
 def diagnose(case: Case, tell: Tell = lambda text: None) -> Diagnosis:
@@ -125,12 +129,7 @@ def diagnose(case: Case, tell: Tell = lambda text: None) -> Diagnosis:
     verdict = _verdict(judged.says, selection, loci, automaton, fit)
     hashes = {case.name_of(path): _digest(path) for path in case.train}
     verdict = dataclasses.replace(verdict, inputs=hashes, messages=(place_sentence(loci, bench),))
-    is_linear = bench.series[0].is_linear
-    held = tuple(
-        one
-        for path in case.held_out
-        for one in paced(read_series(path, case, automaton, seen), automaton, seen, is_linear)
-    )
+    held, unread = _held_out(case, automaton, seen, bench.series[0].is_linear)
     if held:
         tell(
             "held out: "
@@ -141,7 +140,7 @@ def diagnose(case: Case, tell: Tell = lambda text: None) -> Diagnosis:
     verdict = dataclasses.replace(verdict, runtime_s=time.monotonic() - begun)
     shuffles = _shuffles(selection, bench)
     known = judged.description, judged.thresholds, plan, shuffles
-    return Diagnosis(verdict, selection, bench, held, *known)
+    return Diagnosis(verdict, selection, bench, held, *known, unread=unread)
 
 
 @dataclass(frozen=True)
@@ -191,6 +190,21 @@ def _judged_alone(case: Case, raw: Bench, ways: Sequence[Way], tell: Tell) -> _J
     return _Judged(bench, found.base, selection, loci, says, thresholds)
 
 
+def _held_out(
+    case: Case, automaton: Automaton, seen: Sequence[str], is_linear: bool
+) -> tuple[tuple[Series, ...], tuple[str, ...]]:
+    """Open what is held out; what cannot be read is told, for the verdict stands without it."""
+    held: list[Series] = []
+    unread = []
+    for path in case.held_out:
+        try:
+            held += paced(read_series(path, case, automaton, seen), automaton, seen, is_linear)
+        except (SpecError, ValueError) as error:
+            why = error.problems[0].label if isinstance(error, SpecError) else str(error)
+            unread.append(f"{case.name_of(path)} was held out and cannot be used: {why}")
+    return tuple(held), tuple(unread)
+
+
 def read_series(
     path: Path, case: Case, automaton: Automaton, seen: Sequence[str]
 ) -> tuple[Series, ...]:
@@ -215,7 +229,7 @@ def case_bench(
     effects = case.effects if case.effects is not None else shipped_effects()
     drifts = balance_drifts(case.document, automaton)
     bodies = [f"{one.name} {node_text(one.body)}" for one in effects]
-    shelf = Shelf(case.stages, hash_of(node_text(case.document.root), bodies))
+    shelf = Shelf(case.stages, hash_of(node_text(case.document.root), bodies), case.before)
     return Bench(
         case.document, case.project, automaton, effects, tuple(series), seen, drifts, shelf
     )

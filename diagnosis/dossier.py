@@ -21,7 +21,8 @@ from language.model import Automaton
 class Dossier:
     """A verdict on `case`, with the check of its recordings.
 
-    `diagnosis` is None where the recordings are not usable: then nothing was concluded from them.
+    `diagnosis` is None where nothing was concluded: the recordings are not usable, or the
+    diagnosis was ended before it came to a verdict, as `ended` says.
     `left_out` are recordings that were not used for what was found of them.
     `held_out` are hashes of the files that were opened after the verdict.
     """
@@ -33,6 +34,7 @@ class Dossier:
     diagnosis: Diagnosis | None = field(default=None, repr=False)
     held_out: Mapping[str, str] = field(default_factory=dict)
     left_out: tuple[str, ...] = ()
+    ended: str = ""
 
     @property
     def name(self) -> str:
@@ -78,9 +80,13 @@ def errors_of(check: RecordingCheck) -> list[Finding]:
     return [finding for finding in check.findings if finding.severity == "error"]
 
 
-def undecided(check: RecordingCheck, train: Mapping[str, str], runtime_s: float) -> Verdict:
-    """Return the verdict on recordings that no conclusion can be drawn from."""
-    messages = ("the recordings are not usable", *(text for _, text in told(errors_of(check))))
+def unusable(check: RecordingCheck) -> tuple[str, ...]:
+    """Return why no conclusion can be drawn from recordings."""
+    return ("the recordings are not usable", *(text for _, text in told(errors_of(check))))
+
+
+def undecided(messages: tuple[str, ...], train: Mapping[str, str], runtime_s: float) -> Verdict:
+    """Return the verdict where nothing was concluded, for the reasons in its messages."""
     return Verdict(
         "unknown", (), (), 1.0, (), (), {"train": {}}, {}, None, runtime_s, messages, train
     )

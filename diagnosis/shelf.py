@@ -32,10 +32,14 @@ NORMAL = tuple(field.name for field in dataclasses.fields(Normal))
 
 @dataclasses.dataclass(frozen=True)
 class Shelf:
-    """Where fits are kept; nowhere without a folder. `key` is the hash of the model."""
+    """Where fits are kept; nowhere without a folder. `key` is the hash of the model.
+
+    `before` is called before a fit is made: it may raise what ends the diagnosis.
+    """
 
     folder: Path | None = None
     key: str = ""
+    before: Callable[[], None] = lambda: None
 
     def kept(
         self,
@@ -47,11 +51,13 @@ class Shelf:
     ) -> Estimate:
         """Return a fit of a candidate that follows from `given`: as it was kept, else made now."""
         if self.folder is None:
+            self.before()
             return make()
         name = hash_of(words, code_digest(), self.key, candidate, tuple(series), *given)
         path = self.folder / f"{name}.npz"
         with suppress(OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
             return _estimate(candidate, series, dict(np.load(io.BytesIO(path.read_bytes()))))
+        self.before()
         found = make()
         with suppress(OSError):  # a full disk is no reason to stop
             data = io.BytesIO()

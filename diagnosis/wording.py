@@ -22,6 +22,8 @@ MOST_NAMED = 4
 def headline(dossier: Dossier) -> str:
     """Return the verdict in one sentence."""
     verdict = dossier.verdict
+    if dossier.ended:
+        return f"Nothing is concluded yet: {dossier.ended}."
     if dossier.diagnosis is None:
         return "Nothing is concluded about the physics: these recordings are not usable."
     if verdict.verdict == "effect":

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from diagnosis.diagnose import Bootstrap, Case, diagnose as diagnosed
-from diagnosis.dossier import Dossier, errors_of, hashes, undecided, usable
+from diagnosis.dossier import Dossier, errors_of, hashes, undecided, unusable, usable
 from diagnosis.file_names import file_names
 from diagnosis.finding import told
 from diagnosis.fit import Fit, fit as fitted
@@ -20,7 +20,7 @@ from diagnosis.library import library
 from diagnosis.threshold import EVERYWHERE, Thresholds, thresholds_in, written
 from diagnosis.variant import needed, variant_text
 from diagnosis.wording import summary
-from engine.recorded_part import overlap
+from engine.recorded_part import file_of, overlap
 from language.effect import Effect
 from language.load import automaton_of
 from language.model import Automaton
@@ -38,6 +38,31 @@ BOOTSTRAPS: Mapping[str, Bootstrap] = {KEPT: "kept", "bootstrap": "made", "usual
 
 class BudgetSpent(Exception):
     """The time that a diagnosis may take has passed before it came to a verdict."""
+
+
+class _Budget:
+    """The time [s] that a diagnosis may take, and what has been told in it."""
+
+    def __init__(self, seconds: float | None, tell: Tell) -> None:
+        self.begun = time.monotonic()
+        self.seconds = seconds
+        self.telling = tell
+        self.told: list[str] = []
+
+    def tell(self, text: str) -> None:
+        """Tell what a stage has found."""
+        self.told.append(text)
+        self.telling(text)
+
+    def check(self) -> None:
+        """Raise BudgetSpent when the time has passed."""
+        if self.seconds is not None and self.spent > self.seconds:
+            raise BudgetSpent(f"the {self.seconds:g} s of its budget are over")
+
+    @property
+    def spent(self) -> float:
+        """The time [s] since the beginning."""
+        return time.monotonic() - self.begun
 
 
 def diagnose(
@@ -58,18 +83,20 @@ def diagnose(
 
     Recordings with faults that make a verdict worthless give the verdict `unknown`, unless it is
     wanted `anyway`. `effects` is a folder of effects in place of those shipped, `budget` a time
-    [s]. `thresholds` are those that a bootstrap has left (`kept`, else the usual one), those of a
-    `bootstrap` made where it has left none, the `usual` one, or a file. Raises SpecError,
-    ValueError, ToolMissing, OutputError, BudgetSpent.
+    [s] after which the verdict is `unknown` if none was found. `thresholds` are those that a
+    bootstrap has left (`kept`, else the usual one), those of a `bootstrap` made where it has left
+    none, the `usual` one, or a file. Raises SpecError, ValueError, ToolMissing, OutputError.
     """
-    begun = time.monotonic()
+    clock = _Budget(budget, tell)
+    tell = clock.tell
     _require_apart(train, held_out)
     bootstrap, limits = _wanted(thresholds)
-    tell = _within(budget, begun, tell)
     checked = check_recordings(train, map, spec, root=root)
     case, automaton = _case(spec, train, held_out, checked, effects, root)
     stages = Path(out) / STAGES if out is not None else None
-    case = dataclasses.replace(case, thresholds=limits, bootstrap=bootstrap, stages=stages)
+    case = dataclasses.replace(
+        case, thresholds=limits, bootstrap=bootstrap, stages=stages, before=clock.check
+    )
     tell(f"looked at {len(case.train)} recordings: {len(checked.check.findings)} findings")
     kept = case.train if anyway else usable(checked.check, case)
     left_out = tuple(case.name_of(file) for file in case.train if file not in kept)
@@ -78,20 +105,43 @@ def diagnose(
         for text in reasons:
             tell(text)
         case = dataclasses.replace(case, train=kept)
-        found = diagnosed(case, tell)
-        case = dataclasses.replace(case, thresholds=found.thresholds)
-        verdict, after = found.verdict, hashes(case, case.held_out)
-        dossier = Dossier(case, automaton, checked.check, verdict, found, after, left_out)
-        messages = (*reasons, *summary(dossier), *needed(dossier))
-        dossier = dataclasses.replace(
-            dossier, verdict=dataclasses.replace(verdict, messages=messages)
-        )
+        dossier = _concluded(case, automaton, checked, left_out, reasons, clock)
     else:
-        verdict = undecided(checked.check, hashes(case, case.train), time.monotonic() - begun)
+        messages = unusable(checked.check)
+        verdict = undecided(messages, hashes(case, case.train), clock.spent)
         dossier = Dossier(case, automaton, checked.check, verdict)
     if out is not None:
         save_diagnosis(dossier, out, spec)
     return dossier
+
+
+def _concluded(
+    case: Case,
+    automaton: Automaton,
+    checked: CheckedRecordings,
+    left_out: tuple[str, ...],
+    reasons: Sequence[str],
+    clock: _Budget,
+) -> Dossier:
+    """Return what is concluded from recordings; where the time is over, what was found till then.
+
+    A verdict from a part of the candidates would look like one from all: it is `unknown`.
+    """
+    try:
+        found = diagnosed(case, clock.tell)
+    except BudgetSpent as spent:
+        done = [text for text in clock.told if text.startswith(("accepted", "recalibrated"))]
+        advice = "with a larger --budget and the same --out it goes on from there"
+        messages = (*reasons, f"not finished: {spent}", *done, advice)
+        verdict = undecided(messages, hashes(case, case.train), clock.spent)
+        ended = f"{spent}; {advice}"
+        return Dossier(case, automaton, checked.check, verdict, left_out=left_out, ended=ended)
+    case = dataclasses.replace(case, thresholds=found.thresholds)
+    after = hashes(case, case.held_out)
+    dossier = Dossier(case, automaton, checked.check, found.verdict, found, after, left_out)
+    messages = (*reasons, *summary(dossier), *found.unread, *needed(dossier))
+    verdict = dataclasses.replace(found.verdict, messages=messages)
+    return dataclasses.replace(dossier, verdict=verdict)
 
 
 def save_diagnosis(dossier: Dossier, out: str | Path, spec: str) -> list[Path]:
@@ -110,7 +160,8 @@ def save_diagnosis(dossier: Dossier, out: str | Path, spec: str) -> list[Path]:
     for name, data in report_files(dossier, variant, Path(shown(folder))).items():
         files[folder / name] = data
     write_files(files)
-    shutil.rmtree(folder / STAGES, ignore_errors=True)
+    if not dossier.ended:
+        shutil.rmtree(folder / STAGES, ignore_errors=True)
     return list(files)
 
 
@@ -132,19 +183,11 @@ def _require_apart(train: Sequence[str | Path], held_out: Sequence[str | Path]) 
         if overlap(Path(one), Path(other)):
             raise ValueError(f"{other} is held out twice: each recording counts once")
     for file in held_out:
+        path = file_of(Path(file))
+        if not path.is_file() or not os.access(path, os.R_OK):
+            raise ValueError(f"{file} cannot be held out: there is no such file that can be read")
         if any(overlap(Path(file), Path(learnt)) for learnt in train):
             raise ValueError(f"{file} is learnt from: it cannot be held out")
-
-
-def _within(budget: float | None, begun: float, tell: Tell) -> Tell:
-    """Return a teller that ends the diagnosis when its time [s] has passed."""
-
-    def checking(text: str) -> None:
-        tell(text)
-        if budget is not None and time.monotonic() - begun > budget:
-            raise BudgetSpent(f"{budget:g} s have passed after: {text}")
-
-    return checking
 
 
 def _case(

@@ -69,7 +69,7 @@ def diagnose(
     from diagnosis.dossier import verdict_json
     from diagnosis.variant import needed
     from modewright import show, show_diagnosis
-    from modewright.diagnoses import BudgetSpent, diagnose as diagnosed
+    from modewright.diagnoses import diagnose as diagnosed
 
     verdicts = ("effect", "nothing_missing", "unknown", "ambiguous")
     if fail_on is not None and fail_on not in verdicts:
@@ -82,9 +82,10 @@ def diagnose(
                 spec, train, held_out or (), mapping, effects,
                 thresholds=thresholds, out=out, budget=seconds, anyway=anyway, tell=tell,
             )  # fmt: skip
-    except BudgetSpent as error:
-        print(f"error: no verdict within --budget: {error}", file=sys.stderr)
-        raise typer.Exit(PROBLEMS) from None
+    except KeyboardInterrupt:
+        print(f"what was found is kept in {out}; the same command goes on from there",
+              file=sys.stderr)  # fmt: skip
+        raise
     for text in needed(found):
         print(f"note: {text}", file=sys.stderr)
     if as_json:

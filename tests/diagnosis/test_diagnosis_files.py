@@ -381,6 +381,22 @@ def test_a_model_that_lacks_nothing_is_told_so(tmp_path: Path) -> None:
     assert "lacks nothing" in (folder / "found" / "report.html").read_text("utf-8")
 
 
+def test_a_budget_that_is_over_leaves_what_was_found_and_what_to_go_on_from(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = bench(tmp_path / "hasty")
+    assert run(folder, *COMMAND, "--out", "found", "--budget", "0 s") == 0
+    verdict = json.loads((folder / "found" / "verdict.json").read_text("utf-8"))
+    jsonschema.validate(verdict, SCHEMA)
+    assert (verdict["verdict"], verdict["effects"], verdict["confirmed"]) == ("unknown", [], None)
+    assert verdict["messages"][0] == "not finished: the 0 s of its budget are over"
+    told = capsys.readouterr()
+    assert told.out.startswith("Nothing is concluded yet: the 0 s of its budget are over")
+    assert "goes on from there" in told.out and "held out" not in told.err
+    page = (folder / "found" / "report.html").read_text("utf-8")
+    assert "Nothing is concluded yet" in page
+
+
 def test_no_physics_is_blamed_for_a_wrong_unit(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -401,11 +417,11 @@ def test_no_physics_is_blamed_for_a_wrong_unit(
 @pytest.mark.parametrize(
     ("words", "code", "told"),
     [
-        (["--budget", "0 s"], 1, "no verdict within --budget"),
         (["--budget", "soon"], 2, "is not a time"),
         (["--fail-on", "doubt"], 2, "one of effect"),
         (["--effects", "spec/none"], 2, "there is no effect in"),
         (["--held-out", "./run_0.csv"], 2, "cannot be held out"),
+        (["--held-out", "run_9.csv"], 2, "run_9.csv cannot be held out: there is no such file"),
         (["--train", "./run_1.csv"], 2, "is named twice"),
     ],
 )
