@@ -85,6 +85,8 @@ def recording_of(name: str, times: Values, values: dict[str, Values]) -> Recordi
     channels = {}
     for key, column in values.items():
         kept = np.isfinite(column)
+        if not kept.any():
+            continue
         stamps = tuple(Fraction(round(float(t) * 10000), 10000) for t in times[kept])
         channels[key] = Channel(bench().columns[key], stamps, tuple(column[kept].tolist()))
     first = channels["torque"].times

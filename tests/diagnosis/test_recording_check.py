@@ -97,6 +97,37 @@ def test_parameters_that_are_a_fifth_off_and_a_small_delay_are_no_mistake_of_the
     assert found.is_usable and not found.findings
 
 
+def both(factor: float) -> Spoil:
+    def spoil(times: Values, values: dict[str, Values]) -> None:
+        values["motor"], values["wheel"] = factor * values["motor"], factor * values["wheel"]
+
+    return spoil
+
+
+@pytest.mark.parametrize(
+    ("spoil", "kind", "channel"),
+    [
+        (later("wheel", 0.2), "clock_offset", "wheel"),
+        (later("motor", 0.2), "clock_offset", "motor"),
+        (later("torque", 0.2), "clock_offset", "torque"),
+        (scaled("motor", -1.0), "sign", "motor"),
+        (scaled("torque", -1.0), "sign", "torque"),
+        (both(RPM), "unit", "motor"),
+        (scaled("torque", 0.0), "no_signal", "torque"),
+        (scaled("motor", math.nan), "no_signal", "motor"),
+    ],
+)
+@pytest.mark.parametrize("count", [1, 3])
+def test_what_is_bad_is_told_of_one_recording_or_of_all(
+    spoil: Spoil, kind: str, channel: str, count: int
+) -> None:
+    found = check(*[spoiled(spoil if k < count else None, f"run_{k}") for k in range(3)])
+    errors = [one for one in found.findings if one.severity == "error"]
+    assert {(one.kind, one.channel) for one in errors} == {(kind, channel)}
+    where = {one.recording for one in errors}
+    assert where == {"run_0"} if count == 1 else where in ({""}, {"run_0", "run_1", "run_2"})
+
+
 def lost(times: Values, values: dict[str, Values]) -> None:
     gone = np.random.default_rng(2).random(len(times)) < 0.2
     for key in values:
