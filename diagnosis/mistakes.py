@@ -133,7 +133,12 @@ def mistakes_in(candidate: Candidate, series: Sequence[Series]) -> list[Mistake]
         lag = median(one.lag for one in alike)
         return [Mistake(dataclasses.replace(shared, lag=lag), "")]
     named = zip(own, series, strict=True)
-    return [Mistake(trial, one.name) for trial, one in named if trial]
+    return [Mistake(trial, one.name) for trial, one in named if trial and _is_steady(trial, own)]
+
+
+def _is_steady(trial: Trial, own: Sequence[Trial | None]) -> bool:
+    """Tell whether a column is off alike wherever it is: what differs is rather physics."""
+    return all(one.is_like(trial) for one in own if one and one.column == trial.column)
 
 
 def gained(candidate: Candidate, series: Sequence[Series]) -> Mapping[Trial, Reals]:
