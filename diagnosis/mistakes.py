@@ -22,7 +22,7 @@ from diagnosis.finding import Finding
 from diagnosis.level import units_of
 from diagnosis.point import point_of
 from diagnosis.prediction import noises_of, predicted
-from diagnosis.series import Reals, Series, compared, paced, pieces_of
+from diagnosis.series import Reals, Series, compared, paced, pieces_of, require_one_pace
 from engine.recording import Recording
 from language.document import Document
 from language.experiment import Column, RecordingMap
@@ -96,6 +96,7 @@ def mistakes_of(
     drifts = balance_drifts(document, automaton)
     bench = Bench(document, project, automaton, (), tuple(series), seen, drifts)
     try:
+        require_one_pace(series)
         found = mistakes_in(bench.candidate(()), series)
     except (SpecError, ToolMissing, BuildError, ValueError, OSError):
         return None

@@ -125,6 +125,14 @@ def paced(
     return tuple(thinned(one, is_linear) for one in series)
 
 
+def require_one_pace(series: Sequence[Series]) -> None:
+    """Raise ValueError where recordings have samples at different rates."""
+    rates = {one.period: f"{one.name} ({float(1 / one.period):g} Hz)" for one in series}
+    if len(rates) > 1:
+        named = ", ".join(rates.values())
+        raise ValueError(f"recordings at different rates cannot be diagnosed together: {named}")
+
+
 def thinned(series: Series, is_linear: bool = False) -> Series:
     """Return a fast recording at a slower pace: inputs are means over it, every n-th value is kept.
 

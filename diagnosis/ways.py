@@ -16,7 +16,7 @@ from diagnosis.level import first_fit, recalibrated, units_of
 from diagnosis.prediction import noises_of
 from diagnosis.search import Tell
 from diagnosis.selection import Selection, selected
-from diagnosis.series import paced
+from diagnosis.series import paced, require_one_pace
 from diagnosis.starting import settled_at_start, started
 from diagnosis.threshold import Thresholds
 
@@ -32,6 +32,7 @@ def ways_of(bench: Bench, tell: Tell = lambda text: None) -> list[Way]:
     firsts = []
     for is_linear in (True, False):
         paced_ones = paced(bench.series, bench.automaton, bench.seen, is_linear)
+        require_one_pace(paced_ones)
         own = tuple(settled_at_start(one) for one in paced_ones)
         way = dataclasses.replace(bench, series=own)
         candidate = way.candidate(())
