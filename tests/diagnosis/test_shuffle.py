@@ -12,7 +12,8 @@ from diagnosis.bench import Bench, balance_drifts
 from diagnosis.estimation import Estimate
 from diagnosis.evidence import evidence
 from diagnosis.layers import fitting, shipped_effects
-from diagnosis.level import first_fit, recalibrated, settled, units_of
+from diagnosis import level
+from diagnosis.level import first_fit, recalibrated, units_of
 from diagnosis.prediction import noises_of
 from diagnosis.series import Series
 from diagnosis.shuffle import Cycles, Shuffle, _cycles, _wave, shuffle_of
@@ -58,7 +59,7 @@ def fitted(bench: Bench) -> tuple[Estimate, dict[str, Estimate]]:
         for layer in fitting(bench.document, effect):
             start = {**base.values(0), "k_r_half_shaft": 500.0, "F_r_half_shaft": 30.0}
             one = bench.candidate((layer,))
-            found[effect.name] = settled(one, bench.series, base.noises, start, units, turns=1)
+            found[effect.name] = level.fitted(one, bench.series, base.noises, start, units)
     return base, found
 
 
