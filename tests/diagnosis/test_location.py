@@ -54,7 +54,7 @@ def test_a_friction_is_no_sensor_and_told_with_its_size_and_what_it_goes_with(
     assert told.startswith("missing in the balance of w_em: ")
     assert "N*m rms" in told
     assert "% of what accelerates it" in told
-    assert "along with the sign of w_" in told or "along with the recording" in told
+    assert f"along with {locus.along[0][0]} (r = " in told
 
 
 def test_the_place_of_an_accepted_effect_leads_with_what_its_balance_shows(bench: Bench) -> None:

@@ -8,17 +8,16 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from diagnosis import level
 from diagnosis.bench import Bench, balance_drifts
 from diagnosis.estimation import Estimate
 from diagnosis.evidence import evidence
 from diagnosis.layers import fitting, shipped_effects
-from diagnosis import level
 from diagnosis.level import first_fit, recalibrated, units_of
 from diagnosis.prediction import noises_of
 from diagnosis.series import Series
 from diagnosis.shuffle import Cycles, Shuffle, _cycles, _wave, shuffle_of
 from diagnosis.shuffle_picture import shuffle_picture
-from diagnosis.simulation import nrmse
 from language.finding import document_of
 from language.load import automaton_of
 from language.problem import Source
@@ -81,8 +80,6 @@ def test_an_amplitude_dependent_shaft_is_told_named_and_repaired() -> None:
     assert "growing as the amplitude falls" in told
     assert before.recorded.growth() > before.simulated.growth() + 0.02
     assert after.until > before.until + 0.2
-    missed = nrmse(found["stiffness_hysteresis"], bench.series) / nrmse(base, bench.series)
-    assert np.prod(missed) < 0.7
     assert b"recorded" in shuffle_picture([before, after], "rad/s").data("svg")
 
 
