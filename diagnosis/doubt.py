@@ -27,9 +27,9 @@ UNEXPLAINED = 4.0
 """Times the threshold that the freedom of a place gains where a formula is tried."""
 LEFT = 3.0
 """Times the threshold that a term gains where an accepted effect leaves something over."""
-LEFT_PART = 0.15
+LEFT_PART = 0.3
 """And this part of what the effect gained: a strong one is never described quite well."""
-MORE = 1.2
+MORE = 1.5
 """A formula is the verdict where it gains so many times as much as what was accepted."""
 
 
