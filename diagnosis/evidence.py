@@ -15,10 +15,13 @@ from numpy.typing import NDArray
 
 from diagnosis.estimation import Estimate, outcome_at
 from diagnosis.normal import stepped
-from diagnosis.prediction import FOLDS
+from diagnosis.point import Point
+from diagnosis.prediction import FOLDS, Outcome
 from diagnosis.series import Series
 
 Reals = NDArray[np.float64]
+PARTS = (1.0, 0.5, 0.25, 0.1)
+"""Parts of a step that are tried."""
 LAGS = 0.25
 """Seconds over which innovations may hang together."""
 
@@ -36,8 +39,9 @@ class Evidence:
 
     @property
     def least(self) -> float:
-        """The smaller of the two."""
-        return min(self.train, self.left_out)
+        """The smaller of the two; what one recording alone denies is an accident of it."""
+        denied = min(0.0, *self.each) if len(self.each) > 1 else 0.0
+        return min(self.train, self.left_out - denied)
 
     @property
     def rest(self) -> float:
@@ -103,15 +107,46 @@ def _gained(before: Reals, after: Reals, counts: Reals) -> Reals:
 
 def _left_out(model: Estimate, series: Sequence[Series]) -> Reals:
     """Return the squares (recordings, seen) of each block at the point that the others ask for."""
-    assert model.normal is not None
     found = np.zeros((len(series), len(model.candidate.predictor.seen)))
     for fold in range(FOLDS):
-        point = stepped(model.candidate, model.point, model.normal.without(fold), 0.0)
-        outcome = outcome_at(model, series, point)
+        outcome = _without(model, series, fold)
         if not outcome.is_whole:
             return np.full(found.shape, np.inf)
-        squares = outcome.squares()
-        for block in outcome.blocks:
-            if block.fold == fold:
-                found[block.recording] += np.nansum(squares[block.recording][block.part], axis=0)
+        found += _squares(outcome, fold, False)
+    return found
+
+
+def _without(model: Estimate, series: Sequence[Series], fold: int) -> Outcome:
+    """Return the recordings foreseen from where a model would be without a fold.
+
+    A step that does not do the others any good is shortened: the model is not as linear as that.
+    """
+    assert model.normal is not None
+    scale = model.outcome.variances()
+    there = stepped(model.candidate, model.point, model.normal.without(fold), 0.0)
+    limit = _kept_cost(model, model.outcome, model.point, fold, scale)
+    for part in PARTS:
+        point = Point(
+            model.point.shared + part * (there.shared - model.point.shared),
+            model.point.own + part * (there.own - model.point.own),
+        )
+        outcome = outcome_at(model, series, point)
+        if outcome.is_whole and _kept_cost(model, outcome, point, fold, scale) <= limit:
+            return outcome
+    return model.outcome
+
+
+def _kept_cost(model: Estimate, outcome: Outcome, point: Point, fold: int, scale: Reals) -> float:
+    """Return the cost [nats] of what is not left out."""
+    squares = _squares(outcome, fold, True)
+    return 0.5 * float(np.sum(squares.sum(axis=0) / scale)) + point.prior(model.candidate)
+
+
+def _squares(outcome: Outcome, fold: int, others: bool) -> Reals:
+    """Return the sums of squares (recordings, seen) of a fold, or of all others."""
+    squares = outcome.squares()
+    found = np.zeros((len(squares), squares[0].shape[1]))
+    for block in outcome.blocks:
+        if (block.fold != fold) == others:
+            found[block.recording] += np.nansum(squares[block.recording][block.part], axis=0)
     return found

@@ -31,6 +31,8 @@ FAR = 4.0
 SCALE = 1.5
 """Factor by which the noise of inputs or of a signal is changed at a time."""
 MOST_SCALES = 5
+FARTHEST = 2.5
+"""Factor by which it may be another one than was measured."""
 ENOUGH = 2.0
 """Another level is taken where it gains this much [nats]."""
 
@@ -78,16 +80,31 @@ def levelled(
 
 
 def _tuned(now: Estimate, series: Sequence[Series]) -> Estimate:
-    """Return an estimate with the noise of its inputs, then of each signal, scaled."""
+    """Return an estimate with the noise of its inputs, then of each signal, scaled.
+
+    Not far from what was measured: a model that lacks something would trust in its signals alone.
+    """
+    known = noises_of(series, {})
     for place in range(-1, len(now.noises.seen)):
         for factor in (SCALE, 1.0 / SCALE):
             for _ in range(MOST_SCALES):
                 noises = _scaled(now.noises, place, factor)
+                if not _is_near(noises, known, place):
+                    break
                 tried = looked_at(now.candidate, series, noises, now.point, now.outcome)
                 if not tried.cost < now.cost - ENOUGH:
                     break
                 now = tried
     return now
+
+
+def _is_near(noises: Noises, known: Noises, place: int) -> bool:
+    """Tell whether the noise of the inputs (-1) or of a signal is near what was measured."""
+    now, measured = (
+        (noises.inputs, known.inputs) if place < 0 else (noises.seen[place], known.seen[place])
+    )
+    ratio = np.max(now / np.maximum(measured, 1e-300), initial=0.0, where=np.asarray(measured) > 0)
+    return bool(1.0 / FARTHEST <= ratio <= FARTHEST)
 
 
 def _scaled(noises: Noises, place: int, factor: float) -> Noises:

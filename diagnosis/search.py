@@ -11,10 +11,10 @@ import numpy as np
 from diagnosis.bench import Bench
 from diagnosis.candidate import Candidate
 from diagnosis.estimation import Estimate, looked_at, outcome_at, reached
-from diagnosis.evidence import Evidence, evidence
+from diagnosis.evidence import Evidence, evidence, inflation
 from diagnosis.layers import Layer
 from diagnosis.level import fitted
-from diagnosis.point import Point, extended
+from diagnosis.point import Point, extended, point_of
 from diagnosis.series import Series
 
 FULL_FITS = 7
@@ -22,6 +22,8 @@ FULL_FITS = 7
 FEW_FITS = 4
 LITTLE = 0.02
 """Those that promise less than this part of what the best does are only fitted if they are few."""
+POOR = 2.0
+"""Innovations that count as one, from which on a fit is no good."""
 STARTS = 2
 """Starts of a candidate from which steps are made, the best ones."""
 WORTH = 10.0
@@ -68,7 +70,7 @@ def searched(
             found.append(Tried(layer, gain))
             continue
         given = (base.noises, start.point, units, start.cost - WORTH)
-        make = partial(fitted, start.candidate, bench.series, *given)
+        make = partial(_fitted, bench, base, start, units)
         estimate = bench.kept("fitted", start.candidate, given, make)
         if not np.isfinite(estimate.cost):
             found.append(Tried(layer, gain))
@@ -77,6 +79,23 @@ def searched(
         tell(f"{layer.id}: train {gains.train:.0f}, left out {gains.left_out:.0f} nats")
         found.append(Tried(layer, gain, estimate, gains))
     return sorted(found, key=lambda one: -one.score)
+
+
+def _fitted(bench: Bench, base: Estimate, start: Estimate, units: Mapping[str, float]) -> Estimate:
+    """Return a candidate fitted from where screening left it.
+
+    Where that is no good it is fitted from where the base is declared as well: what lacks something
+    may have led the base far astray.
+    """
+    candidate, known = start.candidate, start.cost - WORTH
+    first = fitted(candidate, bench.series, base.noises, start.point, units, known)
+    if not np.isfinite(first.cost) or inflation(first, bench.series) < POOR:
+        return first
+    point = point_of(candidate, len(bench.series), {})
+    own = [k for k, name in enumerate(candidate.names) if name not in base.candidate.names]
+    point.shared[own], point.own[:, own] = start.point.shared[own], start.point.own[:, own]
+    again = fitted(candidate, bench.series, base.noises, point, units, first.cost)
+    return min(first, again, key=lambda one: one.cost)
 
 
 def screened(bench: Bench, candidate: Candidate, base: Estimate) -> Estimate:
