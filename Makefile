@@ -58,6 +58,7 @@ verify: setup ## measure every acceptance figure; with recordings: ARGS="--recor
 	$(BIN)/python tests/verify/command_line.py
 	$(BIN)/python tests/verify/studies.py
 	$(BIN)/python tests/verify/fast.py
+	$(BIN)/python tests/verify/open_cases.py
 	$(BIN)/python tests/verify/variants.py
 	$(BIN)/python tests/verify/tip_out.py
 	$(BIN)/python tests/verify/kept_stages.py

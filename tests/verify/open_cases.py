@@ -12,6 +12,8 @@ import subprocess
 import sys
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from itertools import islice
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -32,13 +34,18 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=SEED)
     parser.add_argument("--effects", default=EFFECTS)
     parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--first", type=int, help="diagnose so many cases only")
     given = parser.parse_args()
-    rates = {"open_generator": lambda: open_generator(given.seed, given.effects, given.jobs)}
+    rates = {
+        "open_generator": partial(
+            open_generator, given.seed, given.effects, given.jobs, given.first
+        )
+    }
     return measured(5, rates)
 
 
-def open_generator(seed: int, effects: str, jobs: int) -> Figure:
-    """Return the rates of all cases of a seed."""
+def open_generator(seed: int, effects: str, jobs: int, first: int | None = None) -> Figure:
+    """Return the rates of all cases of a seed, or of the `first` ones."""
     folder = ROOT / "build" / "open_cases"
     cases = folder / f"{seed}_{effects.replace(':', '-')}"
     labels = cases.with_suffix(".json")
@@ -55,7 +62,8 @@ def open_generator(seed: int, effects: str, jobs: int) -> Figure:
                 effects,
             ]
         )
-    known: Mapping[str, Any] = json.loads(labels.read_text())["cases"]
+    every: Mapping[str, Any] = json.loads(labels.read_text())["cases"]
+    known = dict(islice(every.items(), first))
     results = folder / code_digest((*CODE, "diagnosis"))[:16]
     results.mkdir(parents=True, exist_ok=True)
 
