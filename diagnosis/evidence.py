@@ -39,9 +39,8 @@ class Evidence:
 
     @property
     def least(self) -> float:
-        """The smaller of the two; what one recording alone denies is an accident of it."""
-        denied = min(0.0, *self.each) if len(self.each) > 1 else 0.0
-        return min(self.train, self.left_out - denied)
+        """The smaller of the two."""
+        return min(self.train, self.left_out)
 
     @property
     def rest(self) -> float:

@@ -10,11 +10,11 @@ from diagnosis.bench import Bench
 from diagnosis.candidate import Candidate
 from diagnosis.estimation import Estimate, estimated, looked_at
 from diagnosis.layers import DRIFT, Layer
-from diagnosis.level import FREE_LEVELS, units_of
+from diagnosis.level import FIRST_LEVELS, units_of
 from diagnosis.point import point_of
 from diagnosis.prediction import Noises
 
-SMALL_LEVEL = FREE_LEVELS[1]
+SMALL_LEVEL = FIRST_LEVELS[0]
 """What all drifts have while one of them is let free."""
 START_LEVEL = 10.0
 WIDE_LEVELS = (1.0, 100.0, 1000.0)

@@ -18,19 +18,17 @@ from diagnosis.prediction import Noises, near, noises_of, points_of
 from diagnosis.series import Series
 
 REACH = 0.2
+"""Seconds in which a drift of one unit shows."""
 LEVELS = (0.0, 0.1, 0.3, 1.0, 3.0)
 """Standard deviations that a drift may have, in its unit; the last is the most while naming."""
 FIRST_LEVELS = (0.1, 0.3, 1.0)
 """Those from which a base is fitted: a fit with much drift does not find its way to less."""
 QUIET = FIRST_LEVELS[0]
 """That from which a candidate is fitted as well."""
-FREE_LEVELS = (*LEVELS, 10.0, 30.0, 100.0)
-"""Those for locating."""
 FAR = 4.0
 """Standard deviations beyond which an innovation counts as that far."""
 SCALE = 1.5
 """Factor by which the noise of inputs or of a signal is changed at a time."""
-MOST_SCALES = 5
 FARTHEST = 2.5
 """Factor by which it may be another one than was measured."""
 ENOUGH = 2.0
@@ -59,7 +57,6 @@ def levelled(
     now: Estimate,
     series: Sequence[Series],
     units: Mapping[str, float],
-    levels: Sequence[float] = LEVELS,
 ) -> Estimate:
     """Return an estimate with the drifts that the recordings ask for, its parameters held.
 
@@ -67,10 +64,10 @@ def levelled(
     known to a factor only: with a gain that is not the best, anything would seem to gain.
     """
     for name in units:
-        here = _place(now.noises.drifts.get(name, 0.0), units[name], levels)
+        here = _place(now.noises.drifts.get(name, 0.0), units[name])
         for direction in (1, -1):
-            while 0 <= here + direction < len(levels):
-                drifts = {**now.noises.drifts, name: levels[here + direction] * units[name]}
+            while 0 <= here + direction < len(LEVELS):
+                drifts = {**now.noises.drifts, name: LEVELS[here + direction] * units[name]}
                 noises = dataclasses.replace(now.noises, drifts=drifts)
                 tried = looked_at(now.candidate, series, noises, now.point, now.outcome)
                 if not tried.cost < now.cost - ENOUGH:
@@ -87,14 +84,12 @@ def _tuned(now: Estimate, series: Sequence[Series]) -> Estimate:
     known = noises_of(series, {})
     for place in range(-1, len(now.noises.seen)):
         for factor in (SCALE, 1.0 / SCALE):
-            for _ in range(MOST_SCALES):
-                noises = _scaled(now.noises, place, factor)
-                if not _is_near(noises, known, place):
-                    break
+            noises = _scaled(now.noises, place, factor)
+            while _is_near(noises, known, place):
                 tried = looked_at(now.candidate, series, noises, now.point, now.outcome)
                 if not tried.cost < now.cost - ENOUGH:
                     break
-                now = tried
+                now, noises = tried, _scaled(noises, place, factor)
     return now
 
 
@@ -180,5 +175,5 @@ def recalibrated(first: Estimate, series: Sequence[Series], units: Mapping[str, 
     return min(found, key=lambda one: one.cost)
 
 
-def _place(value: float, unit: float, levels: Sequence[float]) -> int:
-    return int(np.argmin([abs(level - value / unit) for level in levels]))
+def _place(value: float, unit: float) -> int:
+    return int(np.argmin([abs(level - value / unit) for level in LEVELS]))

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from codegen.predictor import Prediction
 from diagnosis.candidate import Candidate
-from diagnosis.gain import Linear, linearised
+from diagnosis.linear import Linear, linearised
 from diagnosis.noise import MAD, noise_of
 from diagnosis.series import Series
 
@@ -205,8 +205,11 @@ def near(
     candidate: Candidate, page: Reals, mode: int, states: Reals, inputs: Reals
 ) -> Linear | None:
     """Return a candidate over one sample, linearised in a mode near a point; None if unstable."""
-    sizes, substeps = SMALL * candidate.spans, candidate.recipe.substeps
-    return linearised(candidate.predictor, page, inputs, mode, substeps, states, sizes)
+
+    def advance(at: Reals, under: Reals) -> tuple[Reals, Reals]:
+        return candidate.predictor.advance(page, under, mode, candidate.recipe.substeps, at)
+
+    return linearised(advance, states, inputs, SMALL * candidate.spans)
 
 
 def _turns(candidate: Candidate, linear: Linear) -> NDArray[np.bool_]:

@@ -19,9 +19,6 @@ from diagnosis.series import Series
 
 FULL_FITS = 7
 """Candidates that are fitted to the end, best foreseen first."""
-FEW_FITS = 4
-LITTLE = 0.02
-"""Those that promise less than this part of what the best does are only fitted if they are few."""
 POOR = 2.0
 """Innovations that count as one, from which on a fit is no good."""
 STARTS = 2

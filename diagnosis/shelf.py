@@ -113,6 +113,7 @@ def _arrays(one: Estimate) -> Arrays:
         "noise_seen": one.noises.seen,
         "noise_inputs": one.noises.inputs,
         "noise_limits": one.noises.limits,
+        "is_alone": one.noises.is_alone,
         "drift_names": np.array(list(drifts), dtype=str),
         "drift_levels": np.array(list(drifts.values()), dtype=float),
         "limits": one.outcome.limits,
@@ -131,7 +132,8 @@ def _estimate(candidate: Candidate, series: Sequence[Series], of: Arrays) -> Est
         str(name): float(level)
         for name, level in zip(of["drift_names"], of["drift_levels"], strict=True)
     }
-    noises = Noises(of["noise_seen"], of["noise_inputs"], drifts, of["limits"])
+    is_alone = bool(of["is_alone"])
+    noises = Noises(of["noise_seen"], of["noise_inputs"], drifts, of["limits"], is_alone)
     point, gains = Point(of["shared"], of["own"]), Gains(of["first"], of["steady"])
     normal = None
     if "normal_a" in of:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+import pytest
 
+from modewright.cli import app
+from modewright.exits import exit_code
 from tests.language.making import ROOT
 
 SPEC = """\
@@ -64,3 +68,17 @@ def recordings(T_c: float) -> Sequence[np.ndarray]:
             w = w + h * (T[:, k] - B * w - T_c * np.tanh(w / 0.1)) / J
     seen = seen + random.normal(0.0, 0.05, seen.shape)
     return list(np.stack([T, seen], axis=-1))
+
+
+SCHEMA = json.loads((ROOT / "spec" / "verdict.schema.json").read_text("utf-8"))
+COMMAND = (
+    *("diagnose", "spinner", "--train", "run_0.csv", "--train", "run_1.csv"),
+    *("--held-out", "run_2.csv", "--effects", "library"),
+)
+
+
+def run(folder: Path, *arguments: str) -> int:
+    """Run the command line in a folder; return its exit code."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        return exit_code(lambda: app(list(arguments), standalone_mode=False))

@@ -23,24 +23,12 @@ import numpy as np
 import pytest
 
 import modewright as mw
-from diagnosis import wording
-from diagnosis.dossier import usable, verdict_json
-from diagnosis.finding import Finding
-from diagnosis.report import report_files
+from diagnosis.dossier import verdict_json
 from diagnosis.shelf import Shelf, hash_of
 from diagnosis.variant import needed
-from diagnosis.wording import headline, separation
-from modewright.cli import app
 from modewright.diagnoses import base_of
-from modewright.exits import exit_code
-from tests.diagnosis.spinning import T_C, B, J, bench
-from tests.language.making import ROOT
+from tests.diagnosis.spinning import COMMAND, SCHEMA, T_C, B, J, bench, run
 
-SCHEMA = json.loads((ROOT / "spec" / "verdict.schema.json").read_text("utf-8"))
-COMMAND = (
-    *("diagnose", "spinner", "--train", "run_0.csv", "--train", "run_1.csv"),
-    *("--held-out", "run_2.csv", "--effects", "library"),
-)
 RIDER = """language: 1
 automaton: rider
 period: 5 ms
@@ -77,12 +65,6 @@ class Found:
     @property
     def verdict(self) -> dict[str, Any]:
         return dict(json.loads((self.folder / "found" / "verdict.json").read_text("utf-8")))
-
-
-def run(folder: Path, *arguments: str) -> int:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.chdir(folder)
-        return exit_code(lambda: app(list(arguments), standalone_mode=False))
 
 
 def _killed(folder: Path) -> None:
@@ -297,11 +279,13 @@ def test_killed_and_run_again_it_says_the_same(found: Found, dossier: mw.Dossier
     assert {**again, "runtime_s": 0} == {**found.verdict, "runtime_s": 0}
 
 
+@pytest.mark.parametrize("is_alone", [False, True])
 def test_a_fit_that_was_kept_has_the_bits_of_the_one_that_was_made(
-    dossier: mw.Dossier, tmp_path: Path
+    is_alone: bool, dossier: mw.Dossier, tmp_path: Path
 ) -> None:
     assert dossier.diagnosis
     series, model = dossier.diagnosis.bench.series, dossier.diagnosis.selection.model
+    model = dataclasses.replace(model, noises=dataclasses.replace(model.noises, is_alone=is_alone))
     shelf = Shelf(tmp_path, "key")
 
     def kept(given: float, make: Callable[[], Any]) -> Any:
@@ -319,117 +303,3 @@ def test_a_fit_that_was_kept_has_the_bits_of_the_one_that_was_made(
     (file,) = tmp_path.glob("*")
     file.write_bytes(file.read_bytes()[:-100])
     assert kept(1.0, lambda: model) is model
-
-
-def test_what_cannot_be_told_apart_is_told_with_what_would_separate_it(dossier: mw.Dossier) -> None:
-    assert dossier.diagnosis
-    effects = dossier.verdict.effects
-    rival = dataclasses.replace(effects[0], id="road_grade")
-    doubt = dataclasses.replace(
-        dossier.verdict, verdict="ambiguous", effects=(), ambiguous_with=(*effects, rival)
-    )
-    jsonschema.validate(verdict_json(doubt), SCHEMA)
-    doubtful = dataclasses.replace(dossier, verdict=doubt)
-    told = headline(doubtful)
-    assert "cannot tell which" in told
-    assert "coulomb friction in the balance of w; road grade in the balance of w" in told
-    named = "coulomb_friction from road_grade, torque_offset, viscous_friction"
-    assert separation(doubtful) == [f"{named}: passage through zero speed"]
-    page = re.sub(r"<[^>]+>", " ", report_files(doubtful, "")["report.html"].decode())
-    assert "These recordings cannot tell apart: coulomb friction" in page
-    assert "best, but not told from others" in page
-    assert "confirmed on" not in page and "better on held-out recordings" in page
-
-
-def test_however_much_is_to_be_told_it_is_four_lines(
-    dossier: mw.Dossier, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(wording, "oscillation", lambda dossier: "w fits until t = 0.3 s")
-    lines = wording.summary(dossier)
-    assert len(lines) == 4 and lines[2] == "w fits until t = 0.3 s"
-    odd = dataclasses.replace(
-        dossier.check, findings=(Finding("gap", "a", "w", "has gaps", "warning"),)
-    )
-    told = wording.summary(dataclasses.replace(dossier, check=odd))
-    assert len(told) == 4 and told[1].endswith("; w fits until t = 0.3 s")
-    assert "has gaps" in told[3]
-
-
-@pytest.mark.parametrize(
-    ("bad", "kept"),
-    [((), "abc"), (("b",), "ac"), (("b", "c"), ""), (("",), "")],
-    ids=["none", "a few", "most", "all"],
-)
-def test_recordings_with_errors_are_left_out_unless_they_are_most(
-    bad: tuple[str, ...], kept: str, dossier: mw.Dossier
-) -> None:
-    errors = tuple(Finding("sign", name, "w", "is upside down", "error") for name in bad)
-    noted = Finding("jitter", "a", "w", "wobbles", "warning")
-    check = dataclasses.replace(dossier.check, findings=(*errors, noted))
-    case = dataclasses.replace(dossier.case, train=(Path("a"), Path("b"), Path("c")))
-    assert usable(check, case) == tuple(Path(name) for name in kept)
-
-
-def test_a_model_that_lacks_nothing_is_told_so(tmp_path: Path) -> None:
-    folder = bench(tmp_path / "clean", T_c=0.0)
-    assert run(folder, *COMMAND, "--out", "found", "--fail-on", "effect") == 0
-    verdict = json.loads((folder / "found" / "verdict.json").read_text("utf-8"))
-    jsonschema.validate(verdict, SCHEMA)
-    assert verdict["verdict"] == "nothing_missing"
-    assert verdict["confirmed"] is None
-    assert "effects:" not in (folder / "found" / "variant.yaml").read_text("utf-8")
-    assert "lacks nothing" in (folder / "found" / "report.html").read_text("utf-8")
-
-
-def test_a_budget_that_is_over_leaves_what_was_found_and_what_to_go_on_from(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    folder = bench(tmp_path / "hasty")
-    assert run(folder, *COMMAND, "--out", "found", "--budget", "0 s") == 0
-    verdict = json.loads((folder / "found" / "verdict.json").read_text("utf-8"))
-    jsonschema.validate(verdict, SCHEMA)
-    assert (verdict["verdict"], verdict["effects"], verdict["confirmed"]) == ("unknown", [], None)
-    assert verdict["messages"][0] == "not finished: the 0 s of its budget are over"
-    told = capsys.readouterr()
-    assert told.out.startswith("Nothing is concluded yet: the 0 s of its budget are over")
-    assert "goes on from there" in told.out and "held out" not in told.err
-    page = (folder / "found" / "report.html").read_text("utf-8")
-    assert "Nothing is concluded yet" in page
-
-
-def test_no_physics_is_blamed_for_a_wrong_unit(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    folder = bench(tmp_path / "wrong")
-    path = folder / "spec" / "bench_columns.yaml"
-    path.write_text(path.read_text("utf-8").replace("unit: rad/s", "unit: rpm"), "utf-8")
-    assert run(folder, *COMMAND, "--out", "found") == 0
-    verdict = json.loads((folder / "found" / "verdict.json").read_text("utf-8"))
-    jsonschema.validate(verdict, SCHEMA)
-    assert (verdict["verdict"], verdict["effects"], verdict["candidates"]) == ("unknown", [], [])
-    assert any("taken for rpm" in message for message in verdict["messages"])
-    assert "not usable" in capsys.readouterr().out
-    page = (folder / "found" / "report.html").read_text("utf-8")
-    assert "not usable" in page and "taken for rpm" in page
-    assert run(folder, "check", "found/variant.yaml") == 0
-
-
-@pytest.mark.parametrize(
-    ("words", "code", "told"),
-    [
-        (["--budget", "soon"], 2, "is not a time"),
-        (["--fail-on", "doubt"], 2, "one of effect"),
-        (["--effects", "spec/none"], 2, "there is no effect in"),
-        (["--held-out", "./run_0.csv"], 2, "cannot be held out"),
-        (["--held-out", "run_9.csv"], 2, "run_9.csv cannot be held out: there is no such file"),
-        (["--train", "./run_1.csv"], 2, "is named twice"),
-    ],
-)
-def test_what_is_asked_for_wrongly_is_told(
-    words: list[str], code: int, told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    folder = bench(tmp_path / "project")
-    (folder / "spec" / "none").mkdir()
-    assert run(folder, *COMMAND, "--out", "found", *words) == code
-    assert told in capsys.readouterr().err
-    assert not list((folder / "found").glob("*"))

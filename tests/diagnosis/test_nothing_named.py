@@ -1,0 +1,76 @@
+"""What a user gets where no effect is named: nothing missing, no time, wrong data, wrong words."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+from tests.diagnosis.spinning import COMMAND, SCHEMA, bench, run
+
+
+def test_a_model_that_lacks_nothing_is_told_so(tmp_path: Path) -> None:
+    folder = bench(tmp_path / "clean", T_c=0.0)
+    assert run(folder, *COMMAND, "--out", "found", "--fail-on", "effect") == 0
+    verdict = json.loads((folder / "found" / "verdict.json").read_text("utf-8"))
+    jsonschema.validate(verdict, SCHEMA)
+    assert verdict["verdict"] == "nothing_missing"
+    assert verdict["confirmed"] is None
+    assert "effects:" not in (folder / "found" / "variant.yaml").read_text("utf-8")
+    assert "lacks nothing" in (folder / "found" / "report.html").read_text("utf-8")
+
+
+def test_a_budget_that_is_over_leaves_what_was_found_and_what_to_go_on_from(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = bench(tmp_path / "hasty")
+    assert run(folder, *COMMAND, "--out", "found", "--budget", "0 s") == 0
+    verdict = json.loads((folder / "found" / "verdict.json").read_text("utf-8"))
+    jsonschema.validate(verdict, SCHEMA)
+    assert (verdict["verdict"], verdict["effects"], verdict["confirmed"]) == ("unknown", [], None)
+    assert verdict["messages"][0] == "not finished: the 0 s of its budget are over"
+    told = capsys.readouterr()
+    assert told.out.startswith("Nothing is concluded yet: the 0 s of its budget are over")
+    assert "goes on from there" in told.out and "held out" not in told.err
+    page = (folder / "found" / "report.html").read_text("utf-8")
+    assert "Nothing is concluded yet" in page
+
+
+def test_no_physics_is_blamed_for_a_wrong_unit(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = bench(tmp_path / "wrong")
+    path = folder / "spec" / "bench_columns.yaml"
+    path.write_text(path.read_text("utf-8").replace("unit: rad/s", "unit: rpm"), "utf-8")
+    assert run(folder, *COMMAND, "--out", "found") == 0
+    verdict = json.loads((folder / "found" / "verdict.json").read_text("utf-8"))
+    jsonschema.validate(verdict, SCHEMA)
+    assert (verdict["verdict"], verdict["effects"], verdict["candidates"]) == ("unknown", [], [])
+    assert any("taken for rpm" in message for message in verdict["messages"])
+    assert "not usable" in capsys.readouterr().out
+    page = (folder / "found" / "report.html").read_text("utf-8")
+    assert "not usable" in page and "taken for rpm" in page
+    assert run(folder, "check", "found/variant.yaml") == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "told"),
+    [
+        (["--budget", "soon"], 2, "is not a time"),
+        (["--fail-on", "doubt"], 2, "one of effect"),
+        (["--effects", "spec/none"], 2, "there is no effect in"),
+        (["--held-out", "./run_0.csv"], 2, "cannot be held out"),
+        (["--held-out", "run_9.csv"], 2, "run_9.csv cannot be held out: there is no such file"),
+        (["--train", "./run_1.csv"], 2, "is named twice"),
+    ],
+)
+def test_what_is_asked_for_wrongly_is_told(
+    words: list[str], code: int, told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = bench(tmp_path / "project")
+    (folder / "spec" / "none").mkdir()
+    assert run(folder, *COMMAND, "--out", "found", *words) == code
+    assert told in capsys.readouterr().err
+    assert not list((folder / "found").glob("*"))
