@@ -9,7 +9,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from diagnosis.diagnose import Case, Diagnosis
+from diagnosis.case import Case
+from diagnosis.diagnose import Diagnosis
 from diagnosis.finding import Finding, told
 from diagnosis.recording_check import RecordingCheck
 from diagnosis.verdict import Verdict

@@ -11,7 +11,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from diagnosis.diagnose import Case, case_bench, read_series
+from diagnosis.case import Case, case_bench, read_series
 from diagnosis.dossier import hashes
 from diagnosis.estimation import Estimate, looked_at
 from diagnosis.naming import correlations_of, quantities_of

@@ -10,7 +10,8 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from diagnosis.diagnose import Bootstrap, Case, diagnose as diagnosed
+from diagnosis.case import Bootstrap, Case
+from diagnosis.diagnose import diagnose as diagnosed
 from diagnosis.dossier import Dossier, errors_of, hashes, undecided, unusable, usable
 from diagnosis.file_names import file_names
 from diagnosis.finding import told

@@ -11,7 +11,8 @@ import numpy as np
 from codegen.predictor import Columns
 from diagnosis.bench import NOT_CANDIDATES
 from diagnosis.candidate import Candidate
-from diagnosis.diagnose import Case, Diagnosis
+from diagnosis.case import Case
+from diagnosis.diagnose import Diagnosis
 from diagnosis.dossier import Dossier
 from diagnosis.estimation import Estimate
 from diagnosis.evidence import Evidence

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from diagnosis.candidate import candidate
-from diagnosis.diagnose import Case, read_series
+from diagnosis.case import Case, read_series
 from diagnosis.series import shows_inputs
 from engine.recorded_part import overlap
 from language.load import automaton_of

@@ -1,0 +1,122 @@
+"""Judgement: which models of a case are accepted, from its training recordings alone."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from diagnosis.alone import LEFT_OUT, SIMULATED, alone, forgets
+from diagnosis.bench import Bench
+from diagnosis.bootstrap import bootstrapped, kept_thresholds
+from diagnosis.case import Case
+from diagnosis.description import Description, described
+from diagnosis.doubt import explains_more, is_doubtful, selected_formula
+from diagnosis.estimation import Estimate
+from diagnosis.evidence import inflation
+from diagnosis.hidden import with_hidden
+from diagnosis.level import units_of
+from diagnosis.location import located
+from diagnosis.locus import Locus
+from diagnosis.place_sentence import place_sentence
+from diagnosis.search import Tell
+from diagnosis.selection import Selection, selected
+from diagnosis.series import Series
+from diagnosis.threshold import EVERYWHERE, USUAL, Thresholds
+from diagnosis.verdict import Says
+from diagnosis.ways import Way, better_way, chosen
+
+CLEAR = 3.0
+"""A rival within this of the best [nats] makes the verdict ambiguous."""
+UNKNOWN = 4.0
+"""Times the threshold that a free drift must gain over the base where no effect was accepted."""
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What selection has come to; `bench` has the recordings as they were judged."""
+
+    bench: Bench
+    base: Estimate
+    selection: Selection
+    loci: tuple[Locus, ...]
+    says: Says
+    thresholds: Thresholds
+    description: Description | None = None
+
+
+def judged(case: Case, raw: Bench, ways: Sequence[Way], tell: Tell) -> Judgement:
+    """Return what is accepted of a case, for the ways that its recordings can be read in.
+
+    A model that forgets is judged by whole simulations, every other by what its observer foresees.
+    """
+    bench, base = better_way(ways)
+    if forgets(base, bench.series):
+        return _judged_by_simulation(case, raw, bench, base, tell)
+    return _judged_by_observer(case, raw, ways, tell)
+
+
+def _judged_by_observer(case: Case, raw: Bench, ways: Sequence[Way], tell: Tell) -> Judgement:
+    """Judge models by what an observer foresees from sample to sample."""
+    thresholds = _thresholds(case, *better_way(ways), raw.series, tell)
+    most = max(USUAL, thresholds.most)
+    bench, base, selection = chosen(ways, thresholds, tell)
+    units = units_of(base.candidate, bench.series, base.noises, base.values(0))
+    loci = located(bench, base)
+    tell(place_sentence(loci, bench))
+    selection = with_hidden(bench, selection, loci, UNKNOWN * most, tell)
+    says = _says(selection, loci, bench, most)
+    formula = None
+    if is_doubtful(says, selection, loci, bench, most):
+        formula = described(bench, selection.base, loci, units, most, tell)
+    if formula is not None and explains_more(formula, selection):
+        says, selection = "unknown", selected_formula(selection, formula)
+    else:
+        formula = None
+    return Judgement(bench, base, selection, loci, says, thresholds, formula)
+
+
+def _judged_by_simulation(
+    case: Case, raw: Bench, bench: Bench, base: Estimate, tell: Tell
+) -> Judgement:
+    """Judge models by simulations of whole recordings, in which nothing is fed back."""
+    loci = located(bench, base)
+    tell(place_sentence(loci, bench))
+    tell("what happened long ago does not matter here: whole simulations are judged")
+    thresholds = SIMULATED if case.thresholds is EVERYWHERE else case.thresholds
+    found = alone(raw, base)
+    selection = selected(found.bench, found.base, {}, thresholds, tell, LEFT_OUT)
+    says = _says(selection, loci, found.bench, max(USUAL, thresholds.most))
+    bench = dataclasses.replace(bench, series=found.bench.series)
+    return Judgement(bench, found.base, selection, loci, says, thresholds)
+
+
+def _thresholds(
+    case: Case,
+    bench: Bench,
+    base: Estimate,
+    raw: Sequence[Series],
+    tell: Tell,
+) -> Thresholds:
+    """Return the thresholds of a case: given, kept from an earlier bootstrap, or made by one."""
+    if case.bootstrap == "never":
+        return case.thresholds
+    kept = kept_thresholds(bench, raw)
+    if kept is None and case.bootstrap == "made":
+        units = units_of(base.candidate, bench.series, base.noises, base.values(0))
+        kept = bootstrapped(bench, base, units, raw, tell)
+    found = kept or case.thresholds
+    tell(f"thresholds of {found.text} nats, {found.origin}")
+    return found
+
+
+def _says(selection: Selection, loci: Sequence[Locus], bench: Bench, needed: float) -> Says:
+    if not selection.accepted:
+        shrink = 1.0 / inflation(selection.base, bench.series)
+        unexplained = max((locus.beyond for locus in loci), default=0.0) * shrink
+        return "unknown" if unexplained > UNKNOWN * needed else "nothing_missing"
+    best = selection.accepted[0].evidence
+    rivals = [tried.evidence for tried in selection.rivals if tried.evidence]
+    if best and any(rival.total > best.total - CLEAR for rival in rivals):
+        return "ambiguous"
+    return "effect"
