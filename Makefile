@@ -103,8 +103,9 @@ format: setup ## format the code and repair what can be repaired
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-generate: setup ## write the generated C anew
+generate: setup ## write the generated C and the JSON Schema anew
 	$(BIN)/modewright generate --all $(ARGS)
+	$(BIN)/modewright schema --out spec/modewright.schema.json
 
 .tools/uv: tools/fetch_uv.py
 	@$(find_python); exec $$python tools/fetch_uv.py $@

@@ -28,6 +28,7 @@ from modewright.commands.new import new
 from modewright.commands.plot import plot
 from modewright.commands.recording import recording
 from modewright.commands.replay import replay
+from modewright.commands.schema import schema
 from modewright.commands.simulate import simulate
 from modewright.commands.sweep import sweep
 from modewright.console import configure
@@ -38,7 +39,7 @@ YOUNG_OBJECTS = 100_000
 """New objects after which garbage is looked for: trees of expressions have no circles."""
 COMMANDS = (
     new, check, diagnose, fit, effects, simulate, sweep, lockstep, replay, plot, compare, graph,
-    generate, explain, demo, doctor,
+    generate, explain, schema, demo, doctor,
 )  # fmt: skip
 
 app = typer.Typer(

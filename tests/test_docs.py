@@ -53,6 +53,7 @@ def test_every_command_in_the_readme_exists() -> None:
         "docs/studies.md",
         "docs/benchmark.md",
         "docs/diagnosis.md",
+        "docs/editing.md",
     ],
 )
 def test_every_file_that_a_page_names_exists(page: str) -> None:

@@ -1,0 +1,48 @@
+"""Corpus: the specs by which shapes and schema are held equal to the readers."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from language.document import Document, Items, Node, Scalar, Table
+from language.problem import SpecError
+from language.project import read_document
+
+ROOT = Path(__file__).parent.parent.parent
+FOLDERS = ("spec", "tests/rules", "tests/data", "tests/refused", "tests/language")
+
+
+def documents() -> Iterator[tuple[Path, Document]]:
+    """Yield the specs that are said to be valid: shipped, of the rules, repaired ones."""
+    for folder in FOLDERS:
+        for path in sorted((ROOT / folder).rglob("*.yaml")):
+            if folder == "tests/refused" and ".repaired" not in path.suffixes:
+                continue
+            try:
+                yield path, read_document(path)
+            except SpecError:
+                assert folder != "spec", path
+
+
+def plain(node: Node) -> Any:
+    """Return a tree as an editor sees it: scalars by the core schema of YAML 1.2."""
+    match node:
+        case Items():
+            return [plain(part) for part in node.nodes]
+        case Table():
+            return {entry.key: plain(entry.node) for entry in node}
+        case Scalar(text, _, quoted) if not quoted:
+            return _resolved(text)
+        case Scalar():
+            return node.text
+
+
+def _resolved(text: str) -> Any:
+    if re.fullmatch(r"[-+]?\d+", text):
+        return int(text)
+    if re.fullmatch(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", text):
+        return float(text)
+    return {"true": True, "false": False, "": None, "null": None, "~": None}.get(text, text)
