@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Literal
 
+from language.codes import code_of
 from language.text import around, one_for_one, shortened, visible
 
 LONGEST_LABEL = 1000
@@ -64,6 +65,11 @@ class Problem:
     label: str
     help: str = ""
     severity: Severity = "error"
+
+    @property
+    def code(self) -> str:
+        """The number of its kind, like `MW201`: docs/problems.md explains it."""
+        return code_of(self.kind)
 
 
 class SpecError(Exception):
@@ -125,9 +131,11 @@ def nearest(name: str, known: Iterable[str]) -> str:
 
 
 def render(problem: Problem) -> str:
-    """Return the problem as `file:line:col: severity: label`, the line, carets and the help."""
+    """Return `file:line:col: severity: label [code]`, the line, carets and the help."""
     span = problem.span
-    rows = [visible(f"{span}: {problem.severity}: {shortened(problem.label, LONGEST_LABEL)}")]
+    code = f" [{problem.code}]" if problem.code else ""
+    label = shortened(problem.label, LONGEST_LABEL) + code
+    rows = [visible(f"{span}: {problem.severity}: {label}")]
     if 1 <= span.line <= len(span.source.lines):
         line = span.source.lines[span.line - 1]
         width = max(1, min(span.width, len(line) - span.column + 1))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ from language.effect import read_effect
 from language.load import automaton_of, lowered
 from language.map import read_map
 from language.numbers_text import motion_lines
-from language.problem import Problem, Problems, SpecError
+from language.problem import Problem, Problems, SpecError, ordered
 from language.project import Project, expanded, read_document, with_calibrations
 from language.scenario import read_scenario
 from language.system import read_system
@@ -77,6 +77,11 @@ def _calibrated(
     return with_calibrations(base, [str(project.path_of(reference))], reference)
 
 
+def all_problems(found: Iterable[Checked]) -> list[Problem]:
+    """Return the problems of several specs, each once, in the order of their places."""
+    return ordered(problem for each in found for problem in each.problems)
+
+
 def spec_files(root: Path) -> Iterator[Path]:
     """Yield the specs of a project in the order of their paths."""
     yield from sorted((root / "spec").rglob("*.yaml"))
@@ -86,6 +91,7 @@ def problem_json(problem: Problem) -> dict[str, Any]:
     """Return a problem as plain data."""
     return {
         "severity": problem.severity,
+        "code": problem.code,
         "kind": problem.kind,
         "file": problem.span.source.name,
         "line": problem.span.line,

@@ -4,49 +4,88 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from modewright.commands.options import Json
-from modewright.console import console, counted
+from modewright.console import announce, console, counted
 from modewright.exits import MOST_SHOWN, PROBLEMS
+from modewright.files import require_writable, write_files
+
+if TYPE_CHECKING:
+    from language.problem import Problem
+    from modewright.checking import Checked
 
 
 def check(
     specs: Annotated[list[str] | None, typer.Argument(help="specs: names or files")] = None,
     every: Annotated[bool, typer.Option("--all", help="every spec below spec/")] = False,
     as_json: Json = False,
+    as_annotations: Annotated[
+        bool, typer.Option("--github", help="print problems as annotations of GitHub Actions")
+    ] = False,
+    sarif: Annotated[Path | None, typer.Option(help="write the problems as SARIF 2.1.0")] = None,
 ) -> None:
-    """Report all problems of specs, with places and help.
+    """Report all problems of specs, with places, codes (docs/problems.md) and help.
 
     \b
     modewright check estimator spec/ev_driveline/plant.yaml
     modewright check --all --json
+    modewright check --all --github --sarif problems.sarif
     """
-    from language.problem import ordered, render_all
     from modewright import checking
 
-    names = list(specs or []) + (
-        [str(path) for path in checking.spec_files(Path())] if every else []
-    )
+    require_writable(sarif)
+    names = list(specs or [])
+    names += [str(path) for path in checking.spec_files(Path())] if every else []
     if not names:
         raise typer.BadParameter("name a spec, or use --all", param_hint="SPECS")
     found = [checking.checked(name) for name in names]
-    problems = ordered(problem for each in found for problem in each.problems)
-    errors = [problem for problem in problems if problem.severity == "error"]
+    problems = checking.all_problems(found)
+    if sarif:
+        _write_sarif(sarif, problems, as_json)
+    _tell(problems, len(names), as_json, as_annotations)
+    if any(problem.severity == "error" for problem in problems):
+        raise typer.Exit(PROBLEMS)
+    if not (as_json or as_annotations):
+        _tell_limits(found[: len(specs or [])])
+
+
+def _tell(
+    problems: Sequence[Problem], specs: int, as_json: bool, as_annotations: bool = False
+) -> None:
+    """Print the problems of some specs: as JSON, as annotations, or for a person."""
+    from language.problem import render_all
+    from modewright.annotations import annotation_lines
+    from modewright.checking import problem_json
+
     if as_json:
-        told = [checking.problem_json(problem) for problem in problems]
+        told = [problem_json(problem) for problem in problems]
         print(json.dumps({"problems": told}, indent=2, allow_nan=False))
+        return
+    if as_annotations:
+        print(annotation_lines(problems), end="")
     elif problems:
         print(render_all(problems[:MOST_SHOWN]), file=sys.stderr)
         if len(problems) > MOST_SHOWN:
             print(f"\n... and {len(problems) - MOST_SHOWN} more: --json", file=sys.stderr)
-    if not as_json:
-        console().print(f"{counted(len(names), 'spec')} checked, {counted(len(errors), 'problem')}")
-    if errors:
-        raise typer.Exit(PROBLEMS)
-    for each in found[: len(specs or [])] if not as_json else ():
+    errors = sum(problem.severity == "error" for problem in problems)
+    console().print(f"{counted(specs, 'spec')} checked, {counted(errors, 'problem')}")
+
+
+def _tell_limits(found: Sequence[Checked]) -> None:
+    for each in found:
         for line in each.limits:
             console().print(line, soft_wrap=True, highlight=False, markup=False)
+
+
+def _write_sarif(path: Path, problems: Sequence[Problem], silent: bool) -> None:
+    from modewright.sarif import sarif
+
+    text = json.dumps(sarif(problems), indent=2, allow_nan=False)
+    write_files({path: f"{text}\n".encode()})
+    if not silent:
+        announce([path])

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from engine.recording import Recording, read_recording
-from language.problem import SpecError, render_all
-from tests.engine.reading import COLUMNS, Read, Told, made_map
+from language.problem import SpecError
+from tests.engine.reading import COLUMNS, Read, Told, made_map, rendered
 
 
 @pytest.fixture
@@ -34,6 +34,6 @@ def told(read: Read) -> Told:
     def telling(data: str | bytes, columns: str = COLUMNS, name: str = "drive.csv") -> str:
         with pytest.raises(SpecError) as caught:
             read(data, columns, name)
-        return render_all(caught.value.problems)
+        return rendered(caught.value.problems)
 
     return telling

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
@@ -10,7 +11,7 @@ import pytest
 from engine.recording import Channel, Recording, read_recording
 from language.experiment import RecordingMap
 from language.map import read_map
-from language.problem import SpecError, render_all
+from language.problem import Problem, SpecError, render_all
 from language.project import Project, read_document
 
 Read = Callable[..., Recording]
@@ -31,11 +32,16 @@ def made_map(folder: Path, columns: str, unit: str = "s") -> RecordingMap:
     return read_map(read_document(path), Project(folder))
 
 
+def rendered(problems: Sequence[Problem]) -> str:
+    """Return what the user is told, without the codes of the kinds."""
+    return re.sub(r" \[MW\d+\]$", "", render_all(problems), flags=re.MULTILINE)
+
+
 def told_of(path: Path, folder: Path) -> str:
     mapping = made_map(folder, COLUMNS)
     with pytest.raises(SpecError) as caught:
         read_recording(path, mapping, list(mapping.columns))
-    return render_all(caught.value.problems)
+    return rendered(caught.value.problems)
 
 
 def only(recording: Recording) -> Channel:

@@ -15,8 +15,9 @@ import pytest
 from engine.recording import Recording, read_recording
 from language.map import read_map
 from language.missing import ToolMissing
-from language.problem import SpecError, render_all
+from language.problem import SpecError
 from language.project import Project, read_document
+from tests.engine.reading import rendered
 
 DBC = """\
 VERSION ""
@@ -51,7 +52,7 @@ def read(path: Path, text: str, *names: str) -> Recording:
 def told(path: Path, text: str, *names: str) -> str:
     with pytest.raises(SpecError) as caught:
         read(path, text, *names)
-    return render_all(caught.value.problems)
+    return rendered(caught.value.problems)
 
 
 def write_parquet(path: Path, **columns: list[Any]) -> None:

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, strategies as st
 
 from engine.recording import read_recording
-from language.problem import SpecError, render_all
-from tests.engine.reading import GOOD, HEAD, Told, made_map
+from language.problem import SpecError
+from tests.engine.reading import GOOD, HEAD, Told, made_map, rendered
 
 
 class TestAValue:
@@ -114,7 +114,7 @@ def test_any_bytes_are_a_recording_or_a_problem(
     try:
         channel = read_recording(path, mapping, ["a"]).channels["a"]
     except SpecError as error:
-        assert render_all(error.problems)
+        assert rendered(error.problems)
     else:
         assert len(channel.times) == len(channel.values) > 0
         assert list(channel.times) == sorted(set(channel.times))

@@ -9,8 +9,9 @@ import pytest
 
 from engine.recording import Recording, pieces, read_recording
 from language.map import read_map
-from language.problem import SpecError, render_all
+from language.problem import SpecError
 from language.project import Project, read_document
+from tests.engine.reading import rendered
 
 HEAD = "language: 1\nmap: bench\ntime: {column: t_s, unit: s}\ncolumns: {a: {to: u, unit: A}}\n"
 
@@ -49,7 +50,7 @@ def test_windows_of_this_file_go_before_those_of_every_file(tmp_path: Path) -> N
 def test_a_window_without_values_is_told(tmp_path: Path) -> None:
     with pytest.raises(SpecError) as caught:
         read(tmp_path, "windows: [[1 s, 2 s], [7 s, 8 s]]\n")
-    assert render_all(caught.value.problems).endswith(
+    assert rendered(caught.value.problems).endswith(
         "error: `a` has no value from 7 s to 8 s, a window of this map\n"
         "  map: bench\n"
         "       ^^^^^\n"

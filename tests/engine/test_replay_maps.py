@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from language.problem import SpecError, render_all
+from language.problem import SpecError
 from language.project import Project
+from tests.engine.reading import rendered
 from tests.engine.replaying import (
     Loaded,
     loaded,
@@ -118,7 +119,7 @@ class TestAMap:
     ) -> None:
         with pytest.raises(SpecError) as caught:
             echoed(columns, "t,a,b,c\n0,1,1,1\n")
-        assert render_all(caught.value.problems) == told
+        assert rendered(caught.value.problems) == told
 
     def test_that_leaves_no_tick_is_told(self, echoed: Callable[..., Loaded]) -> None:
         ready = echoed("  a: {to: a, unit: A, delay: 1 s}\n", "t,a\n0,1\n0.5,2\n")

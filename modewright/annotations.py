@@ -1,0 +1,34 @@
+"""Annotations: problems as the commands by which GitHub Actions marks lines of a change."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from language.problem import Problem
+
+
+def annotation_lines(problems: Iterable[Problem]) -> str:
+    """Return one `::error file=...::message` for each problem."""
+    return "".join(f"{_annotation(problem)}\n" for problem in problems)
+
+
+def _annotation(problem: Problem) -> str:
+    span = problem.span
+    values = {
+        "file": span.source.name,
+        "line": str(max(1, span.line)),
+        "col": str(max(1, span.column)),
+        "endColumn": str(max(1, span.column) + span.width),
+        "title": problem.code,
+    }
+    parts = ",".join(f"{name}={_escaped_value(value)}" for name, value in values.items())
+    text = f"{problem.label}\nhelp: {problem.help}" if problem.help else problem.label
+    return f"::{problem.severity} {parts}::{_escaped(text)}"
+
+
+def _escaped(text: str) -> str:
+    return text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+
+
+def _escaped_value(text: str) -> str:
+    return _escaped(text).replace(":", "%3A").replace(",", "%2C")

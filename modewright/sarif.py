@@ -1,0 +1,49 @@
+"""SARIF: problems in the form that code hosts and editors read (SARIF 2.1.0, OASIS 2020)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from importlib.metadata import version
+from pathlib import PurePath
+from typing import Any
+
+from language.codes import code_of, meaning_of
+from language.problem import Problem
+
+SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
+
+
+def sarif(problems: Sequence[Problem]) -> dict[str, Any]:
+    """Return problems as one run of a SARIF log; only the rules that they break are listed."""
+    kinds = sorted({problem.kind for problem in problems}, key=code_of)
+    places = {kind: index for index, kind in enumerate(kinds)}
+    driver = {
+        "name": "modewright",
+        "version": version("modewright"),
+        "rules": [_rule(kind) for kind in kinds],
+    }
+    results = [_result(problem, places[problem.kind]) for problem in problems]
+    run = {"tool": {"driver": driver}, "columnKind": "unicodeCodePoints", "results": results}
+    return {"$schema": SCHEMA, "version": "2.1.0", "runs": [run]}
+
+
+def _rule(kind: str) -> dict[str, Any]:
+    return {"id": code_of(kind), "name": kind, "shortDescription": {"text": meaning_of(kind)}}
+
+
+def _result(problem: Problem, rule: int) -> dict[str, Any]:
+    span = problem.span
+    text = f"{problem.label}. {problem.help}" if problem.help else problem.label
+    region = {
+        "startLine": max(1, span.line),
+        "startColumn": max(1, span.column),
+        "endColumn": max(1, span.column) + span.width,
+    }
+    artifact = {"uri": PurePath(span.source.name).as_posix()}
+    return {
+        "ruleId": problem.code,
+        "ruleIndex": rule,
+        "level": problem.severity,
+        "message": {"text": text},
+        "locations": [{"physicalLocation": {"artifactLocation": artifact, "region": region}}],
+    }
