@@ -100,9 +100,9 @@ def action_variables(automaton: Automaton) -> list[Variable]:
         resets = [transition.reset for transition in mode.transitions]
         for formulas in (*resets, mode.entry, mode.exit):
             for name in sorted(formulas):
-                found[f"reset_{name}"] = _work(automaton, "reset", name)
+                found[f"reset_{name}"] = work_variable(automaton, "reset", name)
         for name in mode.update:
-            found[f"next_{name}"] = _work(automaton, "next", name)
+            found[f"next_{name}"] = work_variable(automaton, "next", name)
     return list(found.values())
 
 
@@ -121,7 +121,8 @@ def discrete_variables(automaton: Automaton) -> list[Variable]:
     ]
 
 
-def _work(automaton: Automaton, verb: str, name: str) -> Variable:
+def work_variable(automaton: Automaton, verb: str, name: str) -> Variable:
+    """Return the variable of what a stage has computed and not yet committed."""
     thing = automaton.carried[name]
     unit = str(thing.unit.dimension)
     kind = value_type(thing.type)

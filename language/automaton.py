@@ -20,16 +20,22 @@ from language.project import Project, expanded, read_document
 from language.reader import Reader, about_of
 from language.region import with_regions
 from language.table import TableReader, section
+from language.truth_table import TruthTableReader
 from language.units import NO_UNIT, SECOND, Unit, fits, parse_unit
 from language.values import with_value
 from language.variable import VariableReader
 
 COMMON_KEYS = ("language", "automaton", "parameters", "inputs", "states", "discrete", "equations")
 LOGIC_KEYS = ("flow", "terms", "initial", "modes", "regions", "templates", "outputs")
+DECISION_KEYS = ("tables",)
 LAID_KEYS = ("elements", "places")
 RECORDING_KEYS = ("recording_map",)
 FAULT_KEYS = ("faults", "fault_mode")
 CLOCK_KEYS = ("period", "step", "method", "numbers", "model")
+KEYS = (
+    *(*COMMON_KEYS, *LOGIC_KEYS, *DECISION_KEYS, *LAID_KEYS),
+    *(*CLOCK_KEYS, *FAULT_KEYS, *RECORDING_KEYS),
+)
 FITTING_KEYS = ("neutral", "starts", "per", "form")
 FORMS = ("constant", "constant_or_random_walk")
 Per = Literal["model", "recording"]
@@ -123,8 +129,7 @@ class _AutomatonReader(Reader):
     """The sections of an automaton, one method each."""
 
     def read(self, document: Document, tree: Table, model: Automaton | None) -> Automaton:
-        keys = (*COMMON_KEYS, *LOGIC_KEYS, *LAID_KEYS, *CLOCK_KEYS, *FAULT_KEYS, *RECORDING_KEYS)
-        tree = self.table(tree, f"automaton {document.name}", keys)
+        tree = self.table(tree, f"automaton {document.name}", KEYS)
         self.at = document.name_span
         check_file_name(document.name, document.name_span, self.problems)
         self.model = model
@@ -159,6 +164,7 @@ class _AutomatonReader(Reader):
             faults=variables.faults,
             fault_mode=variables.fault_mode,
             recording_map=self._recording_map(tree.get("recording_map")),
+            tables=TruthTableReader(self.problems).tables(tree),
         )
         self._check_sections(tree)
         return automaton

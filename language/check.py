@@ -13,6 +13,7 @@ from language.check_observer import check_observer
 from language.check_region import check_regions
 from language.check_rewind import check_reach, check_rewind
 from language.check_size import check_size
+from language.check_truth_table import check_truth_tables
 from language.check_unused import check_unused
 from language.check_writer import (
     check_continued,
@@ -94,6 +95,9 @@ class _Check:
             for mode in region.modes.values():
                 with self.problems.collecting():
                     self._beside(mode)
+        with self.problems.collecting():
+            check = self._everywhere("in every mode of the chart, for a table")
+            check_truth_tables(automaton, check, self.problems)
         check_outputs(automaton, self.problems)
         check_laid_on(automaton, self.names, self.problems)
         check_scaled(automaton, self.problems)
@@ -191,19 +195,23 @@ class _Check:
             check_observer(automaton, mode.observer, self.names, plain)
         check_writers(automaton, mode, self.problems)
 
-    def _beside(self, mode: Mode) -> None:
-        """A mode of another region reads what every mode of the chart has."""
+    def _everywhere(self, place: str) -> DimensionCheck:
+        """What is beside the chart reads what every mode of the chart has."""
         automaton = self.automaton
         groups = [automaton.parameters, automaton.inputs, automaton.carried]
         known = dict(self._scope(groups, "").names)
         modes = [sources(other) for other in automaton.modes.values()]
         everywhere = [name for name in modes[0] if all(name in other for other in modes)]
         known.update({name: self.names.get(name) for name in everywhere})
-        place = f"beside every mode of the chart, in region `{mode.region}`"
         scope = Scope(
             known, _mode_paths(automaton), place, self._angles(), self._kept(), self._tables()
         )
-        check = DimensionCheck(scope, self.problems)
+        return DimensionCheck(scope, self.problems)
+
+    def _beside(self, mode: Mode) -> None:
+        automaton = self.automaton
+        place = f"beside every mode of the chart, in region `{mode.region}`"
+        check = self._everywhere(place)
         check_balances(automaton, mode, check)
         for assignments in (mode.update, mode.entry, mode.exit):
             self._assignments(assignments, check)

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from language.balance import coefficient_of
 from language.interval import ANYTHING, Interval, Ranging
 from language.memory import actions
-from language.model import Automaton, Mode
+from language.model import CHART, Automaton, Mode
 from language.order import equation_order
 from language.parameter import parameter_order
 from language.problem import Problems, SpecError
@@ -56,7 +56,8 @@ class _ModeDomains:
         ranging = self.ranging
         for name in equation_order(self.mode):
             self.look(name)
-        for formula in actions(self.mode):
+        decided = self.automaton.decisions if self.mode.region == CHART else ()
+        for formula in (*actions(self.mode), *decided):
             ranging.expression(formula.tree)
         for balance in self.mode.flow.values():
             ranging.expression(balance.right)

@@ -46,6 +46,7 @@ def _check_equations(automaton: Automaton, read: set[str], problems: Problems) -
 
 def _check_unwritten(automaton: Automaton, problems: Problems) -> None:
     written = {name for mode in automaton.all_modes for name in _written(automaton, mode)}
+    written |= {name for table in automaton.tables for name in table.written}
     for name, state in automaton.carried.items():
         if name not in written:
             label = f"`{name}` is written nowhere: it keeps its start value"

@@ -123,13 +123,14 @@ def applications(automaton: Automaton, functions: tuple[str, ...]) -> dict[str, 
 def remembering(automaton: Automaton) -> tuple[Application, ...]:
     """Return every use of a function with memory; what is inside of one comes before it."""
     found: list[Application] = []
+    trees = [formula.tree for formula in automaton.decisions]
     for mode in automaton.all_modes:
-        trees = [formula.tree for formula in formulas(mode)]
+        trees += [formula.tree for formula in formulas(mode)]
         trees += [balance.right for balance in mode.flow.values()]
-        for tree in trees:
-            found += reversed(
-                [p for p in walk(tree) if isinstance(p, Application) and p.function in MEMORY]
-            )
+    for tree in trees:
+        found += reversed(
+            [p for p in walk(tree) if isinstance(p, Application) and p.function in MEMORY]
+        )
     return tuple(found)
 
 

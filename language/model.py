@@ -165,6 +165,32 @@ class Region:
 
 
 @dataclass(frozen=True)
+class TruthRow:
+    """A row of a truth table: what each condition is (None: whatever), and what it then writes."""
+
+    name: str
+    marks: tuple[bool | None, ...]
+    results: Mapping[str, Formula]
+    span: Span
+
+
+@dataclass(frozen=True)
+class TruthTable:
+    """Conditions by name, and rows of which exactly one holds (language/decision.py)."""
+
+    name: str
+    conditions: Mapping[str, Formula]
+    rows: tuple[TruthRow, ...]
+    key: str
+    span: Span
+
+    @property
+    def written(self) -> tuple[str, ...]:
+        """The discrete variables that some row writes, each once."""
+        return tuple(dict.fromkeys(name for row in self.rows for name in row.results))
+
+
+@dataclass(frozen=True)
 class Element:
     """A part of the physics on which effects may be laid; `far` are what acts at its far end."""
 
@@ -206,6 +232,7 @@ class Automaton:
     regions: tuple[Region, ...] = ()
     numbers: NumberType = "float64"
     recording_map: Scalar | None = field(default=None, repr=False)
+    tables: tuple[TruthTable, ...] = ()
 
     def source_of(self, output: str) -> str:
         """Return the state or equation that an output reads: its own name unless it says more."""
@@ -246,6 +273,14 @@ class Automaton:
     def target(self, transition: Transition) -> Mode:
         """Return the mode that a transition enters."""
         return self.region(transition.region).modes[transition.target]
+
+    @cached_property
+    def decisions(self) -> tuple[Formula, ...]:
+        """The conditions of the truth tables, and what their rows write."""
+        tables = self.tables
+        conditions = [formula for table in tables for formula in table.conditions.values()]
+        rows = [row for table in tables for row in table.rows]
+        return (*conditions, *(formula for row in rows for formula in row.results.values()))
 
     @cached_property
     def carried(self) -> Mapping[str, State]:

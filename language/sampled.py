@@ -20,6 +20,7 @@ from language.action import (
 )
 from language.constants import derive_block, parameter_constants, values_of
 from language.covariance import COVARIANCE_RANGE, covariance_variables
+from language.decision import decision_block, decision_variables
 from language.evaluate import Scalar
 from language.fault import FAULT_GUARD, fault_names, with_fault_transitions
 from language.invariant import INVARIANTS, invariant_block, invariant_variables
@@ -178,6 +179,7 @@ class _Sampled:
                 for n, ref in variable_names(self.automaton, "input").items()
                 if n in inputs
             ),
+            "decide": decision_block(self.automaton, self.all),
             "keep": self._keep(),
             "start": self._start(),
             "derive": derive_block(self.automaton),
@@ -207,6 +209,7 @@ class _Sampled:
         found.append(Variable("memory.started", "truth", about="the first tick is done"))
         found.append(Variable("memory.faults", "whole", about="latched fault bits"))
         found += action_variables(automaton)
+        found += decision_variables(automaton)
         found += limit_variables(automaton)
         found += invariant_variables(automaton)
         return list({variable.name: variable for variable in found}.values())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
+from language.decision import decided_equations
 from language.limit import HAPPENED, PENDING, latch
 from language.model import Automaton, Region
 from language.operation import Assign, Block, Branch, Choose, FaultBit, Op, Ref, Run, Value, real
@@ -50,6 +51,8 @@ def _jump(automaton: Automaton) -> Block:
     """Guards read the equations after the advance; a transition makes them anew."""
     equations = by_mode(automaton.chart, "equations")
     ops: list[Op] = [equations]
+    if automaton.tables:
+        ops += [Run("decide"), *((equations,) if decided_equations(automaton) else ())]
     if automaton.fault_mode:
         ops += [Assign(HAPPENED, Ref(PENDING)), Assign(PENDING, Value(False))]
     ops += [by_mode(region, "jump") for region in automaton.all_regions]

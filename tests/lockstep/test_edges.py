@@ -125,6 +125,30 @@ equations:
 modes: {{only: {{}}}}
 outputs: [r]
 """,
+    "truth tables": """\
+inputs: {u: {unit: "1"}, go: {type: bool}}
+discrete:
+  level: {initial: -0.0, range: [-1, 400]}
+  kind: {type: enum, values: [low, mid], initial: low}
+  count: {type: int, initial: 0, range: [-5, 5]}
+  fell: {initial: 0}
+  rose: {initial: 0}
+equations: {r: level * 3 + u}
+tables:
+  first:
+    if: {big: u > 1, go: go, rest: not (u <= 1)}
+    rows:
+      "T - T": {level: r / u, kind: mid}
+      "T T F": {level: u}
+      "T F F": {}
+      "F T -": {level: -u, count: count + 3}
+      "F F -": {kind: low, level: previous(r) - 1.0e-308}
+  second: {if: {seen: kind == mid}, rows: {"T": {}, "F": {fell: rose}}}
+  third: {if: {any: kind == low}, rows: {"-": {rose: level - r}}}
+modes: {a: {transitions: {b: {when: kind == mid}}}, b: {transitions: {a: {when: count > 2}}}}
+initial: a
+outputs: [level, kind, count, r, fell, rose, mode]
+""",
     "deep parentheses": f"""\
 inputs: {{u: {{unit: "1"}}}}
 equations: {{r: "{"-(" * 60}u{")" * 60} ^ -3"}}

@@ -1,0 +1,69 @@
+"""Truth table reader: conditions by name, and rows like `"T F -": {permit: false}`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from language.declaration import Formula
+from language.document import Entry, Node, Table
+from language.model import TruthRow, TruthTable
+from language.problem import nearest
+from language.reader import Reader
+
+MARKS: Mapping[str, bool | None] = {"T": True, "F": False, "-": None}
+MOST_CONDITIONS = 16
+"""Conditions of a table: the search for an undecided row looks at 2^16 at most."""
+
+
+class TruthTableReader(Reader):
+    """Reads the section `tables` of an automaton; `discrete` is what its rows may write."""
+
+    discrete: tuple[str, ...] = ()
+
+    def tables(self, tree: Table) -> tuple[TruthTable, ...]:
+        """Return the tables in the order of the file."""
+        self.discrete = tuple(self.table(tree.get("discrete"), "discrete").entries)
+        node = tree.get("tables")
+        return tuple(self._table(entry) for entry in self.named(node, "tables"))
+
+    def _table(self, entry: Entry) -> TruthTable:
+        key = f"tables.{entry.key}"
+        body = self.table(entry.node, key, ("if", "rows"))
+        conditions = self._formulas(body.get("if"), f"{key}.if")
+        for what in ("if", "rows"):
+            if not self.table(body.get(what), what).entries:
+                label = f"a truth table has at least one entry in `{what}`"
+                self.problems.error("missing", entry.span, label)
+        if len(conditions) > MOST_CONDITIONS:
+            label = f"`{entry.key}` has {len(conditions)} conditions"
+            hint = f"a truth table has at most {MOST_CONDITIONS}: split it"
+            self.problems.error("huge", entry.span, label, hint)
+        rows = tuple(
+            self._row(row, key, len(conditions))
+            for row in self.table(body.get("rows"), f"{key}.rows")
+        )
+        return TruthTable(entry.key, conditions, rows, key, entry.span)
+
+    def _row(self, entry: Entry, key: str, width: int) -> TruthRow:
+        marks = entry.key.split()
+        if len(marks) != width or not all(mark in MARKS for mark in marks):
+            label = f"`{entry.key}` is no row of {width} conditions"
+            hint = "one of `T`, `F` or `-` for each, with blanks between, in the order of `if`"
+            self.problems.error("table", entry.span, label, hint)
+            marks = ["-"] * width
+        results = self._formulas(entry.node, f"{key}.rows.{entry.key}")
+        for written in self.table(entry.node, entry.key):
+            if written.key not in self.discrete:
+                label = f"`{written.key}` is not a discrete variable"
+                hint = nearest(written.key, self.discrete) or "declare it under `discrete`"
+                self.problems.error("name", written.span, label, hint)
+        name = " ".join(marks)
+        return TruthRow(name, tuple(MARKS[mark] for mark in marks), results, entry.span)
+
+    def _formulas(self, node: Node | None, key: str) -> dict[str, Formula]:
+        found = {}
+        for entry in self.named(node, key):
+            formula = self.expression(entry.node, f"{key}.{entry.key}", entry.span)
+            if formula:
+                found[entry.key] = formula
+        return found
