@@ -32,6 +32,8 @@ CODES: Mapping[str, tuple[str, str]] = {
     "unwritten": ("MW207", "A variable is written nowhere."),
     "faults": ("MW208", "There are more fault bits than a word holds."),
     "rewind": ("MW209", "A transition cannot go back in time like this."),
+    "overlap": ("MW220", "Two rows of a truth table hold together."),
+    "incomplete": ("MW221", "A table says nothing of some case."),
     # Expressions, units, values.
     "expression": ("MW301", "A text is not an expression."),
     "power": ("MW302", "An exponent is not a small whole number."),
