@@ -16,7 +16,7 @@ from language.number import NUMBERS, NumberType
 from language.observer import METHODS
 from language.overlay import lay, without
 from language.problem import Problems, nearest
-from language.project import Project, expanded, read_document
+from language.project import Project, expanded
 from language.reader import Reader, about_of
 from language.region import with_regions
 from language.table import TableReader, section
@@ -79,7 +79,7 @@ def _with_model(
     own = _parameters(tree)
     if not isinstance(node, Scalar):
         return _set_values(tree, own, values, own, problems), None
-    base = expanded(read_document(project.path_of(node.text, node.span)), project, problems)
+    base = expanded(project.read(project.path_of(node.text, node.span)), project, problems)
     if base.root.get("model") is not None:
         label = f"`{base.name}` has a `model` itself: a model is a continuous automaton"
         problems.error("model", node.span, label)

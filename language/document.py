@@ -114,5 +114,9 @@ def read_text(path: Path, shown: str | None = None) -> tuple[Source, str]:
         place = Span(Source(name), line, 1)
         problems.error("binary", place, "this is not UTF-8 text", "save it as UTF-8")
         raise SpecError(problems.found) from None
-    lines = LINE_END.split(text.removesuffix("\n")) if text else []
-    return Source(name, tuple(lines)), text
+    return Source(name, lines_of(text)), text
+
+
+def lines_of(text: str) -> tuple[str, ...]:
+    """Return the lines of a text as YAML counts them, without their ends."""
+    return tuple(LINE_END.split(text.removesuffix("\n"))) if text else ()

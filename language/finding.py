@@ -10,7 +10,7 @@ from functools import cached_property
 from importlib import resources
 from pathlib import Path
 
-from language.document import Document, Scalar, Table, read_text
+from language.document import Document, Scalar, Table, lines_of, read_text
 from language.inside import exists, require_inside
 from language.problem import Problems, Source, Span, SpecError, nearest
 from language.yaml_tree import parse
@@ -23,10 +23,13 @@ VERSION = "1"
 
 @dataclass(frozen=True)
 class Project:
-    """A folder whose `spec/` is searched first, before the specs that are shipped."""
+    """A folder whose `spec/` is searched first, before the specs that are shipped.
+
+    `texts` are those of an editor, by resolved path: they stand for what is on the disk.
+    """
 
     root: Path
-    files: list[Path] = field(default_factory=list, repr=False)
+    texts: Mapping[Path, str] = field(default_factory=dict, repr=False)
 
     @cached_property
     def index(self) -> dict[str, list[Path]]:
@@ -55,9 +58,14 @@ class Project:
                         own.setdefault(name, [path])
         return own
 
+    def read(self, path: Path) -> Document:
+        """Return the document of a file, in an editor's text where it is open. Raises SpecError."""
+        text = self.texts.get(path.resolve()) if self.texts else None
+        return read_document(path) if text is None else document_of(source_of(path, text), text)
+
     def effect(self, name: str, span: Span) -> Document:
         """Return the document of an effect. Raises SpecError."""
-        return read_document(self._one_of(self.effects, name, span, "effect"))
+        return self.read(self._one_of(self.effects, name, span, "effect"))
 
     def path_of(self, reference: str, span: Span | None = None) -> Path:
         """Return the file of a name or path. Raises SpecError for none or several."""
@@ -102,6 +110,11 @@ def read_document(path: Path) -> Document:
     """Read one file and its head. Raises SpecError."""
     source, text = read_text(path, shown(path))
     return document_of(source, text)
+
+
+def source_of(path: Path, text: str) -> Source:
+    """Return the source of a text that an editor shows of a file."""
+    return Source(shown(path), lines_of(text))
 
 
 def document_of(source: Source, text: str) -> Document:

@@ -13,7 +13,7 @@ from language.hoist import hoisted
 from language.model import Automaton
 from language.problem import Problems, Source, Span
 from language.program import Program
-from language.project import Project, read_document
+from language.project import Project
 from language.sampled import sampled_program
 
 
@@ -35,7 +35,7 @@ def load_automaton(
     reference: str, project: Project, values: Mapping[str, Scalar] | None = None
 ) -> Automaton:
     """Return the checked automaton of a name or path. Raises SpecError with all problems."""
-    return automaton_of(read_document(project.path_of(reference)), project, values)
+    return automaton_of(project.read(project.path_of(reference)), project, values)
 
 
 def program_of(automaton: Automaton, varying: Collection[str] = ()) -> Program:

@@ -72,7 +72,7 @@ def _layers(document: Document, project: Project) -> list[Document]:
     found = [document]
     while found[-1].kind == "variant":
         extends = _extends(found[-1])
-        base = read_document(project.path_of(extends.text, extends.span))
+        base = project.read(project.path_of(extends.text, extends.span))
         found.append(base)
         names = [layer.name for layer in found]
         problems = Problems()
@@ -117,7 +117,7 @@ def parameters_of(tree: Table, project: Project) -> dict[str, Table]:
     found: dict[str, Table] = {}
     model = tree.get("model")
     if isinstance(model, Scalar):
-        base = expanded(read_document(project.path_of(model.text, model.span)), project)
+        base = expanded(project.read(project.path_of(model.text, model.span)), project)
         found = parameters_of(without(base.root, "model"), project)
     for entry in entries(tree.get("parameters")):
         if isinstance(entry.node, Table):
@@ -134,7 +134,7 @@ def _finished(made: Document, layer: Document, project: Project, problems: Probl
     root = without(made.root, "calibrations")
     names = Reader(problems).items(node, "calibrations")
     for name in names:
-        document = read_document(project.path_of(name.text, name.span))
+        document = project.read(project.path_of(name.text, name.span))
         calibration = read_calibration(document, problems)
         known = [*lineage(layer, project), made.name, *_models(root, project)]
         if made.kind == "automaton" and calibration.of.text in known:
@@ -152,7 +152,7 @@ def _models(tree: Table, project: Project) -> list[str]:
     model = tree.get("model")
     if not isinstance(model, Scalar):
         return []
-    return lineage(read_document(project.path_of(model.text, model.span)), project)
+    return lineage(project.read(project.path_of(model.text, model.span)), project)
 
 
 def _calibrated_system(
@@ -165,7 +165,7 @@ def _calibrated_system(
         of = entry.node.get("of") if isinstance(entry.node, Table) else None
         if not isinstance(of, Scalar):
             continue
-        document = read_document(project.path_of(of.text, of.span))
+        document = project.read(project.path_of(of.text, of.span))
         mine = calibration.of.text in lineage(document, project)
         fits = fits or mine
         for name in parameters_of(expanded(document, project).root, project):

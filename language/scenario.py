@@ -14,7 +14,7 @@ from language.literal import constant
 from language.map import MAP_KEYS, column_dimension, map_of
 from language.page import read_pages
 from language.problem import Problems, Span, nearest
-from language.project import Project, expanded, read_document
+from language.project import Project, expanded
 from language.signal import Piece, RecordingUse, Stimulus
 from language.stimulus import StimulusReader
 from language.syntax import Application, Name, Tree
@@ -99,7 +99,7 @@ class _ScenarioReader(StimulusReader):
                     self.problems.error("form", table.entries[key].span, label)
             with self.problems.collecting():
                 other = expanded(
-                    read_document(self.project.path_of(named.text, named.span)), self.project
+                    self.project.read(self.project.path_of(named.text, named.span)), self.project
                 )
                 return self._use(file, map_of(other.root, other.name, named.span, self.problems))
             return None

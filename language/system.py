@@ -15,7 +15,7 @@ from language.load import automaton_of
 from language.model import Automaton
 from language.number import NumberType
 from language.problem import Problems, Span, SpecError, nearest
-from language.project import Project, expanded, read_document
+from language.project import Project, expanded
 from language.reader import Reader
 from language.units import SECOND, fits
 
@@ -161,7 +161,7 @@ class _SystemReader(Reader):
         if wanted not in self.read_before:
             path = self.project.path_of(of.text, of.span)
             if path not in self.documents:
-                self.documents[path] = read_document(path)
+                self.documents[path] = self.project.read(path)
             made = automaton_of(self.documents[path], self.project, values)
             self.read_before[wanted] = made
         return self.read_before[wanted]

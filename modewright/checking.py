@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ from language.load import automaton_of, lowered
 from language.map import read_map
 from language.numbers_text import motion_lines
 from language.problem import Problem, Problems, SpecError, ordered
-from language.project import Project, expanded, read_document, with_calibrations
+from language.project import Project, expanded, with_calibrations
 from language.scenario import read_scenario
 from language.system import read_system
 from sweep.study_reader import read_study
@@ -33,13 +33,18 @@ def check(reference: str, root: Path | None = None) -> list[Problem]:
     return list(checked(reference, root).problems)
 
 
-def checked(reference: str, root: Path | None = None) -> Checked:
-    """Return all problems of a spec, and the largest stable step of each mode of an automaton."""
-    project = Project(root or Path())
+def checked(
+    reference: str, root: Path | None = None, texts: Mapping[Path, str] | None = None
+) -> Checked:
+    """Return all problems of a spec, and the largest stable step of each mode of an automaton.
+
+    `texts` are those of an editor, by resolved path: they stand for what is on the disk.
+    """
+    project = Project(root or Path(), texts or {})
     problems = Problems()
     limits: tuple[str, ...] = ()
     try:
-        document = read_document(project.path_of(reference))
+        document = project.read(project.path_of(reference))
         is_calibration = document.kind == "calibration"
         if is_calibration:
             document = _calibrated(document, reference, project, problems)
@@ -73,7 +78,7 @@ def _calibrated(
     """Return what a calibration is of, calibrated by it: so its values are checked there."""
     of = read_calibration(document, problems).of
     problems.stop_if_any()
-    base = read_document(project.path_of(of.text, of.span))
+    base = project.read(project.path_of(of.text, of.span))
     return with_calibrations(base, [str(project.path_of(reference))], reference)
 
 
@@ -102,10 +107,10 @@ def problem_json(problem: Problem) -> dict[str, Any]:
 
 
 def _check_scenario(reference: str, project: Project) -> None:
-    document = read_document(project.path_of(reference))
+    document = project.read(project.path_of(reference))
     node = expanded(document, project).root.get("of")
     if isinstance(node, Scalar):
-        system = read_system(read_document(project.path_of(node.text, node.span)), project)
+        system = read_system(project.read(project.path_of(node.text, node.span)), project)
         read_scenario(document, project, system)
         return
     problems = Problems()

@@ -12,7 +12,7 @@ from typing import Any
 from language.document import Document, Entry, Items, Node, Scalar, Table
 from language.experiment import Scenario, System
 from language.problem import Problems, Span, nearest
-from language.project import Project, expanded, read_document
+from language.project import Project, expanded
 from language.reader import TEXT_KEYS, Reader
 from language.scenario import read_scenario
 from language.system import Overrides, around, read_system
@@ -139,7 +139,7 @@ class _StudyReader(Reader):
         return self._system(entry.key, of, given)
 
     def _known_instance(self, of: Scalar, item: Entry) -> None:
-        base = expanded(read_document(self.project.path_of(of.text, of.span)), self.project)
+        base = expanded(self.project.read(self.project.path_of(of.text, of.span)), self.project)
         node = base.root.get("instances")
         known = list(node.entries) if isinstance(node, Table) else []
         if item.key not in known:
@@ -147,7 +147,7 @@ class _StudyReader(Reader):
             self.problems.error("name", item.span, label, nearest(item.key, known))
 
     def _system(self, name: str, of: Scalar, given: Mapping[str, Scalar]) -> System:
-        document = read_document(self.project.path_of(of.text, of.span))
+        document = self.project.read(self.project.path_of(of.text, of.span))
         if given:
             document = expanded(document, self.project)
             for instance, automaton in given.items():
@@ -170,7 +170,7 @@ class _StudyReader(Reader):
             if item.text in found:
                 self.problems.error("duplicate", item.span, f"`{item.text}` is given twice")
             with self.problems.collecting():
-                document = read_document(self.project.path_of(item.text, item.span))
+                document = self.project.read(self.project.path_of(item.text, item.span))
                 found[item.text] = expanded(document, self.project)
                 plain = _plain(found[item.text].root, TEXT_KEYS)
                 self.identity[f"scenario `{item.text}`"] = _digest(plain)

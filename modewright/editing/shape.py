@@ -10,7 +10,10 @@ from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 
-import yaml
+from language.document import Items, Scalar, Table, lines_of
+from language.problem import Source
+from language.tree import entries
+from language.yaml_tree import parse
 
 WORDS = ("name", "text", "literal", "expression", "balance", "unit", "whole", "truth")
 """What a single value may be."""
@@ -103,30 +106,37 @@ def shapes() -> Mapping[str, Shape]:
     found: dict[str, Shape] = {}
     for file in sorted(folder.iterdir(), key=lambda file: file.name):
         if file.name.endswith(".yaml"):
-            written = yaml.load(file.read_text("utf-8"), Loader=yaml.CSafeLoader)
-            for name, body in written.items():
-                found[name] = _shape(name, body)
+            text = file.read_text("utf-8")
+            for entry in parse(Source(file.name, lines_of(text)), text):
+                assert isinstance(entry.node, Table)
+                found[entry.key] = _shape(entry.key, entry.node)
     return found
 
 
-def _shape(name: str, body: Mapping[str, object]) -> Shape:
-    keys = body.get("keys", {})
-    when = body.get("when", {})
-    assert isinstance(keys, dict) and isinstance(when, dict)
-    read = [_key(key, text) for key, text in keys.items()]
+def _shape(name: str, body: Table) -> Shape:
+    keys = [_key(key, text) for key, text in _texts(body, "keys")]
+    about = body.get("about")
     return Shape(
         name=name,
-        about=str(body["about"]),
-        keys={key.name: key for key in (*read, *(EVERYWHERE if read else ()))},
-        needs=_words(body.get("needs")),
-        when=tuple((str(key), str(word)) for key, word in when.items()),
-        either=_words(body.get("either")),
-        over=_words(body.get("over")),
+        about=about.text if isinstance(about, Scalar) else "",
+        keys={key.name: key for key in (*keys, *(EVERYWHERE if keys else ()))},
+        needs=_words(body, "needs"),
+        when=tuple(_texts(body, "when")),
+        either=_words(body, "either"),
+        over=_words(body, "over"),
     )
 
 
-def _words(node: object) -> tuple[str, ...]:
-    return tuple(map(str, node)) if isinstance(node, list) else ()
+def _texts(body: Table, key: str) -> Iterator[tuple[str, str]]:
+    for entry in entries(body.get(key)):
+        if isinstance(entry.node, Scalar):
+            yield entry.key, entry.node.text
+
+
+def _words(body: Table, key: str) -> tuple[str, ...]:
+    node = body.get(key)
+    items = node.nodes if isinstance(node, Items) else ()
+    return tuple(item.text for item in items if isinstance(item, Scalar))
 
 
 def _key(name: str, text: str) -> Key:
