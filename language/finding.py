@@ -15,9 +15,20 @@ from language.inside import exists, require_inside
 from language.problem import Problems, Source, Span, SpecError, nearest
 from language.yaml_tree import parse
 
-KINDS = ("automaton", "system", "scenario", "map", "variant", "effect", "calibration", "study")
-LATER_KINDS = ("test",)
-HEAD = re.compile(rf"^({'|'.join(KINDS + LATER_KINDS)}):\s*([^\s#]+)", re.MULTILINE)
+KINDS = (
+    "automaton",
+    "system",
+    "scenario",
+    "map",
+    "variant",
+    "effect",
+    "calibration",
+    "study",
+    "test",
+)
+HEAD = re.compile(rf"^({'|'.join(KINDS)}):\s*([^\s#]+)", re.MULTILINE)
+INSIDE = {"test": ("scenario",)}
+"""Kinds that are keys, too, of a file of another kind."""
 VERSION = "1"
 
 
@@ -122,7 +133,8 @@ def document_of(source: Source, text: str) -> Document:
     root = parse(source, text)
     problems = Problems()
     _check_version(root, problems)
-    heads = [entry for entry in root if entry.key in KINDS + LATER_KINDS]
+    inside = [key for kind, keys in INSIDE.items() if kind in root.entries for key in keys]
+    heads = [entry for entry in root if entry.key in KINDS and entry.key not in inside]
     if not heads:
         first = next(iter(root), None)
         span = first.span if first else root.span
@@ -131,9 +143,6 @@ def document_of(source: Source, text: str) -> Document:
     elif len(heads) > 1:
         label = f"one file holds one thing: `{heads[0].key}` is given too"
         problems.error("form", heads[1].span, label)
-    elif heads[0].key in LATER_KINDS:
-        label = f"`{heads[0].key}` files are not read by this version"
-        problems.error("form", heads[0].span, label)
     elif not isinstance(heads[0].node, Scalar):
         problems.error("form", heads[0].span, f"`{heads[0].key}` is followed by a name")
     problems.stop_if_any()
@@ -164,4 +173,6 @@ def _heads_in(path: Path) -> list[tuple[str, str]]:
         text = path.read_text("utf-8", errors="replace")[:65536]
     except OSError:
         return []
-    return [(match.group(1), match.group(2).strip("'\"")) for match in HEAD.finditer(text)]
+    found = [(match.group(1), match.group(2).strip("'\"")) for match in HEAD.finditer(text)]
+    inside = [key for kind, _ in found for key in INSIDE.get(kind, ())]
+    return [(kind, name) for kind, name in found if kind not in inside]

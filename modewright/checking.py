@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from expectation.reader import read_test
 from language.calibration import read_calibration
 from language.document import Document, Scalar
 from language.effect import read_effect
@@ -65,6 +66,8 @@ def checked(
             problems.stop_if_any()
         elif base.kind == "study":
             read_study(document, project, problems=problems)
+        elif base.kind == "test":
+            read_test(document, project, problems)
         else:
             _check_scenario(reference, project)
     except SpecError as error:

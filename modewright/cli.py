@@ -31,6 +31,7 @@ from modewright.commands.replay import replay
 from modewright.commands.schema import schema
 from modewright.commands.simulate import simulate
 from modewright.commands.sweep import sweep
+from modewright.commands.test import test
 from modewright.console import configure
 from modewright.exits import EXIT_CODES, exit_code
 from modewright.files import require_writable
@@ -38,8 +39,8 @@ from modewright.files import require_writable
 YOUNG_OBJECTS = 100_000
 """New objects after which garbage is looked for: trees of expressions have no circles."""
 COMMANDS = (
-    new, check, diagnose, fit, effects, simulate, sweep, lockstep, replay, plot, compare, graph,
-    generate, explain, schema, demo, doctor,
+    new, check, test, diagnose, fit, effects, simulate, sweep, lockstep, replay, plot, compare,
+    graph, generate, explain, schema, demo, doctor,
 )  # fmt: skip
 
 app = typer.Typer(

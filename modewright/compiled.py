@@ -48,6 +48,20 @@ def run(system: System, scenario: Scenario, compiled: bool | None = None) -> tup
     return simulate(system, scenario, programs=programs), f"interpreter: {means}"
 
 
+def run_in_c(system: System, scenario: Scenario) -> tuple[Trajectory, str]:
+    """Return the trajectory of a run by compiled C: whole, or block by block where that is not all.
+
+    Raises ToolMissing, BuildError.
+    """
+    scenario = resolved(system, scenario)
+    programs = programs_of(system, scenario)
+    found, means = _in_c(system, scenario, programs)
+    if found:
+        return found, means
+    found = simulate(system, scenario, CompiledStepper, programs=programs)
+    return found, f"compiled, block by block: {means}"
+
+
 def _in_c(
     system: System, scenario: Scenario, programs: Mapping[str, Program]
 ) -> tuple[Trajectory | None, str]:

@@ -6,7 +6,16 @@ import os
 import sys
 from importlib.util import module_from_spec, spec_from_file_location
 
-NEIGHBOURS = ("language", "engine", "codegen", "lockstep", "sweep", "diagnosis", "spec")
+NEIGHBOURS = (
+    "language",
+    "engine",
+    "codegen",
+    "expectation",
+    "lockstep",
+    "sweep",
+    "diagnosis",
+    "spec",
+)
 
 
 def claim_neighbours() -> None:

@@ -7,21 +7,12 @@ from fractions import Fraction
 from typing import Literal
 
 from language.declaration import Formula
+from language.event_name import EventName
 from language.problem import Span
 
 SignalKind = Literal["peak", "max", "min", "mean", "rms", "final", "settling", "frequency"]
 Bound = Fraction | str | None
 """An end of a window: a time [s], the name of an earlier measure, or none."""
-
-
-@dataclass(frozen=True)
-class EventName:
-    """The entry of a mode of an instance, from any mode or from `source` alone."""
-
-    instance: str
-    region: str
-    target: str
-    source: str = ""
 
 
 @dataclass(frozen=True)

@@ -6,24 +6,22 @@ import dataclasses
 from collections.abc import Sequence
 from fractions import Fraction
 
-from language.connection import output_kinds
 from language.declaration import Formula
-from language.declared import declared_kind
 from language.dimension import DimensionCheck, Scope
 from language.document import Entry, Node, Scalar, Table
+from language.event_name import EventName, read_event
 from language.experiment import System
 from language.kind import Kind, Whole
 from language.problem import Problems, Span, nearest
 from language.reader import Reader
 from language.rewrite import reads, renamed
+from language.signal_kind import signal_kinds
 from language.syntax import Name
 from language.units import NUMBER, SECOND, Dimension, Unit, fits, product
-from sweep.event_reader import read_event
 from sweep.measure import (
     Bound,
     DelayMeasure,
     EventMeasure,
-    EventName,
     MatchMeasure,
     Measure,
     SignalKind,
@@ -248,17 +246,3 @@ class MeasureReader(Reader):
         return ValueMeasure(entry.key, formula, str(self._last), entry.span, is_truth)
 
     _last: Dimension = NUMBER
-
-
-def signal_kinds(system: System) -> dict[str, Kind]:
-    """Return what each signal of a system is: inputs, outputs of instances, sensors, outputs."""
-    found: dict[str, Kind] = {name: declared_kind(thing) for name, thing in system.inputs.items()}
-    for instance in system.instances.values():
-        found.update(output_kinds(instance))
-    found.update({name: sensor.dimension for name, sensor in system.sensors.items()})
-    for name, output in system.outputs.items():
-        if isinstance(output, str) and output in found:
-            found[name] = found[output]
-        elif name in system.dimensions:
-            found[name] = system.dimensions[name]
-    return found

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.batch import NO_EVENT, BatchResult, EventKind
-from sweep.measure import EventName
+from language.event_name import EventName
 
 Reals = NDArray[np.float64]
 

@@ -35,6 +35,13 @@ def test_the_study_on_its_page_has_no_problem(tmp_path: Path) -> None:
     assert mw.check(str(spec)) == []
 
 
+def test_the_test_on_its_page_has_no_problem(tmp_path: Path) -> None:
+    text = re.findall(r"```yaml\n(.*?)```", (ROOT / "docs/testing.md").read_text(), re.DOTALL)[0]
+    spec = tmp_path / "test.yaml"
+    spec.write_text(text)
+    assert mw.check(str(spec)) == []
+
+
 def test_every_command_in_the_readme_exists() -> None:
     used = set(re.findall(r"`modewright (\w+) ", README))
     assert used == set(re.findall(r"\| `modewright (\w+)", README))
@@ -54,6 +61,7 @@ def test_every_command_in_the_readme_exists() -> None:
         "docs/benchmark.md",
         "docs/diagnosis.md",
         "docs/editing.md",
+        "docs/testing.md",
     ],
 )
 def test_every_file_that_a_page_names_exists(page: str) -> None:

@@ -16,7 +16,17 @@ import pytest
 ROOT = Path(__file__).parent.parent
 TRACE = ROOT / "tests" / "data" / "paper" / "est_paper_tip_out_1kHz.csv.gz"
 BUILD = "import sys; from setuptools.build_meta import build_wheel; build_wheel(sys.argv[1])"
-HOSTILE = ("spec", "engine", "codegen", "language", "lockstep", "sweep", "diagnosis", "tests")
+HOSTILE = (
+    "spec",
+    "engine",
+    "codegen",
+    "language",
+    "expectation",
+    "lockstep",
+    "sweep",
+    "diagnosis",
+    "tests",
+)
 
 
 @pytest.fixture(scope="module")

@@ -139,7 +139,10 @@ def test_a_file_of_a_project_that_is_no_yaml_hides_no_other(tmp_path: Path) -> N
             "language: 1\nautomaton: a\nsystem: b\n",
             ["3:1 one file holds one thing: `automaton` is given too"],
         ),
-        ("language: 1\ntest: a\n", ["2:1 `test` files are not read by this version"]),
+        (
+            "language: 1\nscenario: a\nsystem: b\n",
+            ["3:1 one file holds one thing: `scenario` is given too"],
+        ),
         ("language: 1\nautomaton: {a: 1}\n", ["2:1 `automaton` is followed by a name"]),
         ("{}", ["1:1 `language: 1` is missing", "1:1 the file does not say what it holds"]),
     ],

@@ -21,7 +21,16 @@ from tests.open_generator.short import largest_change, short
 WEAK = 0.1
 NOISE_SHARE = 0.1
 """Doubling the step may move a speed by this share of the noise: the step itself by a quarter."""
-OWN_FLOORS = ("language", "engine", "codegen", "lockstep", "sweep", "diagnosis", "modewright")
+OWN_FLOORS = (
+    "language",
+    "engine",
+    "codegen",
+    "expectation",
+    "lockstep",
+    "sweep",
+    "diagnosis",
+    "modewright",
+)
 
 
 def ran(cases: Sequence[Case], step: float = STEP) -> list[list[Course]]:

@@ -8,7 +8,16 @@ from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).parent.parent.parent
-FLOORS = ("language", "engine", "codegen", "lockstep", "sweep", "diagnosis", "modewright")
+FLOORS = (
+    "language",
+    "engine",
+    "codegen",
+    "expectation",
+    "lockstep",
+    "sweep",
+    "diagnosis",
+    "modewright",
+)
 KIND = re.compile(r"[a-z]+(-[a-z]+)*")
 """Loggers have `warning` too: their messages are no kinds."""
 REPORTERS = {"error": 0, "warning": 0, "Problem": 0}

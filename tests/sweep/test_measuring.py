@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from language.event_name import EventName
 from language.model import CHART
 from language.problem import Source, Span
 from sweep.measure import (
     DelayMeasure,
     EventMeasure,
-    EventName,
     MatchMeasure,
     SignalMeasure,
 )

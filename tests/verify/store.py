@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-CODE = ("language", "engine", "codegen", "lockstep", "sweep", "modewright", "spec")
+CODE = ("language", "engine", "codegen", "expectation", "lockstep", "sweep", "modewright", "spec")
 DIAGNOSIS = 5
 """The issue from which on figures depend on `diagnosis/` too."""
 SUFFIXES = (".py", ".yaml", ".lark", ".jinja", ".txt")

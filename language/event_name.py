@@ -1,12 +1,23 @@
-"""Event reader: the name of an event in a study - the entry of a mode, from one mode or any."""
+"""Event name: the entry of a mode of an instance, from one mode or any."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 from language.document import Scalar
 from language.experiment import System
 from language.model import CHART
 from language.problem import Problems, nearest
-from sweep.measure import EventName
+
+
+@dataclass(frozen=True)
+class EventName:
+    """The entry of a mode of an instance, from any mode or from `source` alone."""
+
+    instance: str
+    region: str
+    target: str
+    source: str = ""
 
 
 def read_event(scalar: Scalar, system: System, problems: Problems) -> EventName | None:

@@ -1,0 +1,213 @@
+"""Condition: an expression of a test, its modes and running numbers found and checked."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from fractions import Fraction
+from typing import Any
+
+from expectation.expected import Condition, Place, Running, Stay
+from language.declaration import Formula
+from language.dimension import DimensionCheck, Scope
+from language.document import Scalar
+from language.event_name import modes_of
+from language.experiment import System
+from language.kind import Enumeration, Kind, Whole
+from language.model import CHART
+from language.problem import Problems, nearest
+from language.signal_kind import signal_kinds
+from language.syntax import Application, Broken, Name, Not, Number, Relation, Tree
+from language.units import NUMBER, SECOND, fits
+
+RUNNING = ("count", "first", "rms")
+MODES_HINT = (
+    "compare it with the name of a mode, like `est.mode == drive`, or write `in(est.drive)`"
+)
+
+
+class ConditionReader:
+    """Reads the expressions of a test over the signals and modes of a system."""
+
+    def __init__(self, problems: Problems, system: System) -> None:
+        """Report into `problems`."""
+        self.problems = problems
+        self.system = system
+        self.kinds = signal_kinds(system)
+        self.modes = modes_of(system)
+        self.regions = _regions(system)
+        self.literals = _literals(self.kinds)
+
+    def condition(self, scalar: Scalar, formula: Formula) -> Condition | None:
+        """Return a condition; None with the problem reported."""
+        return self._read(scalar.text, formula.tree, formula.key, truth=True)
+
+    def _read(self, text: str, tree: Tree, key: str, truth: bool) -> Condition | None:
+        told = len(self.problems.found)
+        found = _Found(self)
+        made = found.resolved(tree)
+        if len(self.problems.found) > told:
+            return None
+        names: dict[str, Kind | None] = {**found.signals, **found.kinds}
+        names.update({name: kind for name, (kind, _) in self.literals.items()})
+        check = DimensionCheck(Scope(names, place="in a test"), self.problems)
+        kind = check.kind(made)
+        if kind is not None and truth and kind != "truth":
+            label = f"`{text}` is a quantity: what is expected is the case or not"
+            self.problems.error("type", tree.span, label, "compare it: `x > 0`")
+        if kind == "truth" and not truth:
+            label = "`rms` is of a quantity, this is true or false"
+            self.problems.error("type", tree.span, label)
+        if len(self.problems.found) > told:
+            return None
+        literals = {name: place for name, (_, place) in self.literals.items()}
+        return Condition(
+            Formula(made, key), text, found.signals, found.stays, found.running, literals,
+            kind or NUMBER,
+        )  # fmt: skip
+
+    def full(self, name: str) -> str:
+        """Return a signal's whole name: in a test of an automaton it stands alone."""
+        alone = self.system.alone
+        if alone and "." not in name and f"{alone}.{name}" in {**self.kinds, **self.regions}:
+            name = f"{alone}.{name}"
+        output = self.system.outputs.get(name)
+        return output if isinstance(output, str) and output in self.regions else name
+
+    def inner(self, text: str, tree: Tree, truth: bool) -> Condition | None:
+        """Return what a running number reads; None with the problem reported."""
+        return self._read(text, tree, "running", truth)
+
+
+class _Found:
+    """What one expression reads, found on the way through it."""
+
+    def __init__(self, reader: ConditionReader) -> None:
+        self.reader = reader
+        self.problems = reader.problems
+        self.signals: dict[str, Kind] = {}
+        self.stays: dict[str, Stay] = {}
+        self.running: dict[str, Running] = {}
+        self.kinds: dict[str, Kind] = {}
+
+    def resolved(self, tree: Tree) -> Tree:
+        """Return a tree in which modes and running numbers are names."""
+        match tree:
+            case Relation("==" | "!=", left, right, span):
+                for mode, name in ((left, right), (right, left)):
+                    place = self._region(mode)
+                    if place:
+                        stay = self._compared(place, name)
+                        return stay if tree.operator == "==" else Not(stay, span)
+            case Application("in", arguments, _):
+                return self._in(tree, arguments)
+            case Application(function, _, _) if function in RUNNING:
+                return self._running(tree)
+            case Name():
+                return self._signal(tree)
+        return _rebuilt(tree, self.resolved)
+
+    def _region(self, tree: Tree) -> Place | None:
+        if not isinstance(tree, Name):
+            return None
+        return self.reader.regions.get(self.reader.full(tree.path))
+
+    def _compared(self, place: Place, tree: Tree) -> Tree:
+        region = self.reader.system.instances[place[0]].automaton.region(place[1])
+        if isinstance(tree, Name) and tree.path in region.modes:
+            return self._stay(place, tree.path, tree)
+        said = tree.path if isinstance(tree, Name) else "this"
+        label = f"`{said}` is not a mode of `{place[0]}`"
+        self._error("name", tree, label, nearest(said, region.modes))
+        return Broken(tree.span)
+
+    def _in(self, tree: Application, arguments: tuple[Tree, ...]) -> Tree:
+        path = arguments[0].path if len(arguments) == 1 and isinstance(arguments[0], Name) else ""
+        place = self.reader.modes.get(path)
+        if place is None:
+            label = f"`{path}` is not a mode of an instance of `{self.reader.system.name}`"
+            self._error("name", arguments[0] if arguments else tree, label,
+                        nearest(path, self.reader.modes))  # fmt: skip
+            return Broken(tree.span)
+        return self._stay(place[:2], place[2], tree)
+
+    def _stay(self, place: Place, mode: str, at: Tree) -> Tree:
+        name = f"in {place[0]}.{place[1]}.{mode}"
+        self.stays[name] = Stay(place, frozenset([mode]))
+        self.kinds[name] = "truth"
+        return Name(name, at.span)
+
+    def _running(self, tree: Application) -> Tree:
+        function, arguments = tree.function, tree.arguments
+        most = 2 if function == "rms" else 1
+        if not 1 <= len(arguments) <= most:
+            label = f"`{function}` takes {most} argument(s), not {len(arguments)}"
+            self._error("arguments", tree, label)
+            return Broken(tree.span)
+        since = self._since(arguments[1]) if len(arguments) == 2 else Fraction(0)
+        of: Condition | Place | None = self._region(arguments[0])
+        if of is None or function != "count":
+            of = self.reader.inner(function, arguments[0], truth=function != "rms")
+        if of is None:
+            return Broken(tree.span)
+        name = f"{function} {len(self.running)}"
+        self.running[name] = Running(function, of, since)  # type: ignore[arg-type]
+        self.kinds[name] = Whole(0) if function == "count" else SECOND
+        if function == "rms" and isinstance(of, Condition):
+            self.kinds[name] = of.kind
+        return Name(name, tree.span)
+
+    def _since(self, tree: Tree) -> Fraction:
+        if isinstance(tree, Number) and (fits(tree.unit.dimension, SECOND) or tree.is_bare_zero):
+            return tree.value
+        self._error("number", tree, "the mean begins at a time, like `rms(x, 0.1 s)`")
+        return Fraction(0)
+
+    def _signal(self, tree: Name) -> Tree:
+        name = self.reader.full(tree.path)
+        if name in self.reader.kinds:
+            self.signals[name] = self.reader.kinds[name]
+            return Name(name, tree.span)
+        if name in self.reader.literals:
+            return tree
+        if name in self.reader.regions:
+            self._error("type", tree, f"`{tree.path}` is a mode, not a number", MODES_HINT)
+        else:
+            label = f"`{tree.path}` is not a signal of `{self.reader.system.name}`"
+            known = [*self.reader.kinds, *self.reader.regions]
+            self._error("name", tree, label, nearest(name, known))
+        return Broken(tree.span)
+
+    def _error(self, kind: str, at: Tree, label: str, help: str = "") -> None:
+        self.problems.error(kind, at.span, label, help)
+
+
+def _rebuilt(tree: Tree, change: Callable[[Tree], Tree]) -> Tree:
+    """Return a tree whose parts are changed."""
+    parts: dict[str, Any] = {}
+    for field in dataclasses.fields(tree):
+        value = getattr(tree, field.name)
+        if isinstance(value, Tree):
+            parts[field.name] = change(value)
+        elif field.name == "arguments":
+            parts[field.name] = tuple(change(part) for part in value)
+    return dataclasses.replace(tree, **parts) if parts else tree
+
+
+def _regions(system: System) -> dict[str, Place]:
+    """Return the regions by the signal of their mode: `est.mode`, `est.gap`."""
+    found = {}
+    for name, instance in system.instances.items():
+        for region in instance.automaton.all_regions:
+            signal = "mode" if region.name == CHART else region.name
+            found[f"{name}.{signal}"] = (name, region.name)
+    return found
+
+
+def _literals(kinds: dict[str, Kind]) -> dict[str, tuple[Kind, int]]:
+    """Return the names of enumerations with their kind and number."""
+    found: dict[str, tuple[Kind, int]] = {}
+    for kind in kinds.values():
+        if isinstance(kind, Enumeration):
+            found.update({value: (kind, place) for place, value in enumerate(kind.values)})
+    return found

@@ -1,0 +1,72 @@
+"""Tests of specs are run on the engine and in C; what is told of them."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from modewright import show_tests, tests
+from modewright.cli import app
+from tests.expectation.latching import project
+
+SHIPPED = Path(__file__).parent.parent.parent
+
+
+def test_the_tests_that_are_shipped_pass_on_engine_and_c() -> None:
+    runs = list(tests.run_tests(root=SHIPPED))
+    assert [line for run in runs if not run.passed for line in show_tests.lines_of(run)] == []
+    assert all(run.means.startswith("compiled") for run in runs) and len(runs) >= 2
+
+
+def test_another_verdict_in_c_fails_a_test(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = project(tmp_path, "low: {that: level < 3 V, at: 29 ms}", "ok: {event: high}")
+    original = tests.simulate
+
+    def wrong(system: object, scenario: object) -> object:
+        run = original(system, scenario)  # type: ignore[arg-type]
+        moved = {name: np.nextafter(values, 9.0) for name, values in run.signals.items()}
+        return dataclasses.replace(run, signals=moved), "compiled"
+
+    monkeypatch.setattr(tests, "run_in_c", wrong)
+    (run,) = tests.run_tests([str(path)], tmp_path)
+    assert all(outcome.passed for outcome in run.outcomes) and not run.passed
+    assert run.difference.startswith("`level` at 0 s is")
+
+
+def test_the_command_tells_what_failed_in_every_form(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    project(tmp_path, "met: {event: high, req: L-1}", "late: {event: high, at: 6 ms}")
+    monkeypatch.chdir(tmp_path)
+    told = CliRunner().invoke(app, ["test", "--interpreted", "--junit", "out.xml"])
+    assert told.exit_code == 1
+    place = "spec/test_latched.yaml:9:17"
+    assert f"{place}: late: `high` happened at 0.007 s, expected at 0.006 s" in told.output
+    assert "1 test, 1 failed" in told.output
+    suite = ElementTree.parse("out.xml").getroot()[0]
+    assert suite.attrib["tests"] == "2" and suite.attrib["failures"] == "1"
+    assert [case.find("failure") is not None for case in suite] == [False, True]
+    told = CliRunner().invoke(app, ["test", "latched", "--interpreted", "--json"])
+    (found,) = json.loads(told.stdout)["tests"]
+    assert [each["passed"] for each in found["expectations"]] == [True, False]
+    assert found["expectations"][0]["requirements"] == ["L-1"]
+    assert found["expectations"][1]["time"] == 0.007
+
+
+def test_a_test_that_passes_leaves_with_0(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    project(tmp_path, "met: {event: high}")
+    monkeypatch.chdir(tmp_path)
+    assert CliRunner().invoke(app, ["test", "--interpreted"]).exit_code == 0
+
+
+def test_parameters_are_set_and_rows_are_closer(tmp_path: Path) -> None:
+    head = project(tmp_path).read_text().replace("expect:\n", "every: 0.5 ms\nexpect:\n")
+    path = project(tmp_path, "between: {that: level > 1 V, at: 5.5 ms}", head=head)
+    (run,) = tests.run_tests([str(path)], tmp_path, compiled=False)
+    assert run.passed
