@@ -31,6 +31,8 @@ from language.system import read_system
 from language.units import SECOND, fits
 
 TEST_KEYS = ("language", "test", "scenario", "of", "values", "every", "expect")
+INNER_KEYS = tuple(key for key in SCENARIO_KEYS if key not in ("language", "scenario"))
+"""The keys of a scenario that is written in a test."""
 MOMENTS = ("at", "within", "before", "after", "from", "until")
 KEYS: Mapping[str, tuple[str, ...]] = {
     "that": MOMENTS,
@@ -97,7 +99,7 @@ class _TestReader(Reader):
         """The system and the scenario: named, or with the scenario written here."""
         node, at = tree.get("scenario"), document.name_span
         if isinstance(node, Table):
-            inner = self.table(node, "scenario", SCENARIO_KEYS)
+            inner = self.table(node, "scenario", INNER_KEYS)
             written = Document("scenario", document.name, node.span, inner, document.source)
         else:
             named = self.scalar(node, "scenario", at)

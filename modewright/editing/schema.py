@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from language.finding import KINDS
+from language.finding import INSIDE, KINDS
 from modewright.editing.shape import (
     Choice,
     Either,
@@ -58,10 +58,16 @@ def schema(kind: str | None = None) -> Json:
             "required": ["language"],
             "properties": {"language": {"const": 1, "description": "version of the language"}}
             | heads,
-            "oneOf": [{"required": [name]} for name in KINDS],
-            "allOf": [{"if": {"required": [name]}, "then": _reference(name)} for name in KINDS],
+            "oneOf": [_is(name) for name in KINDS],
+            "allOf": [{"if": _is(name), "then": _reference(name)} for name in KINDS],
         }
     return {**head, **body, "definitions": _definitions(kind)}
+
+
+def _is(name: str) -> Json:
+    """What tells that a file is of a kind, whose name may be a key of other kinds, too."""
+    others = [{"required": [kind]} for kind, keys in INSIDE.items() if name in keys]
+    return {"required": [name], **({"not": {"anyOf": others}} if others else {})}
 
 
 def schema_text(kind: str | None = None) -> str:

@@ -10,6 +10,7 @@ from pathlib import Path
 import jsonschema
 import pytest
 
+from expectation.reader import read_test
 from language.automaton import read_automaton
 from language.calibration import read_calibration
 from language.document import Document, Node, Table
@@ -183,6 +184,8 @@ def _read(document: Document, project: Project) -> None:
                 read_calibration(document, problems)
             case "study":
                 read_study(document, project)
+            case "test":
+                read_test(document, project)
             case "scenario":
                 of = base.root.get("of")
                 assert of is not None
