@@ -72,6 +72,8 @@ from language.wiring import (
     state_variables,
 )
 
+STARTED = Assign("memory.started", Value(True))
+
 
 def sampled_program(automaton: Automaton, problems: Problems) -> Program:
     """Return the Program of a checked sampled automaton. Raises SpecError."""
@@ -257,7 +259,7 @@ class _Sampled:
         ops += enter_initial(self.automaton, "memory.mode")
         if self.automaton.model and any(mode.run for mode in self.automaton.modes.values()):
             ops += start_regions(self.automaton.model)
-        ops.append(Assign("memory.started", Value(True)))
+        ops.append(STARTED)
         ops += enter_run(self.automaton, initial)
         ops += entry(self.automaton, initial, first_entry(self.automaton), self.now)
         starts = [o.start for name, o in self.observers.items() if name == initial.name and o.start]
@@ -270,7 +272,7 @@ class _Sampled:
     def _init(self, stamps: bool) -> Block:
         """Before the first tick: nothing has started."""
         ops: list[Op] = [
-            Assign("memory.started", Value(False)),
+            *((Assign("memory.started", Value(False)),) if self._starts() else ()),
             *enter_initial(self.automaton, "memory.mode"),
             Assign("memory.faults", whole(0)),
             *first_latched(self.automaton),
@@ -280,7 +282,13 @@ class _Sampled:
     def _step(self) -> Block:
         carried = {mode.name: self._carried(mode) for mode in self.automaton.modes.values()}
         found = (name for o in self.observers.values() for name in o.info.measures)
-        return tick_block(self.automaton, carried, dict.fromkeys(found), bool(self._keep()))
+        keeps = bool(self._keep())
+        return tick_block(self.automaton, carried, dict.fromkeys(found), keeps, self._starts())
+
+    def _starts(self) -> bool:
+        """Tell whether the first tick does more than `init` has done, or later ones advance."""
+        entered = (*enter_initial(self.automaton, "memory.mode"), STARTED)
+        return self._start() != entered or any(map(self._carried, self.automaton.modes.values()))
 
     def _keep(self) -> Block:
         """What is kept of a tick once it has jumped."""

@@ -13,9 +13,15 @@ from language.wiring import any_fired, none_fired
 
 
 def tick_block(
-    automaton: Automaton, carried: Mapping[str, Block], measured: Iterable[str], keeps: bool
+    automaton: Automaton,
+    carried: Mapping[str, Block],
+    measured: Iterable[str],
+    keeps: bool,
+    starts: bool,
 ) -> Block:
     """Return `step`: `carried` is the advance of each mode of the chart, `keeps` whether delays do.
+
+    `starts` tells whether the first tick is another one than those after it.
 
     The innovations of the inputs `measured` are 0 unless this tick corrects with them.
     """
@@ -26,7 +32,8 @@ def tick_block(
     if latch(automaton):
         ops.append(Run("latch"))
     ops += [Assign(f"innovation.{name}", real(0.0)) for name in measured]
-    ops.append(Branch(Ref("memory.started"), _advance(automaton, carried), (Run("start"),)))
+    if starts:
+        ops.append(Branch(Ref("memory.started"), _advance(automaton, carried), (Run("start"),)))
     ops += _jump(automaton)
     if keeps:
         ops.append(Run("keep"))

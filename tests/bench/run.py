@@ -15,6 +15,7 @@ import numpy as np
 
 from codegen.build import FLAGS, compiler_version
 from tests.bench import figures
+from tests.bench.charts import charts
 from tests.bench.first_step import first_step
 from tests.bench.rivals import RIVALS, RivalMissing, measured
 from tests.bench.showing import table
@@ -43,6 +44,7 @@ def main(arguments: list[str] | None = None) -> int:
     found: dict[str, Any] = {
         "machine": machine(),
         "single_run": single_run(given.pairs),
+        "chart": charts(given.pairs),
         "first_step": first_step(),
         "sweep": {"batch_over_c": figures.batch_over_c(given.pairs)},
         "accuracy": {

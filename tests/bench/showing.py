@@ -37,11 +37,12 @@ def table(found: Figure) -> list[str]:
         f"{where['compiler']}; {where['flags']}",
         f"Python {where['python']}, numpy {where['numpy']}, scipy {where['scipy']}",
         "",
-        "processor time over the rival's (sweep: variants per second): median (quartiles)",
+        "processor time over the rival's (sweep, chart: rates): median (quartiles)",
     ]
     for group in ("single_run", "sweep"):
         for name, figure in found.get(group, {}).items():
             lines.append(f"  {group + '.' + name:36} {_ratio(figure)}")
+    lines += [_chart(name, figure) for name, figure in found["chart"].items()]
     for name, figure in found["rivals"].items():
         said = figure.get("missing") or f"{_ratio(figure)}, first run {figure['first_run_s']:.1f} s"
         lines.append(f"  {name + ' over scipy':36} {said}")
@@ -68,6 +69,13 @@ def table(found: Figure) -> list[str]:
             for who, errors in sides.items():
                 lines.append(f"  {case + ' at ' + step:24} {who:14} {_errors(errors)}")
     return lines
+
+
+def _chart(name: str, figure: Figure) -> str:
+    own = next(key for key in figure if key.endswith("_ticks_per_s"))
+    spread = f"{figure['median']:.3g} ({figure['low']:.3g} .. {figure['high']:.3g})"
+    rates = f"{figure[own]:,.0f} and {figure['rival_ticks_per_s']:,.0f} ticks a second"
+    return f"  {'chart.' + name:36} {spread:24} {rates}, {figure['pairs']} pairs"
 
 
 def _ratio(figure: Figure) -> str:

@@ -11,7 +11,7 @@ import pytest
 
 from codegen.build import optimised
 from codegen.library import library_of
-from tests.bench import figures, ours, rivals, run, timing, variants
+from tests.bench import charts, figures, ours, rivals, run, timing, variants
 from tests.bench.in_c import HERE, PEERS
 from tests.bench.manoeuvre import Manoeuvre
 
@@ -37,6 +37,7 @@ def test_a_small_run_has_every_figure_with_its_errors(
     monkeypatch.setattr(ours, "library_of", partial(library_of, flags=optimised("O0")))
     monkeypatch.setattr(variants, "library_of", partial(library_of, flags=optimised("O0")))
     monkeypatch.setattr(timing, "SHORTEST", 0.0)
+    monkeypatch.setattr(charts, "TICKS_IN_C", 2000)
     monkeypatch.setattr(run, "first_step", lambda: {"total_s": 1.0, "compiler_s": 0.5})
     path = tmp_path / "bench.json"
     assert run.main(["--pairs", "1", "--out", str(path)]) == 0
@@ -52,6 +53,10 @@ def test_a_small_run_has_every_figure_with_its_errors(
         assert 0.0 < errors["late"] < 1e-6
         assert 0.0 < errors["rms"] <= errors["largest"] < 1e-6
     assert found["single_run"]["compiled_over_c"]["errors"]["compiled"]["largest"] < 1e-6
+    machines = {f"interpreter_over_{name}" for name in charts.MACHINES}
+    assert machines < set(found["chart"])
+    assert found["chart"]["interpreter_over_fastest"]["fastest"] in charts.MACHINES
+    assert found["chart"]["generated_over_c"]["median"] > 0.0
     swept = found["sweep"]["batch_over_c"]
     assert swept["errors"]["batch"]["other_events"] == swept["errors"]["c"]["other_events"] == 0
     assert swept["errors"]["batch"]["late"] < 1e-4
