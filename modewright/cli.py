@@ -24,6 +24,7 @@ from modewright.commands.fit import fit
 from modewright.commands.generate import generate
 from modewright.commands.graph import graph
 from modewright.commands.lockstep import lockstep
+from modewright.commands.lsp import lsp
 from modewright.commands.new import new
 from modewright.commands.plot import plot
 from modewright.commands.recording import recording
@@ -40,7 +41,7 @@ YOUNG_OBJECTS = 100_000
 """New objects after which garbage is looked for: trees of expressions have no circles."""
 COMMANDS = (
     new, check, test, diagnose, fit, effects, simulate, sweep, lockstep, replay, plot, compare,
-    graph, generate, explain, schema, demo, doctor,
+    graph, generate, explain, schema, lsp, demo, doctor,
 )  # fmt: skip
 
 app = typer.Typer(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 
 from language.document import Items, Node, Scalar, Table
 from language.finding import KINDS
@@ -18,8 +19,19 @@ from modewright.editing.shape import (
     shapes,
 )
 
-Place = tuple[Node, Kind]
-"""A node and what it is meant to be."""
+
+@dataclass(frozen=True)
+class Place:
+    """A node, the keys that lead to it, and what it is meant to be."""
+
+    path: tuple[str, ...]
+    node: Node
+    kind: Kind
+
+    @property
+    def section(self) -> str:
+        """The last key on the way, empty for the whole file."""
+        return self.path[-1] if self.path else ""
 
 
 def kind_of_file(root: Table) -> str:
@@ -52,27 +64,27 @@ def places(root: Table, base: str = "") -> Iterator[Place]:
     keys = dict(shape.keys)
     if kind == "variant" and base in shapes():
         keys = {**shapes()[base].keys, **shapes()[kind].keys}
-    yield root, Part(kind)
+    yield Place((), root, Part(kind))
     for entry in root:
         if entry.key in keys:
-            yield from _below(entry.node, keys[entry.key].kind)
+            yield from _below((entry.key,), entry.node, keys[entry.key].kind)
 
 
-def _below(node: Node, kind: Kind) -> Iterator[Place]:
+def _below(path: tuple[str, ...], node: Node, kind: Kind) -> Iterator[Place]:
     kind = fitting(node, kind)
-    yield node, kind
+    yield Place(path, node, kind)
     match node, kind:
         case Table(), Part(name):
             known = shapes()[name].keys
             for entry in node:
                 if entry.key in known:
-                    yield from _below(entry.node, known[entry.key].kind)
+                    yield from _below((*path, entry.key), entry.node, known[entry.key].kind)
         case Table(), MappingOf(item, _):
             for entry in node:
-                yield from _below(entry.node, item)
+                yield from _below((*path, entry.key), entry.node, item)
         case Items(), ListOf(item):
             for part in node.nodes:
-                yield from _below(part, item)
+                yield from _below(path, part, item)
 
 
 def fitting(node: Node, kind: Kind) -> Kind:

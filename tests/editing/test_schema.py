@@ -147,9 +147,9 @@ def test_a_choice_offers_what_the_reader_takes(monkeypatch: pytest.MonkeyPatch) 
 
 
 def _tables(root: Table) -> Iterator[tuple[str, Table]]:
-    for node, kind in places(root):
-        if isinstance(node, Table) and isinstance(kind, Part):
-            yield kind.shape, node
+    for place in places(root):
+        if isinstance(place.node, Table) and isinstance(place.kind, Part):
+            yield place.kind.shape, place.node
 
 
 def _place(span: Span) -> tuple[str, int, int]:

@@ -1,0 +1,22 @@
+"""Command lsp: the language server, started by an editor."""
+
+from __future__ import annotations
+
+import os
+
+from language.missing import ToolMissing
+
+
+def lsp() -> None:
+    """Answer an editor's questions about specs on stdin and stdout (docs/editing.md).
+
+    \b
+    modewright lsp
+    """
+    try:
+        from modewright.lsp.server import language_server
+    except ModuleNotFoundError as error:
+        hint = "pip install 'modewright[lsp]'"
+        raise ToolMissing(f"the language server needs {error.name}: {hint}") from None
+    with os.fdopen(os.dup(0), "rb") as asked, os.fdopen(os.dup(1), "wb") as answered:
+        language_server().start_io(asked, answered)

@@ -1,0 +1,1 @@
+"""Language server: what an editor asks about specs while they are written."""

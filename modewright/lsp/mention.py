@@ -1,0 +1,142 @@
+"""Mention: every place of a spec that names something, and what it names."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from language.problem import Span
+from modewright.lsp.name import Name
+from modewright.lsp.namespace import Declared, Namespace, lookup, namespace
+from modewright.lsp.world import World
+
+PREFIXES = ("initial", "inputs")
+"""What stands before names in studies: `initial.plant.theta_d`, `inputs.T_req.start`."""
+SPECS = ("automaton", "system", "scenario", "map", "calibration", "spec", "effect")
+
+Part = tuple[int, str]
+"""A part of a dotted name: where it begins, and its text."""
+Meaning = Iterator[tuple[Part, Declared | None]]
+
+
+@dataclass(frozen=True)
+class Mention:
+    """A part of a name that stands for something; `path` are the keys that lead to it."""
+
+    declared: Declared
+    span: Span
+    path: tuple[str, ...]
+    is_key: bool
+
+    @property
+    def is_declaration(self) -> bool:
+        """Whether this is where the thing gets its name; an equation does so in several modes."""
+        is_equation = self.is_key and self.path[-2:-1] == ("equations",)
+        return self.span == self.declared.span or (is_equation and self.is_here)
+
+    @property
+    def is_here(self) -> bool:
+        """Whether this stands in the file that declares the thing."""
+        return Path(self.span.source.name).resolve() == self.declared.file
+
+
+def mentions(world: World, path: Path) -> list[Mention]:
+    """Return what a spec names, in the order of the file."""
+    space = namespace(world, path)
+    found = []
+    for name in world.names(path) if space else ():
+        assert space is not None
+        for (offset, part), declared in meaning(world, space, name):
+            if declared:
+                span = name.span.inside(offset, len(part))
+                found.append(Mention(declared, span, name.path, name.is_key))
+    return found
+
+
+def mentions_of(world: World, declared: Declared) -> list[Mention]:
+    """Return where something is named, in the whole project and in the file that declares it."""
+    files = dict.fromkeys((declared.file, *(path for path, _ in world.documents())))
+    return [
+        mention
+        for path in files
+        for mention in mentions(world, path)
+        if mention.declared.identity == declared.identity
+    ]
+
+
+def meaning(world: World, space: Namespace, name: Name) -> Meaning:
+    """Yield the parts of a dotted name with what each stands for."""
+    whole = (0, name.text)
+    if name.of in SPECS:
+        yield whole, _spec(world, space, name)
+    elif name.of == "mode":
+        is_key = name.path[-2:-1] == ("modes",) or name.path[-2:-1] == ("transitions",)
+        last = name.text.rpartition(".")[2]
+        part = (len(name.text) - len(last), last)
+        if is_key and name.path[-2] == "modes":
+            yield part, lookup(space, name.text, name.path[:-2])
+        else:
+            yield part, lookup(space, name.text, name.path[:-1])
+    elif name.of in ("template", "fault", "region"):
+        yield whole, space.names.get((name.of, name.text))
+    else:
+        parts = _parts(name.text)
+        if name.of == "model_mode":
+            yield from _of_model(space, parts)
+            return
+        if name.of == "signal" and "measures" in name.path and space.model:
+            space = space.model
+        if name.path[:1] == ("instances",) and name.path[2:3] == ("values",):
+            space = space.instances.get(name.path[1], space)
+        if space.document.kind == "study" and parts[0][1] in PREFIXES:
+            parts = parts[1:]
+        yield from _value(space, parts, name.path)
+
+
+def _parts(text: str) -> list[Part]:
+    found, offset = [], 0
+    for part in text.split("."):
+        found.append((offset, part))
+        offset += len(part) + 1
+    return found
+
+
+def _spec(world: World, space: Namespace, name: Name) -> Declared | None:
+    if name.text == space.document.name:
+        return space.names.get(("spec", name.text))
+    path = world.find(name.text, space.file, is_effect=name.of == "effect")
+    document = world.document(path) if path else None
+    if path is None or document is None or document.name != name.text:
+        return None
+    return Declared(path, "spec", name.text, document.kind, document.name_span, document)
+
+
+def _value(space: Namespace, parts: Sequence[Part], path: tuple[str, ...]) -> Meaning:
+    if not parts:
+        return
+    head, *rest = parts
+    declared = space.names.get(("value", head[1]))
+    if head[1] in space.instances and rest:
+        yield head, declared
+        yield from _value(space.instances[head[1]], rest, ())
+    elif declared:
+        yield head, declared
+    elif space.model and rest and head[1] == space.model.document.name:
+        yield from _of_model(space, parts)
+    else:
+        yield from _mode(space, parts, path)
+
+
+def _mode(space: Namespace, parts: Sequence[Part], path: tuple[str, ...]) -> Meaning:
+    """A mode by its path, behind the name of a region perhaps."""
+    if len(parts) > 1:
+        yield parts[0], space.names.get(("region", parts[0][1]))
+    yield parts[-1], lookup(space, ".".join(text for _, text in parts), path)
+
+
+def _of_model(space: Namespace, parts: Sequence[Part]) -> Meaning:
+    model = space.model
+    if model and len(parts) > 1 and parts[0][1] == model.document.name:
+        yield parts[0], model.names.get(("spec", parts[0][1]))
+        yield from _mode(model, parts[1:], ())

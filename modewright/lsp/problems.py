@@ -1,0 +1,45 @@
+"""Problems: what `check` says of a text in an editor, as its diagnostics."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from lsprotocol import types
+
+from language.problem import Problem
+from modewright.checking import checked
+from modewright.lsp.positions import range_of, uri_of
+from modewright.lsp.world import World
+
+SOURCE = "modewright"
+SEVERITIES = {
+    "error": types.DiagnosticSeverity.Error,
+    "warning": types.DiagnosticSeverity.Warning,
+}
+START = types.Range(types.Position(0, 0), types.Position(0, 0))
+
+
+def diagnostics(world: World, path: Path) -> list[types.Diagnostic]:
+    """Return the problems of a file; one that lies in another file is told at the start of this."""
+    told = checked(str(path), world.root, dict(world.texts)).problems
+    return [_diagnostic(problem, path.resolve(), world.encoding) for problem in told]
+
+
+def _diagnostic(problem: Problem, path: Path, encoding: str) -> types.Diagnostic:
+    message = f"{problem.label}\nhelp: {problem.help}" if problem.help else problem.label
+    place = Path(problem.span.source.name).resolve()
+    related = None
+    where = range_of(problem.span, encoding)
+    if place != path:
+        location = types.Location(uri_of(place), where)
+        related = [types.DiagnosticRelatedInformation(location, problem.label)]
+        message = f"in {problem.span}: {message}"
+        where = START
+    return types.Diagnostic(
+        range=where,
+        message=message,
+        severity=SEVERITIES[problem.severity],
+        code=problem.code,
+        source=SOURCE,
+        related_information=related,
+    )

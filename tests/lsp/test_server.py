@@ -1,0 +1,248 @@
+"""The language server: what an editor is told, asked through the real protocol."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import modewright as mw
+from language.problem import Source, Span
+from modewright.lsp.positions import column_of, range_of
+from tests.lsp.talk import Message, Talk
+
+ROOT = Path(__file__).parent.parent.parent
+HEATER = """\
+language: 1
+automaton: heater
+period: 10 ms
+numbers: float64
+parameters:
+  T_on: {value: 18 degC, about: "below this it heats"}
+  P_on: {value: 2 kW}
+  P_low: {derived: P_on / 4, unit: W}
+inputs: {T_room: {unit: degC, range: [-40, 80]}}
+discrete: {P: {unit: W, initial: 0 W, range: [0, 5000]}}
+initial: idle
+modes:
+  idle:
+    entry: {P: 0 W}
+    transitions: {heating: {when: T_room < T_on, wait: 50 ms}}
+  heating:
+    entry: {P: P_on}
+    exit: {P: P_low}
+    transitions: {idle: {when: T_room > T_on}}
+outputs: [P, mode]
+"""
+
+
+@pytest.fixture(scope="module")
+def talk() -> Iterator[Talk]:
+    with Talk(("utf-8", "utf-16")) as made:
+        yield made
+
+
+@pytest.fixture
+def heater(talk: Talk, tmp_path: Path) -> Path:
+    path = tmp_path / "spec" / "heater.yaml"
+    path.parent.mkdir()
+    path.write_text("language: 1\nautomaton: heater\n")  # the editor's text counts, not this
+    told = talk.open(path, HEATER)
+    assert told == [], told
+    return path
+
+
+def where(text: str, part: str, inside: int = 0) -> tuple[int, int]:
+    """Return line (from 1) and column (from 0) of the first place of a part of a text."""
+    before = text[: text.index(part) + inside]
+    return before.count("\n") + 1, len(before.rpartition("\n")[2])
+
+
+def labels(talk: Talk, path: Path, text: str) -> list[str]:
+    """Return what is offered at the sign `|` of a text."""
+    before, _, after = text.partition("|")
+    talk.begin_change(path, before + after)
+    place = (before.count("\n") + 1, len(before.rpartition("\n")[2]))
+    found = talk.ask("textDocument/completion", talk.at(path, *place))
+    return [item["label"] for item in found["items"]]
+
+
+def hover(talk: Talk, path: Path, place: tuple[int, int]) -> str:
+    told: Message | None = talk.ask("textDocument/hover", talk.at(path, *place))
+    return told["contents"]["value"] if told else ""
+
+
+def applied(text: str, edits: list[dict[str, Any]]) -> str:
+    lines = text.split("\n")
+    for edit in sorted(edits, key=lambda e: str(e["range"]["start"]), reverse=True):
+        start, end = edit["range"]["start"], edit["range"]["end"]
+        assert start["line"] == end["line"]
+        line = lines[start["line"]]
+        lines[start["line"]] = (
+            line[: start["character"]] + edit["newText"] + line[end["character"] :]
+        )
+    return "\n".join(lines)
+
+
+def test_problems_are_those_of_the_editors_text(talk: Talk, heater: Path) -> None:
+    (told,) = talk.change(heater, HEATER.replace("when: T_room > T_on", "when: T_rom > T_on"))
+    line, column = where(HEATER, "T_room > T_on")
+    assert told["range"]["start"] == {"line": line - 1, "character": column}
+    assert told["range"]["end"] == {"line": line - 1, "character": column + len("T_rom")}
+    assert "did you mean `T_room`?" in told["message"]
+    assert (told["code"], told["severity"], told["source"]) == ("MW115", 1, "modewright")
+    assert talk.change(heater, HEATER) == []
+
+
+def test_a_text_that_is_no_yaml_is_told_of(talk: Talk, heater: Path) -> None:
+    (told,) = talk.change(heater, HEATER + "regions: {a: [\n")
+    assert "this is not YAML" in told["message"]
+
+
+def test_a_mistake_in_a_base_is_told_in_the_variant(
+    talk: Talk, heater: Path, tmp_path: Path
+) -> None:
+    variant = tmp_path / "spec" / "weak.yaml"
+    text = "language: 1\nvariant: weak\nextends: heater\nparameters: {P_on: {value: 1 kW}}\n"
+    assert talk.open(variant, text) == []
+    talk.change(heater, HEATER.replace("when: T_room > T_on", "when: T_rom > T_on"))
+    talk.versions[variant.as_uri()] = 1
+    (told,) = talk.change(variant, text + "\n")
+    assert "heater.yaml:19:" in told["message"]
+    assert told["range"]["start"] == {"line": 0, "character": 0}
+    (related,) = told["relatedInformation"]
+    assert related["location"]["uri"] == heater.as_uri()
+
+
+def test_columns_are_counted_as_the_editor_asked_for(talk: Talk, heater: Path) -> None:
+    assert talk.capabilities["positionEncoding"] == "utf-8"
+    text = HEATER.replace('"below this it heats"}', '"\U0001f525", vlaue: 1}')
+    (told,) = talk.change(heater, text)
+    line = next(line for line in text.splitlines() if "vlaue" in line)
+    assert told["range"]["start"]["character"] == len(line[: line.index("vlaue")].encode())
+
+
+@pytest.mark.parametrize(("encoding", "units"), [("utf-8", 4), ("utf-16", 2), ("utf-32", 1)])
+def test_a_character_has_the_width_of_its_encoding(encoding: str, units: int) -> None:
+    span = Span(Source("a.yaml", ("\U0001f525 a",)), 1, 3)
+    found = range_of(span, encoding)
+    assert (found.start.character, found.end.character) == (units + 1, units + 2)
+    assert column_of("\U0001f525 a", found.start, encoding) == 2
+
+
+def test_hover_tells_unit_value_meaning_and_who_reads_it(talk: Talk, heater: Path) -> None:
+    told = hover(talk, heater, where(HEATER, "T_room > T_on", 10))
+    assert told.startswith("**T_on** - parameter")
+    assert "below this it heats" in told and "- value: `18 degC`" in told
+    assert "`modes.idle.transitions.heating.when`, `modes.heating.transitions.idle.when`" in told
+    assert "- value: `500` in SI" in hover(talk, heater, where(HEATER, "P_low"))
+    assert "how long the guard must hold" in hover(talk, heater, where(HEATER, "wait:", 1))
+    assert hover(talk, heater, where(HEATER, "heating:")).startswith("**heating** - mode")
+    assert hover(talk, heater, (1, 11)) == ""
+
+
+@pytest.mark.parametrize(
+    ("text", "some", "never"),
+    [
+        ("|", ["language", "automaton", "study"], ["modes"]),
+        ("language: 1\nautomaton: a\npa|", ["parameters", "modes"], ["automaton", "kalman"]),
+        (HEATER.replace("wait: 50 ms", "p|"), ["priority", "wait", "reset"], ["when", "number"]),
+        (HEATER.replace("T_room < T_on, wait: 50 ms}}", "|"), ["T_room", "P", "abs"], ["idle"]),
+        (HEATER.replace("{heating: {when: T_room < T_on, wait: 50 ms}}", "{h|"), ["heating"], []),
+        (HEATER.replace("initial: idle", "initial: |"), ["idle", "heating"], ["P"]),
+        (HEATER.replace("entry: {P: 0 W}", "entry: {|"), ["P"], ["T_room", "T_on"]),
+        (HEATER.replace("unit: degC", "unit: |"), ["degC", "N*m", "ms"], ["T_room"]),
+        (HEATER.replace("2 kW", "2 |"), ["kW", "W"], ["P_on"]),
+        (HEATER.replace("numbers: float64", "numbers: f|"), ["float64", "float32"], ["P"]),
+        (
+            HEATER.replace("  heating:\n", "  heating:\n    en|\n"),
+            ["update"],
+            ["transitions", "to"],
+        ),
+        ("language: 1\nsystem: s\ninstances: {h: {of: heat|", ["heater_on_disk"], ["plot"]),
+        (
+            "language: 1\nsystem: s\ninstances: {h: {of: heater_on_disk}}\nconnections: {h.|",
+            ["h.T_room"],
+            ["h.P", "h.T_on"],
+        ),
+        (
+            "language: 1\nsystem: s\ninstances: {h: {of: heater_on_disk}}\noutputs: {p: 2 * h|}\n",
+            ["h.P"],
+            [],
+        ),
+    ],
+)
+def test_what_fits_at_a_place_is_offered(
+    talk: Talk, heater: Path, text: str, some: list[str], never: list[str]
+) -> None:
+    beside = heater.with_name("heater_on_disk.yaml")
+    beside.write_text(HEATER.replace("automaton: heater", "automaton: heater_on_disk"))
+    found = labels(talk, heater, text)
+    assert set(some) <= set(found)
+    assert not set(never) & set(found)
+    assert len(found) == len(set(found))
+
+
+@pytest.fixture
+def driveline(talk: Talk, tmp_path: Path) -> Path:
+    shutil.copytree(ROOT / "spec" / "ev_driveline", tmp_path / "spec")
+    path = tmp_path / "spec" / "plant.yaml"
+    assert talk.open(path, path.read_text()) == []
+    return path
+
+
+def test_a_definition_is_found_in_another_file(talk: Talk, driveline: Path) -> None:
+    estimator = driveline.with_name("estimator.yaml")
+    text = estimator.read_text()
+    talk.open(estimator, text)
+    for part, inside, target in (
+        ("k_hs * (theta_d", 2, "k_hs:  {value"),
+        ("in(driveline.no_contact)", 16, "  no_contact:\n    number"),
+        ("in(driveline.no_contact)", 5, "driveline\n"),
+    ):
+        place = where(text, part, inside)
+        (found,) = talk.ask("textDocument/definition", talk.at(estimator, *place))
+        assert found["uri"] == driveline.as_uri()
+        line = where(driveline.read_text(), target)[0]
+        assert found["range"]["start"]["line"] in (line - 1, line)
+
+
+@pytest.mark.parametrize("old", ["k_hs:", "theta_b:", "no_contact:\n"])
+def test_a_rename_reaches_all_files_of_the_project_and_changes_no_meaning(
+    talk: Talk, driveline: Path, old: str
+) -> None:
+    files = sorted(driveline.parent.glob("*.yaml"))
+    name = old.strip(":\n")
+    text = driveline.read_text()
+    asked = {**talk.at(driveline, *where(text, f"  {old}", 3)), "newName": "renamed"}
+    changes = talk.ask("textDocument/rename", asked)["changes"]
+    assert len(changes) > 3
+    for path in files:
+        path.write_text(applied(path.read_text(), changes.get(path.as_uri(), [])))
+    root = driveline.parent.parent
+    for checked in ("ev_driveline", "hko", "estimator_written", "study_tip_out"):
+        path = next(p for p in files if p.stem == checked or f": {checked}\n" in p.read_text())
+        errors = [p for p in mw.check(str(path), root=root) if p.severity == "error"]
+        assert errors == [], mw.render_all(errors)
+    assert f"{name}:" not in driveline.read_text().replace("gap: ", "")
+
+
+def test_a_name_that_cannot_be_given_is_refused_with_the_reason(
+    talk: Talk, driveline: Path
+) -> None:
+    place = where(driveline.read_text(), "  k_hs:", 3)
+    for name, reason in (
+        ("c_hs", "is a name already"),
+        ("while", "word of C"),
+        ("1k", "not a name"),
+    ):
+        answer = talk.answer("textDocument/rename", {**talk.at(driveline, *place), "newName": name})
+        assert reason in answer["error"]["message"]
+    outside = driveline.with_name("worn.yaml")
+    text = "language: 1\nvariant: worn\nextends: emps\nparameters: {M: {value: 1 kg}}\n"
+    talk.open(outside, text)
+    asked = {**talk.at(outside, *where(text, "M:")), "newName": "mass"}
+    assert "not here" in talk.answer("textDocument/rename", asked)["error"]["message"]
