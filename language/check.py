@@ -6,6 +6,7 @@ import dataclasses
 from collections.abc import Iterable, Mapping
 
 from language.check_balance import check_balances, check_flow
+from language.check_cycle import report_refiring
 from language.check_domain import check_domains
 from language.check_element import check_laid_on
 from language.check_memory import check_memory
@@ -25,6 +26,7 @@ from language.declaration import Formula, LookupTable
 from language.declared import declared_names
 from language.dimension import DimensionCheck, Scope
 from language.guards import report_overlaps
+from language.inquiry import Inquiry
 from language.kind import Enumeration, Kind, Whole
 from language.model import Automaton, Mode, Region
 from language.order import equation_order, report_circle, unreached
@@ -33,7 +35,6 @@ from language.problem import Problems, nearest
 from language.region import sources, with_regions
 from language.syntax import EDGES, KEPT, MEMORY, Tree, names, whole_literal
 from language.units import SECOND, Dimension, Unit, common, fits
-from language.witness import report_refiring
 
 WHOLES = (Whole, Enumeration)
 
@@ -55,9 +56,8 @@ def check_automaton(automaton: Automaton, problems: Problems) -> Automaton:
         for name in _never_entered(checked, region):
             label = f"mode `{name}` is never entered"
             problems.warning("unreached", region.modes[name].span, label)
-    report_overlaps(checked, problems)
-    if not checked.is_sampled:
-        report_refiring(checked, problems)
+    report_overlaps(checked, Inquiry(checked), problems)
+    report_refiring(checked, problems)
     if checked.model:
         check_automaton(checked.model, problems)
     problems.stop_if_any()

@@ -32,6 +32,12 @@ CODES: Mapping[str, tuple[str, str]] = {
     "unwritten": ("MW207", "A variable is written nowhere."),
     "faults": ("MW208", "There are more fault bits than a word holds."),
     "rewind": ("MW209", "A transition cannot go back in time like this."),
+    "cycle": ("MW210", "Transitions of several modes go round for ever at the same instant."),
+    "dead": ("MW211", "A guard never holds, so its transition never fires."),
+    "shadowed": ("MW212", "Other transitions fire first whenever a guard holds."),
+    "timer": ("MW213", "A wait never elapses."),
+    "near": ("MW214", "Two waits are nearer to each other than a period."),
+    "stuck": ("MW215", "No transition out of a mode ever fires."),
     "overlap": ("MW220", "Two rows of a truth table hold together."),
     "incomplete": ("MW221", "A table says nothing of some case."),
     # Expressions, units, values.

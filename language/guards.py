@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import islice
 
+from language.inquiry import Inquiry, Witness
 from language.model import Automaton, Mode, Transition
-from language.problem import Problems
+from language.moment import Moment
+from language.problem import Problems, SpecError
+from language.question import Question
 from language.syntax import Not, Relation, Tree, alike
-from language.witness import WitnessSearch
 
 DISJOINT = {"<": (">", ">="), "<=": (">",), ">": ("<", "<="), ">=": ("<",)}
 """Relations that exclude each other between the same two sides."""
@@ -16,18 +17,16 @@ DISJOINT = {"<": (">", ">="), "<=": (">",), ">": ("<", "<="), ">=": ("<",)}
 
 MOST_OVERLAPS = 1000
 """Pairs told of in one mode; who has so many gives priorities to all."""
-MOST_SEARCHED = 100
-"""Pairs for which a witness is searched; beyond, nothing proves that they exclude each other."""
 
 
-def report_overlaps(automaton: Automaton, problems: Problems) -> None:
+def report_overlaps(automaton: Automaton, inquiry: Inquiry, problems: Problems) -> None:
     """Report pairs of one priority that are not proven disjoint, with a witness if one is found."""
-    pairs = [
-        pair for mode in automaton.all_modes for pair in islice(_overlaps(mode), MOST_OVERLAPS)
-    ]
-    search = WitnessSearch(automaton, min(len(pairs), MOST_SEARCHED)) if pairs else None
-    for number, (earlier, later) in enumerate(pairs):
-        _report(search if number < MOST_SEARCHED else None, earlier, later, problems)
+    for mode in automaton.all_modes:
+        told = 0
+        for earlier, later in _overlaps(mode):
+            told += _report(automaton, mode, earlier, later, inquiry, problems)
+            if told == MOST_OVERLAPS:
+                break
 
 
 def _overlaps(mode: Mode) -> Iterator[tuple[Transition, Transition]]:
@@ -51,13 +50,33 @@ def excluded(left: Tree, right: Tree) -> bool:
 
 
 def _report(
-    search: WitnessSearch | None, earlier: Transition, later: Transition, problems: Problems
-) -> None:
-    point = search.both(earlier, later) if search else None
+    automaton: Automaton,
+    mode: Mode,
+    earlier: Transition,
+    later: Transition,
+    inquiry: Inquiry,
+    problems: Problems,
+) -> bool:
+    """Report a pair unless it is proven disjoint; tell whether it was reported."""
+    question = _together(automaton, mode, earlier, later, inquiry)
+    found = inquiry.freely(question) if question else "open"
+    if found == "never":
+        return False
+    label = f"nothing proves that `{earlier.name}` and `{later.name}` exclude each other"
+    if isinstance(found, Witness):
+        label = f"`{earlier.name}` and `{later.name}` are both enabled at {found.text}"
     hint = "give them different priorities: the smallest wins"
-    if search and point is not None:
-        values = search.shown(point, [earlier.when.tree, later.when.tree])
-        label = f"`{earlier.name}` and `{later.name}` are both enabled at {values}"
-    else:
-        label = f"nothing proves that `{earlier.name}` and `{later.name}` exclude each other"
     problems.error("priority", later.when.span, label, hint)
+    return True
+
+
+def _together(
+    automaton: Automaton, mode: Mode, earlier: Transition, later: Transition, inquiry: Inquiry
+) -> Question | None:
+    """Return the question whether two guards can hold together; None where they have no form."""
+    moment = Moment(automaton, mode)
+    try:
+        guards = [moment.expression(way.when.tree) for way in (earlier, later)]
+    except (KeyError, SpecError):
+        return None
+    return inquiry.question(moment.story, guards)

@@ -105,6 +105,23 @@ def expr_names(expr: Expr) -> Iterator[str]:
                 stack += reversed(arguments)
 
 
+def parts(expr: Expr) -> Iterator[Expr]:
+    """Yield every part of an expression, parents first."""
+    stack = [expr]
+    while stack:
+        part = stack.pop()
+        yield part
+        match part:
+            case Item(_, operand) | Unary(_, operand):
+                stack.append(operand)
+            case Binary(_, left, right) | Compare(_, left, right):
+                stack += (right, left)
+            case Select(condition, then, other):
+                stack += (other, then, condition)
+            case Call(_, arguments):
+                stack += reversed(arguments)
+
+
 def reads(blocks: Iterable[Block]) -> set[str]:
     """Return every name that some blocks read or write."""
     return {name for block in blocks for name in block_names(block)}

@@ -11,6 +11,7 @@ from expectation.reader import read_test
 from language.calibration import read_calibration
 from language.document import Document, Scalar
 from language.effect import read_effect
+from language.examine import examine
 from language.load import automaton_of, lowered
 from language.map import read_map
 from language.numbers_text import motion_lines
@@ -51,14 +52,16 @@ def checked(
             document = _calibrated(document, reference, project, problems)
         base = expanded(document, project, problems)
         if base.kind == "automaton":
-            motion = lowered(automaton_of(document, project, problems=problems)).motion
+            automaton = automaton_of(document, project, problems=problems)
+            motion = lowered(automaton).motion
+            examine(automaton, problems)
             if motion and motion.limits and not is_calibration:
                 first, *others = motion_lines(motion)
                 limits = (f"{document.name}: {first}", *others)
         elif base.kind == "system":
             instances = read_system(document, project).instances.values()
-            for automaton in {id(each.automaton): each.automaton for each in instances}.values():
-                lowered(automaton)
+            for part in {id(each.automaton): each.automaton for each in instances}.values():
+                lowered(part)
         elif base.kind == "map":
             read_map(document, project)
         elif base.kind == "effect":

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 from hypothesis import given, strategies as st
 
@@ -24,6 +26,14 @@ initial: free
 modes:
   free: {{transitions: {{p: {{{p}}}, q: {{{q}}}}}}}
   end: {{}}
+"""
+
+REGION = """regions:
+  place:
+    initial: left
+    modes:
+      left: {{equations: {{side: {left}}}, transitions: {{right: {{when: x > 0.3 m}}}}}}
+      right: {{equations: {{side: {right}}}, transitions: {{left: {{when: x < 0.2 m}}}}}}
 """
 
 
@@ -81,11 +91,48 @@ def test_guards_that_may_hold_together_are_refused_with_a_witness(p: str, q: str
         ("x < limit", "limit <= x"),
         ("x < limit", "x > limit + 0.1 m"),
         ("x > limit and v > 0", "x < -limit and v < 0"),
-        ("x > 3 m", "x > 4 m"),
+        ("2 * x - v * 1 s > limit", "v * 1 s >= 2 * x"),
+        ("far > 0 and flag", "x < limit or not (flag or x > limit)"),
+        ("x > 3 m", "x > limit"),  # outside of the range of x
+        ("x * v > 0", "x > limit and v < 0"),
+        ("x^2 + v^2 * 1 s^2 < limit^2", "x + v * 1 s > 2 * limit"),
+        ("sqrt(abs(x) / 1 m) > 0.5", "abs(x) <= 0.25 m"),
+        ("sin(x / 1 m) > v / 1 m * 1 s", "v / 1 m * 1 s > 1"),
+        ("rising(x > limit)", "falling(x > limit)"),
+        ("after(2 s)", "not after(1 s) and x > 0"),
     ],
+)
+def test_what_is_proven_to_exclude_each_other_needs_no_priorities(p: str, q: str) -> None:
+    assert not excluded(tree(p), tree(q))
+    assert overlaps(p, q) == []
+
+
+@pytest.mark.parametrize(
+    ("p", "q"), [("exp(v * 1 s/m) > 100", "x > limit"), ("x > limit", "tanh(v * 1 s/m) > 0.999")]
 )
 def test_what_is_not_proven_is_refused_even_without_a_witness(p: str, q: str) -> None:
     assert overlaps(p, q) == ["nothing proves that `p` and `q` exclude each other"]
+
+
+def test_a_tunable_counts_with_all_its_values() -> None:
+    """At its present value 0.5 m the guards exclude each other, at 0.2 m they do not."""
+    tunable = TEXT.replace("limit: {{value: 0.5 m}}", "limit: {{value: 0.5 m, {more}}}")
+    text = tunable.format(
+        more="range: [0.2, 1], tunable: true",
+        p="to: end, when: x < 0.4 m",
+        q="to: end, when: x > limit",
+    )
+    (label,) = told(lambda: automaton(text))
+    assert re.search(r"both enabled at x = 0\.[23]\d*, limit = 0\.[23]", label), label
+    assert told(lambda: automaton(text.replace("[0.2, 1]", "[0.4, 1]"))) == []
+
+
+def test_regions_beside_are_in_any_of_their_modes() -> None:
+    """The equation `side` has another value in each mode of the region."""
+    text = slide("side > 0 and x > 0", "x > 0 and side < 1")
+    (label,) = told(lambda: automaton(text + REGION.format(left=0.5, right=2)))
+    assert "`p` and `q` are both enabled at" in label
+    assert told(lambda: automaton(text + REGION.format(left=-1, right=2))) == []
 
 
 def test_different_priorities_decide() -> None:

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 
 import pytest
 from hypothesis import given, strategies as st
 
 from language.evaluate import evaluate
+from language.inquiry import Inquiry, Witness
 from language.lower import expression
 from language.model import Automaton
+from language.moment import Moment
 from language.operation import Expr, Value
-from language.witness import WitnessSearch
 from tests.language.making import SHIPPED, automaton, refusal, told, tree
 
 STOP = """language: 1
@@ -42,6 +44,15 @@ def arrive(guard: str, reset: str = "{x: limit}") -> str:
 def both(p: str, q: str) -> str:
     """Return two transitions with priorities, so that they may overlap."""
     return f"p: {{to: stopped, when: {p}, priority: 1}}, q: {{to: stopped, when: {q}, priority: 2}}"
+
+
+def together(made: Automaton) -> Mapping[str, float]:
+    """Return values at which all guards of the free mode hold."""
+    inquiry, moment = Inquiry(made), Moment(made, made.modes["free"])
+    guards = [moment.expression(way.when.tree) for way in made.modes["free"].transitions]
+    found = inquiry.answer(inquiry.question(moment.story, guards))
+    assert isinstance(found, Witness)
+    return found.point
 
 
 def holds(guard: str, values: dict[str, float], made: Automaton) -> bool:
@@ -158,9 +169,7 @@ PAIRS = [
 @pytest.mark.parametrize(("p", "q"), PAIRS)
 def test_both_guards_hold_at_the_values_of_a_witness(p: str, q: str) -> None:
     made = automaton(stop(both(p, q), ""))
-    search = WitnessSearch(made)
-    point = search.both(*made.modes["free"].transitions)
-    assert point is not None
+    point = together(made)
     values = {name.partition(".")[2]: float(value) for name, value in point.items()}
     assert holds(p, values, made) and holds(q, values, made)
 
@@ -190,16 +199,14 @@ def test_both_guards_hold_at_the_values_that_are_shown_on_an_uneven_boundary() -
 @given(st.integers(-999, 999), st.integers(-1999, 1999))
 def test_an_overlap_of_two_half_planes_is_always_found(x: int, v: int) -> None:
     made = automaton(stop(both(f"x <= {x / 1000} m", f"v >= {v / 1000} m/s"), ""))
-    point = WitnessSearch(made).both(*made.modes["free"].transitions)
-    assert point is not None
+    point = together(made)
     assert point["state.x"] <= x / 1000
     assert point["state.v"] >= v / 1000
 
 
 def test_the_search_stays_inside_the_ranges() -> None:
     made = automaton(stop(both("x > 0 and v > 0 and F > 0", "true"), ""))
-    point = WitnessSearch(made).both(*made.modes["free"].transitions)
-    assert point is not None
+    point = together(made)
     assert 0 < point["state.x"] <= 1
     assert 0 < point["state.v"] <= 2
     assert 0 < point["input.F"] <= 10

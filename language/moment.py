@@ -1,0 +1,219 @@
+"""Moment: what names are at one instant in one mode, and after transitions of that instant.
+
+Every expression is lowered as for a Program; what it needs of equations becomes steps before it.
+Of parallel regions each equation is chosen by the region's own mode, which is a variable here. What
+functions with memory give is any value: an edge only where its condition is as it says.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+
+from language.action import place_of
+from language.constants import exact_value
+from language.declaration import Formula
+from language.graph import post_order
+from language.lower import WHOLE_TYPES, assigned, expression
+from language.memory import ticks_of, type_of
+from language.model import Automaton, Mode, Transition
+from language.number import rounded
+from language.operation import Binary, Compare, Expr, Ref, Select, Unary, Value, whole
+from language.parameter import constant_names
+from language.question import Extent, Step
+from language.syntax import EDGES, MEMORY, Application, Tree, memory_key, walk
+
+ELAPSED = "memory.elapsed"
+"""The time since the entry of the mode: in ticks of a sampled automaton, else in seconds."""
+
+
+@dataclass
+class Story:
+    """What is computed at an instant, in order, and what is known of it besides."""
+
+    steps: list[Step] = field(default_factory=list)
+    facts: list[Expr] = field(default_factory=list)
+    extents: dict[str, Extent] = field(default_factory=dict)
+    moments: int = 0
+
+
+class Moment:
+    """A mode of one region at an instant; `after` a transition comes the next one."""
+
+    def __init__(
+        self,
+        automaton: Automaton,
+        mode: Mode,
+        story: Story | None = None,
+        carried: Mapping[str, Expr] | None = None,
+    ) -> None:
+        """Begin an instant, or go on with the values that a transition left."""
+        self.automaton = automaton
+        self.mode = mode
+        self.story = story or Story()
+        self.tag = f" {self.story.moments}" if self.story.moments else ""
+        self.story.moments += 1
+        self.known: dict[str, Expr] = dict(constant_names(automaton))
+        for name, thing in automaton.inputs.items():
+            self.known[name] = Ref(f"input.{name}", thing.type in WHOLE_TYPES)
+        for name, variable in automaton.carried.items():
+            self.known[name] = Ref(place_of(automaton, name), variable.type in WHOLE_TYPES)
+        self.known.update(carried or {})
+        self.known.update(self._modes())
+
+    def expression(self, tree: Tree) -> Expr:
+        """Return an expression of this moment. Raises KeyError where a name is not known here."""
+        self._define([tree])
+        return expression(tree, self.known)
+
+    def after(self, transition: Transition) -> Moment:
+        """Return the moment after a transition: exit, reset and entry, each read as a whole."""
+        target = self.automaton.target(transition)
+        carried = self._stage(self.mode.exit, {})
+        carried = self._stage(transition.reset, carried)
+        there = Moment(self.automaton, target, self.story, {**self._carried(), **carried})
+        if target.entry:
+            entered = there._stage(target.entry, {})
+            there = Moment(self.automaton, target, self.story, {**there._carried(), **entered})
+        return there
+
+    def _carried(self) -> dict[str, Expr]:
+        return {name: self.known[name] for name in self.automaton.carried}
+
+    def _stage(self, formulas: Mapping[str, Formula], carried: dict[str, Expr]) -> dict[str, Expr]:
+        """Return what is carried after a stage; its equations are those of this moment."""
+        self._define(formula.tree for formula in formulas.values())
+        known = {**self.known, **carried}
+        found = dict(carried)
+        for name, formula in formulas.items():
+            is_whole = self.automaton.carried[name].type in WHOLE_TYPES
+            target = f"{place_of(self.automaton, name)} {len(self.story.steps)}"
+            value = assigned(formula.tree, known, is_whole)
+            self.story.steps.append((target, value))
+            found[name] = Ref(target, is_whole)
+        return found
+
+    def _modes(self) -> dict[str, Expr]:
+        """Return what `in(...)` is: of our own region it is certain, of others any mode."""
+        found: dict[str, Expr] = {}
+        for region in self.automaton.all_regions:
+            own = region.name == self.mode.region
+            selector = Ref(f"mode.{region.name}", True)
+            if not own:
+                numbers = tuple(mode.number for mode in region.modes.values())
+                self.story.extents[selector.name] = Extent("whole", numbers=numbers)
+            for name, mode in region.modes.items():
+                is_in: Expr = Compare("==", selector, whole(mode.number))
+                found[f"in {region.name}.{name}"] = Value(name == self.mode.name) if own else is_in
+        return {**found, **self._modes_of_run()}
+
+    def _modes_of_run(self) -> dict[str, Expr]:
+        model = self.automaton.model
+        found: dict[str, Expr] = {}
+        for region in model.all_regions if model else ():
+            assert model
+            selector = Ref(f"run.{region.name}", True)
+            numbers = tuple(mode.number for mode in region.modes.values())
+            self.story.extents[selector.name] = Extent("whole", numbers=numbers)
+            for name, mode in region.modes.items():
+                is_in = Compare("==", selector, whole(mode.number))
+                found[f"in {model.name}.{region.name}.{name}"] = is_in
+                if region.name == model.chart.name:
+                    found[f"in {model.name}.{name}"] = is_in
+        return found
+
+    def _define(self, trees: Iterable[Tree]) -> None:
+        """Make the equations known that some expressions need, each after those that it reads."""
+        trees = list(trees)
+        needed: dict[str, list[tuple[int | None, str, Formula]]] = {}
+        stack = [name for tree in trees for name in _reads(tree)]
+        while stack:
+            name = stack.pop()
+            if name in needed or name in self.known:
+                continue
+            needed[name] = list(self._alternatives(name))
+            stack += [read for _, _, formula in needed[name] for read in formula.reads]
+        reads = {n: [r for _, _, f in found for r in f.reads] for n, found in needed.items()}
+        for name in post_order(reads):
+            if needed[name]:
+                self._equation(name, needed[name])
+        for tree in trees:
+            self._remember(tree)
+
+    def _alternatives(self, name: str) -> Iterator[tuple[int | None, str, Formula]]:
+        """Yield the formulas that an equation can have: our mode's, else by another region's."""
+        if name in self.mode.equations:
+            yield None, self.mode.region, self.mode.equations[name]
+            return
+        for region in self.automaton.all_regions:
+            for mode in region.modes.values() if region.name != self.mode.region else ():
+                if name in mode.equations:
+                    yield mode.number, region.name, mode.equations[name]
+
+    def _equation(self, name: str, found: list[tuple[int | None, str, Formula]]) -> None:
+        is_whole = found[0][2].whole
+        value: Expr | None = None
+        for number, region, formula in reversed(found):
+            self._remember(formula.tree)
+            own = assigned(formula.tree, self.known, formula.whole)
+            if value is None or number is None:
+                value = own
+            else:
+                is_in = Compare("==", Ref(f"mode.{region}", True), whole(number))
+                value = Select(is_in, own, value)
+        assert value is not None
+        target = f"equation.{name}{self.tag}"
+        self.story.steps.append((target, value))
+        self.known[name] = Ref(target, is_whole)
+
+    def _remember(self, tree: Tree) -> None:
+        """Make the functions with memory known; what is inside of one comes first."""
+        for part in reversed(walk(tree)):
+            if isinstance(part, Application) and part.function in MEMORY:
+                key = memory_key(part)
+                if key not in self.known:
+                    self.known[key] = self._remembered(part)
+
+    def _remembered(self, part: Application) -> Expr:
+        automaton = self.automaton
+        if self.tag and part.function in EDGES:
+            return Value(False)  # nothing was seen before in this activation
+        if part.function == "after":
+            if self.tag:
+                return Value(_time_of(automaton, part) <= 0)
+            if automaton.is_sampled:
+                self.story.extents[ELAPSED] = Extent("whole", low=Fraction(0))
+                ticks = whole(ticks_of(automaton, part.arguments[0]))
+                return Compare(">=", Ref(ELAPSED, True), ticks)
+            self.story.extents[ELAPSED] = Extent(low=Fraction(0))
+            time = expression(part.arguments[0], constant_names(automaton))
+            return Compare(">=", Ref(ELAPSED), time)
+        name = f"memory.{part.function}_{len(self.story.extents)}{self.tag}"
+        if part.function in EDGES:
+            self.story.extents[name] = Extent("truth")
+            level = expression(part.arguments[0], self.known)
+            now = level if part.function == "rising" else Unary("not", level)
+            self.story.facts.append(Binary("or", Unary("not", Ref(name)), now))
+            return Ref(name)
+        kind = type_of(automaton, part.arguments[0])
+        self.story.extents[name] = replace(self._extent_of(part.arguments[0]), type=kind)
+        return Ref(name, kind == "whole")
+
+    def _extent_of(self, tree: Tree) -> Extent:
+        """Return the bounds of a name that is delayed."""
+        path = getattr(tree, "path", "")
+        thing = self.automaton.inputs.get(path) or self.automaton.carried.get(path)
+        if thing is None or thing.range is None:
+            return Extent()
+        low, high = (Fraction(rounded(bound, self.automaton.numbers)) for bound in thing.range)
+        return Extent(low=low, high=high)
+
+
+def _time_of(automaton: Automaton, part: Application) -> Fraction:
+    """Return the time of `after` exactly [s]."""
+    return exact_value(Formula(part.arguments[0], ""), automaton)
+
+
+def _reads(tree: Tree) -> list[str]:
+    return list(Formula(tree, "").reads)

@@ -1,0 +1,116 @@
+"""Question: can these conditions hold together? Steps of scalar expressions and what they read.
+
+A witness is a point: a value for every variable. It is told only where the conditions, evaluated
+there by our own arithmetic, are true; so a witness is true whatever found it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, MutableMapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+from language.evaluate import Scalar, evaluate
+from language.operation import Expr
+from language.program import ValueType
+from language.traversal import expr_names
+
+SHOWN_DIGITS = (2, 3, 4, 6, 9, 12)
+"""Digits of the values shown: the first number of them at which the conditions still hold."""
+
+Point = MutableMapping[str, Scalar]
+Step = tuple[str, Expr]
+
+
+@dataclass(frozen=True)
+class Extent:
+    """What a variable can be: its type, its bounds (SI) where it has some, or a few numbers.
+
+    `names` are those of an enumeration, `default` is what it is where nothing speaks against it.
+    """
+
+    type: ValueType = "real"
+    low: Fraction | None = None
+    high: Fraction | None = None
+    numbers: tuple[int, ...] = ()
+    names: tuple[str, ...] = ()
+    default: Scalar | None = None
+
+    def holds(self, value: Scalar) -> bool:
+        """Tell whether a value is one that the variable can have."""
+        above = self.low is None or value >= self.low
+        below = self.high is None or value <= self.high
+        return above and below and (not self.numbers or value in self.numbers)
+
+
+@dataclass(frozen=True)
+class Question:
+    """Whether all conditions can hold: after the steps, whatever the variables are.
+
+    `values` are those of parameters: numbers, and tuples for tables.
+    """
+
+    conditions: tuple[Expr, ...]
+    steps: tuple[Step, ...]
+    extents: Mapping[str, Extent]
+    values: Mapping[str, Scalar] = field(repr=False)
+
+    @property
+    def variables(self) -> list[str]:
+        """The variables that the conditions read, directly or through the steps, in order."""
+        read = self.read
+        return [name for name in self.extents if name in read]
+
+    @property
+    def read(self) -> set[str]:
+        """Every name that the conditions need."""
+        found = {name for condition in self.conditions for name in expr_names(condition)}
+        for target, value in reversed(self.steps):
+            if target in found:
+                found.update(expr_names(value))
+        return found
+
+    def holds_at(self, point: Mapping[str, Scalar]) -> bool:
+        """Tell whether a point lies within the extents and makes all conditions true."""
+        try:
+            if not all(self.extents[name].holds(value) for name, value in point.items()):
+                return False
+            values = {**self.values, **point}
+            wanted = self.read
+            for target, value in self.steps:
+                if target in wanted:
+                    values[target] = evaluate(value, values)
+            return all(evaluate(condition, values) is True for condition in self.conditions)
+        except (KeyError, OverflowError, ValueError):
+            return False
+
+    def shortened(self, point: Point) -> Point:
+        """Return a point with as few digits as still show what it shows."""
+        for digits in SHOWN_DIGITS:
+            shorter: Point = {
+                name: float(f"{value:.{digits}g}") if isinstance(value, float) else value
+                for name, value in point.items()
+            }
+            if self.holds_at(shorter):
+                return shorter
+        return point
+
+
+def shown(point: Mapping[str, Scalar], extents: Mapping[str, Extent]) -> str:
+    """Return a point as text: `x = 0.5, ready = true, key = parked`."""
+    return ", ".join(
+        f"{name.partition('.')[2]} = {_text(value, extents[name])}" for name, value in point.items()
+    )
+
+
+def _text(value: Scalar, extent: Extent) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if extent.names:
+        return extent.names[int(value)]
+    return _shortest(float(value))
+
+
+def _shortest(value: float) -> str:
+    """Return the shortest text that reads back as the value, without a needless `.0`."""
+    return next(text for n in (4, 6, 9, 12, 15, 17) if float(text := f"{value:.{n}g}") == value)

@@ -1,0 +1,230 @@
+"""Solver: exact answers over the reals by z3 (de Moura and Bjorner 2008), or none.
+
+Functions without a theory (sin, exp, tables) are any functions within their bounds: what cannot be
+for any of them cannot be. The effort is counted by z3 itself, not by a clock: so the answers are
+the same on every machine. z3 is loaded with the first question.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from fractions import Fraction
+from functools import cached_property
+from typing import Any, Literal
+
+from language.evaluate import Scalar
+from language.operation import Binary, Call, Compare, Expr, Ref, Select, Unary, Value
+from language.question import Extent, Point, Question
+
+EFFORT = 400_000
+"""Units of z3's own count for one question: some tenths of a second at most."""
+DIGITS = 20
+"""Decimal digits of an irrational number: more than a double has."""
+BOUNDS: Mapping[str, tuple[float, float]] = {
+    "sin": (-1.0, 1.0),
+    "cos": (-1.0, 1.0),
+    "tanh": (-1.0, 1.0),
+    "atan2": (-math.pi, math.pi),
+    "exp": (0.0, math.inf),
+}
+"""What is known of functions that z3 has no theory of."""
+
+Verdict = Literal["never", "open"]
+
+
+class Unknown(Exception):
+    """An expression that has no counterpart in z3."""
+
+
+class Solver:
+    """Answers questions; each stands for itself."""
+
+    @cached_property
+    def z3(self) -> Any:
+        """The library; loading it takes a fifth of a second."""
+        import z3
+
+        return z3
+
+    def ask(self, question: Question) -> Point | Verdict:
+        """Return values that z3 takes for a witness, "never", or "open" where it does not know."""
+        solver = self.z3.Solver()
+        solver.set("rlimit", EFFORT)
+        try:
+            terms = _Terms(self.z3, question)
+            wanted = [terms.of(condition) for condition in question.conditions]
+        except (Unknown, self.z3.Z3Exception):
+            return "open"
+        solver.add(*wanted, *terms.facts)
+        answer = solver.check()
+        if answer == self.z3.unsat:
+            return "never"
+        if answer != self.z3.sat:
+            return "open"
+        model = solver.model()
+        return {name: _value(model, terms.variables[name]) for name in terms.variables}
+
+
+def _value(model: Any, variable: Any) -> Scalar:
+    """Return the value of a variable in a model, rounded once."""
+    found = model.eval(variable, model_completion=True)
+    if variable.sort().name() == "Bool":
+        return str(found) == "True"
+    if variable.is_int():
+        return int(found.as_long())
+    exact = found if hasattr(found, "numerator_as_long") else found.approx(DIGITS)
+    return float(Fraction(exact.numerator_as_long(), exact.denominator_as_long()))
+
+
+class _Terms:
+    """The expressions of one question as terms of z3; `facts` is what holds of them anyway."""
+
+    def __init__(self, z3: Any, question: Question) -> None:
+        self.z3 = z3
+        self.question = question
+        self.variables: dict[str, Any] = {}
+        self.facts: list[Any] = []
+        self.known: dict[str, Any] = {}
+        self.roots: dict[int, Any] = {}
+        read = question.read
+        for target, value in question.steps:
+            if target in read:
+                self.known[target] = self.of(value)
+
+    def of(self, expr: Expr) -> Any:
+        """Return the term of an expression."""
+        z3 = self.z3
+        match expr:
+            case Value(value):
+                return self._literal(value)
+            case Ref(name):
+                return self._named(name)
+            case Unary("-", operand):
+                return -self.of(operand)
+            case Unary("not", operand):
+                return z3.Not(self.of(operand))
+            case Binary("and", left, right):
+                return z3.And(self.of(left), self.of(right))
+            case Binary("or", left, right):
+                return z3.Or(self.of(left), self.of(right))
+            case Binary(operator, left, right):
+                return self._arithmetic(operator, self.of(left), self.of(right))
+            case Compare(operator, left, right):
+                return self._relation(operator, self.of(left), self.of(right))
+            case Select(condition, then, other):
+                return z3.If(self.of(condition), self.of(then), self.of(other))
+            case Call(function, arguments):
+                return self._call(function, arguments)
+        raise Unknown
+
+    def _literal(self, value: Scalar) -> Any:
+        if isinstance(value, bool):
+            return self.z3.BoolVal(value)
+        if isinstance(value, int):
+            return self.z3.IntVal(value)
+        if not math.isfinite(value):
+            raise Unknown
+        exact = Fraction(value)
+        return self.z3.RatVal(exact.numerator, exact.denominator)
+
+    def _named(self, name: str) -> Any:
+        if name not in self.known:
+            if name in self.question.extents:
+                self.known[name] = self._variable(name, self.question.extents[name])
+            elif isinstance(self.question.values.get(name), float | int | bool):
+                self.known[name] = self._literal(self.question.values[name])
+            else:
+                raise Unknown
+        return self.known[name]
+
+    def _variable(self, name: str, extent: Extent) -> Any:
+        z3 = self.z3
+        make = {"real": z3.Real, "whole": z3.Int, "truth": z3.Bool}[extent.type]
+        term = self.variables[name] = make(name)
+        for bound, is_low in ((extent.low, True), (extent.high, False)):
+            if bound is not None:
+                limit = z3.RatVal(bound.numerator, bound.denominator)
+                self.facts.append(term >= limit if is_low else term <= limit)
+        if extent.numbers:
+            self.facts.append(z3.Or(*(term == number for number in extent.numbers)))
+        return term
+
+    def _arithmetic(self, operator: str, left: Any, right: Any) -> Any:
+        match operator:
+            case "+":
+                return left + right
+            case "-":
+                return left - right
+            case "*":
+                return left * right
+        return left / right
+
+    def _relation(self, operator: str, left: Any, right: Any) -> Any:
+        match operator:
+            case "<":
+                return left < right
+            case "<=":
+                return left <= right
+            case ">":
+                return left > right
+            case ">=":
+                return left >= right
+            case "==":
+                return left == right
+        return left != right
+
+    def _call(self, function: str, arguments: tuple[Expr, ...]) -> Any:
+        z3 = self.z3
+        if function in ("lookup", "lookup2"):
+            count = 1 if function == "lookup" else 2
+            return self._lookup(arguments[-1 - count], arguments[-count:])
+        terms = [self.of(argument) for argument in arguments]
+        first = terms[0]
+        match function:
+            case "real":
+                return z3.ToReal(first)
+            case "whole":
+                return z3.ToInt(first)
+            case "floor":
+                return z3.ToReal(z3.ToInt(first))
+            case "abs":
+                return z3.If(first >= 0, first, -first)
+            case "sign":
+                return z3.If(first > 0, z3.RealVal(1), z3.If(first < 0, z3.RealVal(-1), 0))
+            case "min":
+                return z3.If(terms[1] < first, terms[1], first)
+            case "max":
+                return z3.If(terms[1] > first, terms[1], first)
+            case "clip":
+                low, high = terms[1:]
+                return z3.If(first > low, z3.If(first < high, first, high), low)
+            case "sqrt":
+                return self._root(first)
+        low, high = BOUNDS.get(function, (-math.inf, math.inf))
+        return self._any(function, terms, low, high)
+
+    def _root(self, square: Any) -> Any:
+        """Return a number that is not negative and gives the square, where there is one."""
+        if square.get_id() not in self.roots:
+            root = self.z3.FreshReal("sqrt")
+            self.roots[square.get_id()] = root
+            self.facts += [root >= 0, self.z3.Implies(square >= 0, root * root == square)]
+        return self.roots[square.get_id()]
+
+    def _lookup(self, table: Expr, arguments: tuple[Expr, ...]) -> Any:
+        items = self.question.values.get(table.name) if isinstance(table, Ref) else None
+        if not isinstance(table, Ref) or not isinstance(items, tuple):
+            raise Unknown
+        terms = [self.of(argument) for argument in arguments]
+        return self._any(f"lookup {table.name}", terms, min(items), max(items))
+
+    def _any(self, function: str, terms: list[Any], low: float, high: float) -> Any:
+        """Return what any function within bounds gives: equal arguments have equal values."""
+        z3 = self.z3
+        made = z3.Function(function, *[z3.RealSort()] * (len(terms) + 1))(*terms)
+        if math.isfinite(low):
+            self.facts.append(made >= self._literal(low))
+        if math.isfinite(high):
+            self.facts.append(made <= self._literal(high))
+        return made
