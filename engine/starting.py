@@ -17,7 +17,13 @@ from language.units import NO_UNIT
 
 
 def programs_of(system: System, scenario: Scenario) -> dict[str, Program]:
-    """Return the Program of each instance, with the start values of a resolved scenario.
+    """Return the Program of each instance, with the start values of a resolved scenario."""
+    automata = automata_of(system, scenario)
+    return {name: program_of(*each) for name, each in automata.items()}
+
+
+def automata_of(system: System, scenario: Scenario) -> dict[str, tuple[Automaton, list[str]]]:
+    """Return the automaton of each instance with its start values, and its inputs that vary.
 
     Inputs of continuous automata that change between instants are parabolas inside a step.
     """
@@ -35,7 +41,7 @@ def programs_of(system: System, scenario: Scenario) -> dict[str, Program]:
             if not instance.automaton.inputs[thing].truth
             if any(_varies(system, scenario, read) for read in connection.reads)
         ]
-        found[name] = program_of(_started(instance.automaton, start), varying)
+        found[name] = _started(instance.automaton, start), varying
     return found
 
 

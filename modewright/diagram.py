@@ -11,6 +11,7 @@ import textwrap
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 from language.document import Document, Entry, Node, Scalar, Table
 from language.overlay import lay, without
@@ -24,6 +25,8 @@ LABEL_WIDTH = 36
 MOST_LINES = 6
 """Most lines of equations shown in a mode."""
 Key = tuple[str, ...]
+Shade = Literal["", "covered", "part", "missed"]
+"""What tests have reached of a mode or a transition; empty where nothing is said of it."""
 
 
 @dataclass(frozen=True)
@@ -33,6 +36,8 @@ class Arrow:
     source: Key
     target: Key
     lines: tuple[str, ...]
+    name: str = ""
+    shade: Shade = ""
 
 
 @dataclass(frozen=True)
@@ -42,6 +47,7 @@ class ModeBox:
     path: Key
     lines: tuple[str, ...]
     regions: tuple[RegionBox, ...] = ()
+    shade: Shade = ""
 
     @property
     def name(self) -> str:
@@ -139,7 +145,7 @@ def lifted(arrow: Arrow) -> Arrow:
         lines.insert(0, f"to {'.'.join(arrow.target[depth + 1 :])}")
     if source != arrow.source:
         lines.insert(0, f"from {'.'.join(arrow.source[depth + 1 :])}")
-    return Arrow(source, target, tuple(lines))
+    return dataclasses.replace(arrow, source=source, target=target, lines=tuple(lines))
 
 
 def _regions(owner: Table, path: Key) -> list[RegionBox]:
@@ -199,7 +205,7 @@ def _arrows(path: Key, mode: Table, known: set[Key]) -> Iterator[Arrow]:
             name = _text(entry.node.get("to")) or entry.key
             target = _target(tuple(name.split(".")), path, known)
             if target:
-                yield Arrow(path, target, tuple(_label(entry.node)))
+                yield Arrow(path, target, tuple(_label(entry.node)), entry.key)
 
 
 def _target(name: Key, path: Key, known: set[Key]) -> Key | None:

@@ -14,9 +14,13 @@ from modewright.layers import Edge, Layout, Point, Size, layout
 CHARACTER, LINE, TITLE = 7.0, 14.0, 20.0
 """Width of a character, height of a line, height of a title [px]: monospace at 11 px."""
 PAD = 9.0
+DASH = ' stroke-dasharray="4 3"'
 START = 30.0
 """Room for the dot before the initial mode [px]."""
 COLOURS = ("#33608c", "#b03a4a", "#1d6f2b", "#8a7410", "#257a8f", "#8a2b63", "#555555")
+SHADES = {"covered": "#1d7a33", "part": "#9a6700", "missed": "#b3261e"}
+PALETTE = (*COLOURS, *SHADES.values())
+NOTES = {"covered": "reached by tests", "part": "reached in part", "missed": "not reached"}
 STYLE = (
     "text{font:11px 'DejaVu Sans Mono',Menlo,Consolas,monospace;fill:#222}"
     ".n{font-weight:bold;font-size:13px}.a{fill:#555}"
@@ -42,20 +46,34 @@ def _xml(text: str) -> str:
 def svg(diagram: Diagram) -> str:
     """Return the diagram as an SVG document."""
     drawn = _stacked(diagram.regions, diagram.arrows)
-    width = max(drawn.size[0], CHARACTER * 1.2 * len(diagram.name), 120.0) + 2 * PAD
+    title = CHARACTER * 1.2 * len(diagram.name)
+    if any(arrow.shade for arrow in diagram.arrows):
+        title += CHARACTER * (6 + sum(len(note) + 3 for note in NOTES.values()))
+    width = max(drawn.size[0], title, 120.0) + 2 * PAD
     height = drawn.size[1] + TITLE + 2 * PAD
     rows = [
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:.0f}" height="{height:.0f}"'
         f' viewBox="0 0 {width:.0f} {height:.0f}">',
         f"<title>{_xml(diagram.name)}</title>",
         f"<style>{STYLE}</style>",
-        "<defs>" + "".join(_marker(k, colour) for k, colour in enumerate(COLOURS)) + "</defs>",
+        "<defs>" + "".join(_marker(k, colour) for k, colour in enumerate(PALETTE)) + "</defs>",
         f'<rect width="{width:.0f}" height="{height:.0f}" fill="white"/>',
         f'<text class="n" x="{PAD}" y="{PAD + 10}">{_xml(diagram.name)}</text>',
     ]
+    if any(arrow.shade for arrow in diagram.arrows):
+        rows.append(_legend(PAD + CHARACTER * (1.2 * len(diagram.name) + 3)))
     for (x, y), text in drawn.at(PAD, PAD + TITLE):
         rows.append(f'<g transform="translate({x:.1f} {y:.1f})">{text}</g>')
     return "\n".join([*rows, "</svg>", ""])
+
+
+def _legend(x: float) -> str:
+    """What the shades mean, beside the title."""
+    found = ""
+    for shade, note in NOTES.items():
+        found += f'<text x="{x:.1f}" y="{PAD + 10}" style="fill:{SHADES[shade]}">{note}</text>'
+        x += CHARACTER * (len(note) + 3)
+    return found
 
 
 def _stacked(regions: Sequence[RegionBox], arrows: Sequence[Arrow]) -> _Drawn:
@@ -100,10 +118,10 @@ def _arrows(
 ) -> list[tuple[Point, str]]:
     parts: list[tuple[Point, str]] = []
     for arrow, edge, route in zip(arrows, edges, placed.routes, strict=True):
-        number = edge.source % len(COLOURS)
+        number = _number(arrow.shade, edge.source)
         for k, piece in enumerate(route.pieces):
             head = k == len(route.pieces) - 1
-            parts.append(((START, 0.0), _line(piece, number, head)))
+            parts.append(((START, 0.0), _line(piece, number, head, arrow.shade == "missed")))
         x, y = route.label
         parts.append(((START + x, y), _label(arrow, number)))
     return parts
@@ -121,12 +139,13 @@ def _mode(mode: ModeBox, loops: Sequence[Arrow], arrows: Sequence[Arrow], number
     for loop in loops:
         size = _label_size(loop)
         width = max(width, size[0] + 44.0)
-        parts.append(((30.0, top), _label(loop, number % len(COLOURS))))
-        parts.append(((0.0, top), _loop(size, number % len(COLOURS))))
+        parts.append(((30.0, top), _label(loop, _number(loop.shade, number))))
+        parts.append(((0.0, top), _loop(size, _number(loop.shade, number))))
         top += size[1] + 24.0
-    colour = COLOURS[number % len(COLOURS)]
+    colour = PALETTE[_number(mode.shade, number)]
+    dash = DASH if mode.shade == "missed" else ""
     box = f'<rect width="{width:.1f}" height="{height:.1f}" rx="7" fill="{colour}"'
-    box += f' fill-opacity="0.08" stroke="{colour}" stroke-width="1.6"/>'
+    box += f' fill-opacity="0.08" stroke="{colour}" stroke-width="1.6"{dash}/>'
     box += f'<text class="n" x="{PAD}" y="16">{_xml(mode.name)}</text>'
     box += _lines(mode.lines, PAD, TITLE + 10, "a")
     parts.append(((0.0, top), box))
@@ -142,7 +161,7 @@ def _label_size(arrow: Arrow) -> Size:
 def _label(arrow: Arrow, number: int) -> str:
     width, height = _label_size(arrow)
     frame = f'<rect width="{width:.1f}" height="{height:.1f}" rx="3" fill="white"'
-    return frame + f' stroke="{COLOURS[number]}" stroke-width="0.7"/>' + _lines(arrow.lines, 5, 13)
+    return frame + f' stroke="{PALETTE[number]}" stroke-width="0.7"/>' + _lines(arrow.lines, 5, 13)
 
 
 def _lines(lines: Sequence[str], x: float, y: float, name: str = "") -> str:
@@ -156,13 +175,19 @@ def _lines(lines: Sequence[str], x: float, y: float, name: str = "") -> str:
     return found
 
 
-def _line(points: Sequence[Point], number: int, head: bool) -> str:
+def _number(shade: str, number: int) -> int:
+    """Return the place of a colour: that of a shade, else one of those that tell modes apart."""
+    return len(COLOURS) + list(SHADES).index(shade) if shade else number % len(COLOURS)
+
+
+def _line(points: Sequence[Point], number: int, head: bool, dashed: bool) -> str:
     path = f"M{points[0][0]:.1f} {points[0][1]:.1f}"
     for (x, y), (u, v) in itertools.pairwise(points):
         bend = (u - x) / 2
         path += f" C{x + bend:.1f} {y:.1f} {u - bend:.1f} {v:.1f} {u:.1f} {v:.1f}"
     end = f' marker-end="url(#h{number})"' if head else ""
-    return f'<path d="{path}" fill="none" stroke="{COLOURS[number]}" stroke-width="1.3"{end}/>'
+    end += DASH if dashed else ""
+    return f'<path d="{path}" fill="none" stroke="{PALETTE[number]}" stroke-width="1.3"{end}/>'
 
 
 def _loop(size: Size, number: int) -> str:
@@ -172,7 +197,7 @@ def _loop(size: Size, number: int) -> str:
     path += f" M{right} {size[1] / 2} C{right + 8} {size[1] / 2}"
     path += f" {right + 8} {size[1]} {right + 8} {bottom}"
     return (
-        f'<path d="{path}" fill="none" stroke="{COLOURS[number]}" stroke-width="1.3"'
+        f'<path d="{path}" fill="none" stroke="{PALETTE[number]}" stroke-width="1.3"'
         f' marker-end="url(#h{number})"/>'
     )
 

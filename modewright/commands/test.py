@@ -8,9 +8,9 @@ from typing import Annotated
 import typer
 
 from modewright.commands.options import Json
-from modewright.console import console, working
+from modewright.console import announce, console, working
 from modewright.exits import PROBLEMS
-from modewright.files import require_writable, write_files
+from modewright.files import make_folder, require_writable, write_files
 
 
 def test(
@@ -23,6 +23,13 @@ def test(
     interpreted: Annotated[
         bool, typer.Option("--interpreted", help="on the engine alone: no compiler is needed")
     ] = False,
+    coverage: Annotated[
+        bool,
+        typer.Option("--coverage", help="tell which modes, transitions, conditions are tested"),
+    ] = False,
+    graphs: Annotated[
+        Path | None, typer.Option("--graphs", help="a folder for the modes, coloured by coverage")
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Run tests of specs on the engine and in C; both have to give one verdict.
@@ -30,23 +37,40 @@ def test(
     \b
     modewright test
     modewright test tip_out_is_detected --junit build/tests.xml
+    modewright test --coverage --graphs build
     """
+    from expectation.coverage import Coverage, coverage as covered, together
     from modewright import show_tests
+    from modewright.covered import coverage_json, covered_graph, lines_of
     from modewright.show import print_json
     from modewright.tests import run_tests
 
     require_writable(junit)
     runs = []
+    parts: list[Coverage] = []
     with working("running tests"):
         for run in run_tests(tests or (), compiled=not interpreted):
             runs.append(run)
+            parts += covered(run.test) if coverage or graphs else ()
             for line in show_tests.lines_of(run) if not as_json else ():
-                console().print(line, soft_wrap=True, highlight=False, markup=False)
-    if junit:
-        write_files({junit: show_tests.junit(runs)})
+                _tell(line)
+    sums = together(parts)
+    files = {junit: show_tests.junit(runs)} if junit else {}
+    if graphs:
+        make_folder(graphs)
+        files |= {graphs / f"{c.name}.svg": covered_graph(c).svg().encode() for c in sums}
+    write_files(files)
     if as_json:
-        print_json({"tests": [show_tests.test_json(run) for run in runs]})
+        told = {"tests": [show_tests.test_json(run) for run in runs]}
+        print_json(told | ({"coverage": [coverage_json(c) for c in sums]} if sums else {}))
     else:
-        console().print(show_tests.summary(runs), highlight=False)
+        for line in (line for each in sums for line in lines_of(each)):
+            _tell(line)
+        _tell(show_tests.summary(runs))
+        announce([path for path in files if path != junit])
     if not all(run.passed for run in runs):
         raise typer.Exit(PROBLEMS)
+
+
+def _tell(line: str) -> None:
+    console().print(line, soft_wrap=True, highlight=False, markup=False)

@@ -1,0 +1,172 @@
+"""Coverage: which modes, transitions and conditions of specs tests have reached."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from engine.interpreter import Interpreter
+from engine.simulate import simulate
+from engine.starting import automata_of
+from engine.stimulus import resolved
+from expectation.decision import MOST_CONDITIONS, SHOWN, Decision, Shown, decision_of
+from expectation.expected import Test
+from expectation.observed import observed
+from expectation.probe import LOOK, probed
+from language.hoist import hoisted
+from language.load import lowered
+from language.model import CHART, Automaton
+from language.program import Program
+
+Modes = frozenset[tuple[str, str]]
+"""Modes by region and name."""
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """What has been reached of an automaton: modes, transitions by key path, combinations."""
+
+    automaton: Automaton
+    decisions: tuple[Decision, ...]
+    modes: Modes = frozenset()
+    transitions: frozenset[str] = frozenset()
+    seen: Mapping[str, frozenset[int]] = dataclasses.field(default_factory=dict)
+
+    @property
+    def name(self) -> str:
+        """The name of the automaton."""
+        return self.automaton.name
+
+    @property
+    def all_modes(self) -> tuple[tuple[str, str], ...]:
+        """All modes by region and name, in the order of the file."""
+        return tuple((mode.region, mode.name) for mode in self.automaton.all_modes)
+
+    def shown(self, decision: Decision) -> tuple[Shown, ...]:
+        """Return of each condition of a guard whether it was shown to matter."""
+        return decision.shown(self.seen.get(decision.key, frozenset()))
+
+    def count(self) -> dict[str, tuple[int, int]]:
+        """Return how many modes, transitions, outcomes of guards and conditions were reached."""
+        outcomes = [d.outcomes(self.seen.get(d.key, frozenset())) for d in self.decisions]
+        conditions = [each for d in self.decisions for each in self.shown(d)]
+        return {
+            "modes": (len(self.modes), len(self.all_modes)),
+            "transitions": (len(self.transitions), len(self.decisions)),
+            "outcomes": (sum(map(len, outcomes)), sum(map(_possible, self.decisions))),
+            "conditions": (sum(each in SHOWN for each in conditions), len(conditions)),
+        }
+
+    def missed(self) -> list[str]:
+        """Return what was not reached, one line each."""
+        lines = [
+            f"mode `{name if region == CHART else f'{region}.{name}'}` was not entered"
+            for region, name in self.all_modes
+            if (region, name) not in self.modes
+        ]
+        for decision in self.decisions:
+            if decision.key not in self.transitions:
+                lines.append(f"`{decision.key}` was not taken")
+            lines += self._conditions(decision)
+        return lines
+
+    def _conditions(self, decision: Decision) -> list[str]:
+        if decision.key not in self.seen:
+            return [f"`{decision.key}.when` was never read"] if decision.conditions else []
+        if len(decision.conditions) > MOST_CONDITIONS:
+            return [f"`{decision.key}.when` has more than {MOST_CONDITIONS} conditions"]
+        words = {"always true": "was never false", "always false": "was never true"}
+        return [
+            f"`{decision.key}.when`: `{text}` {words.get(shown, 'was not shown to matter')}"
+            for text, shown in zip(decision.conditions, self.shown(decision), strict=True)
+            if shown not in SHOWN
+        ]
+
+
+def coverage(test: Test) -> list[Coverage]:
+    """Return what a test reaches of each automaton: a run of the interpreter with probes."""
+    scenario = resolved(test.system, test.scenario)
+    decisions, programs, arrays = probed_programs(automata_of(test.system, scenario))
+    steppers: dict[int, _Looking] = {}
+
+    def build(program: Program) -> _Looking:
+        return steppers.setdefault(id(program), _Looking(program))
+
+    run = observed(test.system, simulate(test.system, scenario, build, programs=programs))
+    made = []
+    for name, program in programs.items():
+        stepper = steppers[id(program)]
+        seen = {
+            key: frozenset(k for k, was in enumerate(stepper.get(array)) if was)
+            for key, array in arrays[name].items()
+        }
+        places = [place for place in run.modes if place[0] == name]
+        made.append(
+            Coverage(
+                test.system.instances[name].automaton,
+                decisions[name],
+                frozenset((place[1], mode) for place in places for mode in run.modes[place]),
+                frozenset(stepper.taken),
+                {key: combinations for key, combinations in seen.items() if combinations},
+            )
+        )
+    return made
+
+
+def probed_programs(
+    automata: Mapping[str, tuple[Automaton, list[str]]],
+) -> tuple[dict[str, tuple[Decision, ...]], dict[str, Program], dict[str, Mapping[str, str]]]:
+    """Return the decisions of instances, their Programs with probes, and where these write."""
+    decisions, programs, arrays = {}, {}, {}
+    for name, (automaton, varying) in automata.items():
+        ways = [way for mode in automaton.all_modes for way in mode.transitions]
+        decisions[name] = tuple(decision_of(way) for way in ways)
+        made = probed(lowered(automaton, varying), decisions[name])
+        programs[name], arrays[name] = hoisted(made.program), made.arrays
+    return decisions, programs, arrays
+
+
+def together(parts: Iterable[Coverage]) -> list[Coverage]:
+    """Return what several tests and instances have reached, one for each automaton by name."""
+    found: dict[str, Coverage] = {}
+    for part in parts:
+        before = found.get(part.name)
+        found[part.name] = _joined(before, part) if before else part
+    return list(found.values())
+
+
+def _joined(one: Coverage, other: Coverage) -> Coverage:
+    none: frozenset[int] = frozenset()
+    keys = {**one.seen, **other.seen}
+    return dataclasses.replace(
+        one,
+        modes=one.modes | other.modes,
+        transitions=one.transitions | other.transitions,
+        seen={key: one.seen.get(key, none) | other.seen.get(key, none) for key in keys},
+    )
+
+
+class _Looking(Interpreter):
+    """An interpreter that reads guards wherever outputs are read, and notes what fires."""
+
+    def __init__(self, program: Program) -> None:
+        super().__init__(program)
+        self.taken: set[str] = set()
+        self._fired = program.fired_variables()
+        self._looks = LOOK in program.blocks
+
+    def run(self, block: str) -> None:
+        if block == "equations" and self._looks:
+            super().run(LOOK)
+        super().run(block)
+        if block in ("step", "jump"):
+            for name in self._fired:
+                number = self.get(name)
+                if number:
+                    key = self.program.transitions[number - 1].key
+                    self.taken.add(key.partition(" ")[2])
+
+
+def _possible(decision: Decision) -> int:
+    return 2 if decision.conditions else 1

@@ -1,0 +1,126 @@
+"""Decision: a guard as conditions and how they are joined; which of them were shown to matter.
+
+MC/DC (Chilenski and Miller 1994, Applicability of modified condition/decision coverage): every
+condition is shown to change the outcome alone. Unique cause: of two evaluations in which only it
+differs, one is true. Masking: in both evaluations the outcome hangs on it, others may differ, too.
+A condition that is written twice is one.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+from language.model import Transition
+from language.model_text import tree_text
+from language.operation import Binary, Expr, Unary
+from language.syntax import Logic, Not, Tree, Truth, alike
+
+Joined = int | bool | tuple[str, "Joined"] | tuple[str, "Joined", "Joined"]
+"""A condition by its place, `true` or `false`, or `not`, `and`, `or` of others."""
+Shown = Literal["unique cause", "masking", "always true", "always false", "not shown"]
+SHOWN: tuple[Shown, ...] = ("unique cause", "masking")
+"""What counts as covered."""
+MOST_CONDITIONS = 10
+"""More have too many combinations to be kept, one for each."""
+
+
+@dataclass(frozen=True)
+class Decision:
+    """The guard of a transition, by its key path; conditions in the order of the text."""
+
+    key: str
+    conditions: tuple[str, ...]
+    joined: Joined
+    places: tuple[int | None, ...]
+
+    def outcome(self, combination: int) -> bool:
+        """Return what the guard is; bit k of a combination is condition k."""
+        return _value(self.joined, combination)
+
+    def shown(self, seen: Collection[int]) -> tuple[Shown, ...]:
+        """Return of each condition whether the combinations that were seen show that it matters."""
+        return tuple(self._shown(1 << k, seen) for k in range(len(self.conditions)))
+
+    def outcomes(self, seen: Collection[int]) -> frozenset[bool]:
+        """Return what the guard has been."""
+        return frozenset(self.outcome(combination) for combination in seen)
+
+    def _shown(self, bit: int, seen: Collection[int]) -> Shown:
+        ons = [one for one in seen if one & bit]
+        offs = {one for one in seen if not one & bit}
+        if any(one ^ bit in offs and self._matters(one, bit) for one in ons):
+            return "unique cause"
+        mattering = [one for one in ons if self._matters(one, bit)]
+        others = [one for one in offs if self._matters(one, bit)]
+        if any(self.outcome(a) != self.outcome(b) for a, b in itertools.product(mattering, others)):
+            return "masking"
+        if not offs or not ons:
+            return "always true" if ons else "always false"
+        return "not shown"
+
+    def _matters(self, combination: int, bit: int) -> bool:
+        return self.outcome(combination) != self.outcome(combination ^ bit)
+
+
+def decision_of(transition: Transition) -> Decision:
+    """Return the guard of a transition as a decision."""
+    found: list[Tree] = []
+    places: list[int | None] = []
+
+    def joined(tree: Tree) -> Joined:
+        match tree:
+            case Logic(operator, left, right, _):
+                return (operator, joined(left), joined(right))
+            case Not(operand, _):
+                return ("not", joined(operand))
+            case Truth(value, _):
+                places.append(None)
+                return value
+        place = next((k for k, known in enumerate(found) if alike(known, tree)), len(found))
+        if place == len(found):
+            found.append(tree)
+        places.append(place)
+        return place
+
+    made = joined(transition.when.tree)
+    texts = tuple(_text(tree) for tree in found)
+    return Decision(transition.key, texts, made, tuple(places))
+
+
+def leaves(expr: Expr) -> Iterator[Expr]:
+    """Yield the conditions of a lowered guard, in the order of its text."""
+    match expr:
+        case Binary("and" | "or", left, right):
+            yield from leaves(left)
+            yield from leaves(right)
+        case Unary("not", operand):
+            yield from leaves(operand)
+        case _:
+            yield expr
+
+
+def _value(joined: Joined, combination: int) -> bool:
+    match joined:
+        case bool():
+            return joined
+        case int():
+            return bool(combination >> joined & 1)
+        case ("not", operand):
+            return not _value(operand, combination)
+        case ("and", left, right):
+            return _value(left, combination) and _value(right, combination)
+        case (_, left, right):
+            return _value(left, combination) or _value(right, combination)
+    raise TypeError(f"not a decision: {joined}")
+
+
+def _text(tree: Tree) -> str:
+    """Return a condition as its author wrote it, where that is one text of the file."""
+    span = tree.span
+    if span.whole or not 1 <= span.line <= len(span.source.lines):
+        return tree_text(tree).removeprefix("(").removesuffix(")")
+    line = span.source.lines[span.line - 1]
+    return line[span.column - 1 : span.column - 1 + span.width]

@@ -1,0 +1,102 @@
+"""Covered: what tests have reached of specs - told, as plain data, and on the diagram of modes."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from expectation.coverage import Coverage
+from expectation.decision import SHOWN, Decision
+from language.model import CHART
+from modewright.diagram import Arrow, Diagram, Key, ModeBox, RegionBox, Shade, graph
+
+STRUCTURE = ("modes", "regions", "transitions")
+"""Words of a key path that are no names."""
+
+
+def lines_of(coverage: Coverage) -> Iterator[str]:
+    """Yield the lines that tell of a coverage: the counts, then what is missing."""
+    counts = coverage.count()
+    said = ", ".join(f"{done} of {total} {what}" for what, (done, total) in counts.items())
+    yield f"{coverage.name}: {said} (MC/DC)"
+    yield from (f"  {line}" for line in coverage.missed())
+
+
+def coverage_json(coverage: Coverage) -> dict[str, Any]:
+    """Return what was reached of an automaton as plain data."""
+    return {
+        "automaton": coverage.name,
+        "file": coverage.automaton.span.source.name,
+        "counts": {
+            what: {"reached": done, "of": total} for what, (done, total) in coverage.count().items()
+        },
+        "modes": [
+            {"region": region, "mode": mode, "entered": (region, mode) in coverage.modes}
+            for region, mode in coverage.all_modes
+        ],
+        "transitions": [_transition_json(coverage, decision) for decision in coverage.decisions],
+    }
+
+
+def covered_graph(coverage: Coverage, root: Path | None = None) -> Diagram:
+    """Return the diagram of an automaton, shaded by what tests reached. Raises SpecError."""
+    return shaded(graph(coverage.automaton.span.source.name, root), coverage)
+
+
+def shaded(diagram: Diagram, coverage: Coverage) -> Diagram:
+    """Return a diagram whose modes and transitions are shaded by what tests reached."""
+    modes = {mode.key: (mode.region, mode.name) for mode in coverage.automaton.all_modes}
+    entered = {_names(key) for key, place in modes.items() if place in coverage.modes}
+    decisions = {_names(decision.key): decision for decision in coverage.decisions}
+    return dataclasses.replace(
+        diagram,
+        regions=tuple(_region(region, entered) for region in diagram.regions),
+        arrows=tuple(_arrow(arrow, coverage, decisions) for arrow in diagram.arrows),
+    )
+
+
+def _region(region: RegionBox, entered: set[Key]) -> RegionBox:
+    return dataclasses.replace(region, modes=tuple(_mode(mode, entered) for mode in region.modes))
+
+
+def _mode(mode: ModeBox, entered: set[Key]) -> ModeBox:
+    """A mode was entered if one inside it was."""
+    path = mode.path[1:] if mode.path[0] == CHART and len(mode.path) > 1 else mode.path
+    paths = (mode.path, path)
+    was = any(one[: len(each)] == each for one in entered for each in paths)
+    inner = tuple(_region(region, entered) for region in mode.regions)
+    return dataclasses.replace(mode, shade="covered" if was else "missed", regions=inner)
+
+
+def _arrow(arrow: Arrow, coverage: Coverage, decisions: dict[Key, Decision]) -> Arrow:
+    decision = decisions.get((*arrow.source, arrow.name))
+    if decision is None:
+        return arrow
+    shade: Shade = "missed"
+    lines = arrow.lines
+    if decision.key in coverage.transitions:
+        shown = zip(decision.conditions, coverage.shown(decision), strict=True)
+        still = [text for text, how in shown if how not in SHOWN]
+        shade = "part" if still else "covered"
+        lines = (*lines, *(f"? {text}" for text in still))
+    return dataclasses.replace(arrow, shade=shade, lines=lines)
+
+
+def _names(key: str) -> Key:
+    """Return the names of a key path: `modes.a.transitions.b` is (a, b)."""
+    return tuple(part for part in key.split(".") if part not in STRUCTURE)
+
+
+def _transition_json(coverage: Coverage, decision: Decision) -> dict[str, Any]:
+    seen = coverage.seen.get(decision.key, frozenset())
+    return {
+        "key": decision.key,
+        "taken": decision.key in coverage.transitions,
+        "outcomes": sorted(decision.outcomes(seen)),
+        "conditions": [
+            {"text": text, "shown": how}
+            for text, how in zip(decision.conditions, coverage.shown(decision), strict=True)
+        ],
+    }

@@ -1,0 +1,129 @@
+"""What tests reach of a spec, derived by hand; probes change no bit of a run."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from engine.simulate import simulate
+from engine.starting import automata_of
+from engine.stimulus import resolved
+from expectation.coverage import Coverage, coverage, probed_programs, together
+from language.operation import Store
+from language.traversal import walk
+from modewright import tests
+from modewright.cli import app
+from modewright.diagram_svg import SHADES
+from tests.expectation.latching import HEAD, project
+
+ROOT = Path(__file__).parent.parent.parent
+
+
+def reached(folder: Path, head: str = HEAD) -> Coverage:
+    path = project(folder, "any: {always: level < 20 V}", head=head)
+    (found,) = together(coverage(tests.load_test(str(path), folder)))
+    return found
+
+
+def test_everything_is_reached(tmp_path: Path) -> None:
+    found = reached(tmp_path)
+    assert found.count() == {
+        "modes": (2, 2), "transitions": (2, 2), "outcomes": (4, 4), "conditions": (2, 2),
+    }  # fmt: skip
+    assert found.missed() == []
+
+
+def test_what_is_not_reached_is_listed(tmp_path: Path) -> None:
+    found = reached(tmp_path, HEAD.replace("20 ms: -2 V, 30 ms: 3 V", "20 ms: 3 V"))
+    assert found.count() == {
+        "modes": (2, 2), "transitions": (1, 2), "outcomes": (3, 4), "conditions": (1, 2),
+    }  # fmt: skip
+    assert found.missed() == [
+        "`modes.high.transitions.low` was not taken",
+        "`modes.high.transitions.low.when`: `level < -1 V` was never true",
+    ]
+
+
+def test_a_wait_is_no_condition(tmp_path: Path) -> None:
+    """At 5 and 6 ms the guard is true, the transition not taken: it fires at 7 ms."""
+    head = HEAD.replace("20 ms: -2 V, 30 ms: 3 V", "6 ms: 0 V")
+    found = reached(tmp_path, head)
+    assert found.count() == {
+        "modes": (1, 2), "transitions": (0, 2), "outcomes": (2, 4), "conditions": (1, 2),
+    }  # fmt: skip
+    assert found.missed() == [
+        "mode `high` was not entered",
+        "`modes.low.transitions.high` was not taken",
+        "`modes.high.transitions.low` was not taken",
+        "`modes.high.transitions.low.when` was never read",
+    ]
+
+
+def test_what_tests_reach_is_summed(tmp_path: Path) -> None:
+    late = HEAD.replace("5 ms: 2 V, 20 ms: -2 V, 30 ms: 3 V", "5 ms: 0 V")
+    parts = [reached(tmp_path, HEAD.replace("20 ms: -2 V, ", "")), reached(tmp_path, late)]
+    (both,) = together(parts)
+    assert both.count()["transitions"] == (1, 2)
+    assert both.seen == {k: parts[0].seen.get(k, set()) | parts[1].seen.get(k, set())
+                         for k in both.seen}  # fmt: skip
+
+
+def test_probes_change_no_bit_of_a_run_and_each_guard_has_one() -> None:
+    test = tests.load_test("tip_out_is_detected", ROOT)
+    scenario = resolved(test.system, test.scenario)
+    decisions, programs, arrays = probed_programs(automata_of(test.system, scenario))
+    plain = simulate(test.system, scenario)
+    with_probes = simulate(test.system, scenario, programs=programs)
+    assert with_probes.events == plain.events
+    for name, values in plain.signals.items():
+        assert np.array_equal(with_probes.signals[name], values)
+    for name, program in programs.items():
+        ops = [op for block in program.blocks.values() for op in walk(block)]
+        stored = {op.array for op in ops if isinstance(op, Store) and "probe." in op.array}
+        assert stored == set(arrays[name].values())
+        assert set(arrays[name]) == {decision.key for decision in decisions[name]}
+
+
+def test_conditions_that_change_together_are_not_shown_to_matter(tmp_path: Path) -> None:
+    path = project(tmp_path, "any: {always: level < 20 V}")
+    spec = tmp_path / "spec" / "latch.yaml"
+    spec.write_text(spec.read_text().replace("level > 1 V", "level > 1 V and level < 1.5 V"))
+    (found,) = together(coverage(tests.load_test(str(path), tmp_path)))
+    assert found.missed() == [
+        "mode `high` was not entered",
+        "`modes.low.transitions.high` was not taken",
+        "`modes.low.transitions.high.when`: `level > 1 V` was not shown to matter",
+        "`modes.low.transitions.high.when`: `level < 1.5 V` was not shown to matter",
+        "`modes.high.transitions.low` was not taken",
+        "`modes.high.transitions.low.when` was never read",
+    ]
+
+
+def test_coverage_colours_the_graph_and_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = project(tmp_path, "any: {always: level < 20 V}")
+    path.write_text(path.read_text().replace("20 ms: -2 V, 30 ms: 3 V", "20 ms: 3 V"))
+    spec = tmp_path / "spec" / "latch.yaml"
+    spec.write_text(spec.read_text().replace("level > 1 V", "level > 1 V and level < 9 V"))
+    monkeypatch.chdir(tmp_path)
+    command = ["test", "--interpreted", "--coverage", "--graphs", "out"]
+    told = CliRunner().invoke(app, command).output
+    assert "latch: 2 of 2 modes, 1 of 2 transitions, 3 of 4 outcomes, 1 of 3 conditions" in told
+    assert "`level < 9 V` was never false" in told
+    found = (tmp_path / "out" / "latch.svg").read_text()
+    assert found.count(f'stroke="{SHADES["covered"]}" stroke-width="1.6"') == 2  # both modes
+    arrow = 'stroke="{}" stroke-width="1.3"[^>]*stroke-dasharray'
+    assert re.search(arrow.format(SHADES["missed"]), found)
+    assert not re.search(arrow.format(SHADES["part"]), found) and SHADES["part"] in found
+    assert "? level &lt; 9 V" in found
+    found = json.loads(CliRunner().invoke(app, [*command, "--json"]).stdout)["coverage"][0]
+    assert [way["taken"] for way in found["transitions"]] == [True, False]
+    assert [each["shown"] for each in found["transitions"][0]["conditions"]] == [
+        "unique cause", "always true",
+    ]  # fmt: skip
