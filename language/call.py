@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from language.problem import nearest
-from language.syntax import KEPT, Application, Name
+from language.syntax import EDGES, KEPT, TIMES, Application, Name
 from language.units import SECOND
 
 if TYPE_CHECKING:
@@ -15,8 +15,7 @@ if TYPE_CHECKING:
 WHERE = {
     "previous": "it is for equations, updates, resets and guards of a sampled automaton",
     "delay": "it is for equations, balances, updates, resets and guards",
-    **dict.fromkeys(("rising", "falling"), "it is for guards: `when`"),
-    "after": "it is for guards: `when`",
+    **dict.fromkeys((*EDGES, *TIMES), "it is for guards: `when`"),
 }
 """What functions with memory are for."""
 
@@ -33,12 +32,14 @@ def memory_kind(check: DimensionCheck, tree: Application) -> Kind | None:
         label = f"`{name}` takes {wanted} argument(s), not {len(arguments)}"
         check.problems.error("arguments", tree.span, label)
         return None
-    if name in ("delay", "after"):
+    if name in ("delay", *TIMES):
         check.quantity(arguments[-1], SECOND, f"the time of {name}")
     inside = check.remembering(*KEPT)
     if name in KEPT:
         return inside.kind(arguments[0])
-    if name != "after":
+    if name == "changed":
+        return "truth" if inside.kind(arguments[0]) is not None else None
+    if name in EDGES:
         inside.truth(arguments[0], name)
     return "truth"
 

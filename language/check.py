@@ -33,7 +33,7 @@ from language.order import equation_order, report_circle, unreached
 from language.parameter import parameter_kinds
 from language.problem import Problems, nearest
 from language.region import sources, with_regions
-from language.syntax import EDGES, KEPT, MEMORY, Tree, names, whole_literal
+from language.syntax import EDGES, KEPT, MEMORY, TIMES, Tree, names, whole_literal
 from language.units import SECOND, Dimension, Unit, common, fits
 
 WHOLES = (Whole, Enumeration)
@@ -260,7 +260,7 @@ class _Check:
         automaton = self.automaton
         parameters = self._scope([automaton.parameters], "in `wait`: it is a fixed time")
         constant = DimensionCheck(parameters, self.problems)
-        remembered = frozenset(MEMORY if automaton.is_sampled else ("delay", *EDGES, "after"))
+        remembered = frozenset(MEMORY if automaton.is_sampled else ("delay", *EDGES, *TIMES))
         guards = dataclasses.replace(check.scope, memory=remembered)
         guard = DimensionCheck(guards, self.problems)
         for transition in mode.transitions:

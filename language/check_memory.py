@@ -12,7 +12,7 @@ from language.model import Automaton, Transition
 from language.parameter import parameter_kinds
 from language.problem import Problems
 from language.region import equation_names
-from language.syntax import EDGES, KEPT, Application, Tree, names, walk
+from language.syntax import EDGES, KEPT, MEMORY, TIMES, Application, Tree, names, walk
 
 MAX_AFTER = 65535
 """Longest `after` in ticks: its counter is a uint16."""
@@ -27,8 +27,16 @@ def check_memory(automaton: Automaton, problems: Problems) -> None:
             problems.error("type", tree.arguments[0].span, label)
         if tree.function == "delay":
             _time(automaton, tree, tree.arguments[1], MAX_DELAY, problems)
-    for tree in applications(automaton, ("after",)).values():
+    for tree in applications(automaton, TIMES).values():
         _time(automaton, tree, tree.arguments[0], MAX_AFTER, problems)
+    for tree in applications(automaton, ("every",)).values():
+        with problems.collecting():
+            _beat(automaton, tree, problems)
+    for tree in applications(automaton, ("changed",)).values():
+        if not automaton.is_sampled and type_of(automaton, tree.arguments[0]) == "real":
+            label = "a quantity of a continuous automaton changes at every time"
+            hint = "`changed` is for bool, int and enum; `rising(x > limit)` for a quantity"
+            problems.error("type", tree.arguments[0].span, label, hint)
     for mode in automaton.all_modes:
         for transition in mode.transitions:
             _no_edge_that_waits(automaton, transition, problems)
@@ -41,7 +49,7 @@ def uses_memory(automaton: Automaton) -> Application | None:
         trees += [balance.right for balance in mode.flow.values()]
         for tree in trees:
             for part in walk(tree):
-                if isinstance(part, Application) and part.function in (*KEPT, *EDGES, "after"):
+                if isinstance(part, Application) and part.function in MEMORY:
                     return part
     return None
 
@@ -73,6 +81,18 @@ def _time(
             _spans_a_step(automaton, time, value, problems)
 
 
+def _beat(automaton: Automaton, tree: Application, problems: Problems) -> None:
+    """What comes again and again is not rounded: it would drift."""
+    time = tree.arguments[0]
+    value = exact_value(Formula(time, ""), automaton)
+    if value == 0:
+        problems.error("wait", time.span, "the time of `every` is above zero")
+    elif automaton.period and value > 0 and (value / automaton.period).denominator != 1:
+        label = f"`every` of {float(value / automaton.period):g} ticks would drift"
+        hint = f"a whole number of periods of {float(automaton.period):g} s"
+        problems.error("wait", time.span, label, hint)
+
+
 def _spans_a_step(automaton: Automaton, time: Tree, value: Fraction, problems: Problems) -> None:
     """The value of a stage is looked up, so it must not lie inside the step that is taken."""
     if 0 <= value < automaton.step:
@@ -98,7 +118,7 @@ def _no_edge_that_waits(automaton: Automaton, transition: Transition, problems: 
     edges = [
         part
         for part in walk(transition.when.tree)
-        if isinstance(part, Application) and part.function in EDGES
+        if isinstance(part, Application) and part.function in (*EDGES, "every")
     ]
     if edges and transition.wait and exact_value(transition.wait, automaton) > 0:
         label = f"`{edges[0].function}` is true for one instant: it cannot hold for a wait"

@@ -1,4 +1,4 @@
-"""History of a continuous automaton: `delay` as operations, `after` as time events.
+"""History of a continuous automaton: `delay` as operations, `after` and `every` as time events.
 
 A delayed quantity is kept at the major steps, when everything of that instant has happened, and
 read by linear interpolation: a step of it becomes a ramp over one major step. What is read lies at
@@ -40,7 +40,7 @@ from language.operation import (
 )
 from language.parameter import constant_names
 from language.program import Alarm, Variable
-from language.syntax import Application, Name, Tree, memory_key, walk
+from language.syntax import TIMES, Application, Name, Tree, memory_key, walk
 
 AGE = Ref("memory.age")
 """Time since the last record [s]; an engine sets it."""
@@ -216,26 +216,27 @@ def history_variables(histories: tuple[History, ...]) -> list[Variable]:
 
 
 def alarms_of(automaton: Automaton) -> tuple[Alarm, ...]:
-    """Return the times after which an `after` in a guard is true, by mode."""
+    """Return the times after which an `after` or `every` in a guard is true, by mode."""
     found: list[Alarm] = []
     for mode in automaton.all_modes:
-        for tree in _afters(mode).values():
+        for tree in _times(mode).values():
             time = exact_value(Formula(tree.arguments[0], ""), automaton)
-            name = f"memory.after_{len(found) + 1}"
-            found.append(Alarm(name, mode.region, mode.number, time))
+            name = f"memory.{tree.function}_{len(found) + 1}"
+            repeats = tree.function == "every"
+            found.append(Alarm(name, mode.region, mode.number, time, repeats))
     return tuple(found)
 
 
 def alarm_names(automaton: Automaton) -> Mapping[str, Names]:
-    """Return, by the key of a mode, what the `after` in its guards are."""
+    """Return, by the key of a mode, what the times in its guards are."""
     alarms = iter(alarms_of(automaton))
     return {
-        mode.key: {key: Ref(next(alarms).variable) for key in _afters(mode)}
+        mode.key: {key: Ref(next(alarms).variable) for key in _times(mode)}
         for mode in automaton.all_modes
     }
 
 
-def _afters(mode: Mode) -> dict[str, Application]:
+def _times(mode: Mode) -> dict[str, Application]:
     parts = [part for t in mode.transitions for part in walk(t.when.tree)]
-    found = [part for part in parts if isinstance(part, Application) and part.function == "after"]
+    found = [part for part in parts if isinstance(part, Application) and part.function in TIMES]
     return {memory_key(part): part for part in found}

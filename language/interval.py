@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from language.syntax import (
+    TIMES,
     Application,
     Arithmetic,
     Choice,
@@ -157,7 +158,7 @@ class Ranging:
                 self.of(part, limits)
             first = tree.arguments[0]
             return self.table(first.path) if isinstance(first, Name) else ANYTHING
-        if name in ("in", "after"):
+        if name in ("in", *TIMES):
             return ANYTHING
         parts = [self.of(part, limits) for part in tree.arguments]
         if self.report and name == "sqrt" and parts[0].low < 0.0:

@@ -1,15 +1,14 @@
-"""Memory of a sampled automaton: `previous`, `delay`, `rising`, `falling`, `after` as operations.
+"""Memory of a sampled automaton: `previous` and `delay` as operations.
 
 A delay of N ticks is a ring of N values; the oldest is overwritten once a tick, when the equations
 of the resulting mode hold and before the updates. Until it was written once, a delayed value is
-the value of now. An edge is a truth value per `rising` or `falling`: whether the opposite was seen
-at the tick before, in the same activation of the mode. `after` is a counter of ticks per mode.
+the value of now. What guards remember of an activation is in language/activation.py.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from language.constants import exact_value
@@ -21,11 +20,9 @@ from language.model import Automaton, Mode
 from language.once import once
 from language.operation import (
     Assign,
-    Binary,
     Block,
     Branch,
     Compare,
-    Count,
     Expr,
     Item,
     Loop,
@@ -33,15 +30,13 @@ from language.operation import (
     Ref,
     Select,
     Store,
-    Unary,
     Value,
     add,
     whole,
 )
 from language.problem import Problems
-from language.program import ValueType, Variable, mode_variable
+from language.program import ValueType, Variable
 from language.syntax import (
-    EDGES,
     KEPT,
     MEMORY,
     Application,
@@ -75,20 +70,6 @@ class Delay:
     def oldest(self) -> str:
         """The variable that says which value of the ring is the oldest."""
         return f"memory.oldest_{self.number}"
-
-
-@dataclass(frozen=True)
-class Edge:
-    """A `rising` or `falling` in the guards of a mode (its key path)."""
-
-    number: int
-    mode: str
-    tree: Application
-
-    @property
-    def opposite(self) -> str:
-        """The variable: the opposite was seen at an earlier instant of this activation."""
-        return f"memory.opposite_{self.number}"
 
 
 def formulas(mode: Mode) -> Iterator[Formula]:
@@ -193,96 +174,11 @@ def keep_block(automaton: Automaton, delays: tuple[Delay, ...], known: Names) ->
             replace.append(Assign(oldest.name, Select(last, whole(0), add(oldest, whole(1)))))
     ring: Block = (Branch(KEPT_ONCE, tuple(replace), tuple(fill)),) if fill else ()
     done: Block = (Assign(KEPT_ONCE.name, Value(True)),) if values else ()
-    return (*values, *ring, *commit, *done, *_elapse(automaton))
-
-
-def _elapse(automaton: Automaton) -> Iterator[Op]:
-    """One more tick was spent in the mode."""
-    for timer, mode, longest in _timers(automaton).values():
-        variable = mode_variable("memory.mode", mode.region)
-        active = Compare("==", Ref(variable), whole(mode.number))
-        yield Count(timer, active, longest, f"{automaton.name} {mode.key}")
-
-
-@once
-def _timers(automaton: Automaton) -> dict[str, tuple[str, Mode, int]]:
-    """Return, by mode, the counter of its ticks and how far it counts."""
-    found: dict[str, tuple[str, Mode, int]] = {}
-    for mode in automaton.all_modes:
-        longest = max((ticks_of(automaton, a.arguments[0]) for a in _afters(mode)), default=0)
-        if longest:
-            found[mode.key] = (f"timer.after_{len(found) + 1}", mode, longest)
-    return found
-
-
-def _afters(mode: Mode) -> list[Application]:
-    parts = [part for t in mode.transitions for part in walk(t.when.tree)]
-    return [part for part in parts if isinstance(part, Application) and part.function == "after"]
-
-
-@once
-def edges_of(automaton: Automaton) -> tuple[Edge, ...]:
-    """Return the edges that the guards of each mode read."""
-    found: dict[tuple[str, str], Edge] = {}
-    for mode in automaton.all_modes:
-        for transition in mode.transitions:
-            for part in walk(transition.when.tree):
-                if isinstance(part, Application) and part.function in EDGES:
-                    key = mode.key, memory_key(part)
-                    found.setdefault(key, Edge(len(found) + 1, mode.key, part))
-    return tuple(found.values())
-
-
-@once
-def edges_by_mode(automaton: Automaton) -> Mapping[str, list[Edge]]:
-    """Return the edges by the key of the mode whose guards read them."""
-    found: dict[str, list[Edge]] = {}
-    for edge in edges_of(automaton):
-        found.setdefault(edge.mode, []).append(edge)
-    return found
-
-
-def guard_names(automaton: Automaton, mode: Mode) -> dict[str, Expr]:
-    """Return what the edges and times of a mode's guards are."""
-    found: dict[str, Expr] = {}
-    for edge in edges_by_mode(automaton).get(mode.key, ()):
-        found[memory_key(edge.tree)] = Ref(f"work.edge_{edge.number}")
-    timers = _timers(automaton)
-    for part in _afters(mode):
-        ticks = ticks_of(automaton, part.arguments[0])
-        over: Expr = Value(True)
-        if ticks:
-            over = Compare(">=", Ref(timers[mode.key][0]), whole(ticks))
-        found[memory_key(part)] = over
-    return found
-
-
-def watch_edges(automaton: Automaton, mode: Mode, known: Mapping[str, Expr]) -> list[Op]:
-    """Return the edges of now, and what they leave for the next tick (rule 8)."""
-    ops: list[Op] = []
-    for edge in edges_by_mode(automaton).get(mode.key, ()):
-        level = expression(edge.tree.arguments[0], known)
-        rising = edge.tree.function == "rising"
-        here, seen = Ref(f"work.level_{edge.number}"), Ref(edge.opposite)
-        ops.append(Assign(here.name, level if rising else Unary("not", level)))
-        ops.append(Assign(f"work.edge_{edge.number}", Binary("and", here, seen)))
-        ops.append(Assign(seen.name, Unary("not", here)))
-    return ops
-
-
-def leave(automaton: Automaton, source: Mode, target: Mode) -> list[Op]:
-    """Return what a transition forgets: the edges of its source; its target's time starts."""
-    ops: list[Op] = [
-        Assign(edge.opposite, Value(False)) for edge in edges_by_mode(automaton).get(source.key, ())
-    ]
-    timers = _timers(automaton)
-    if target.key in timers:
-        ops.append(Assign(timers[target.key][0], whole(0)))
-    return ops
+    return (*values, *ring, *commit, *done)
 
 
 def memory_variables(automaton: Automaton, delays: tuple[Delay, ...]) -> list[Variable]:
-    """Return the variables of all of it; `finished` leaves out what is not used."""
+    """Return the variables of delays; `finished` leaves out what is not used."""
     found = [
         Variable("memory.kept", "truth", about="delayed values are kept"),
         Variable("work.slot", "whole"),
@@ -292,13 +188,6 @@ def memory_variables(automaton: Automaton, delays: tuple[Delay, ...]) -> list[Va
         found.append(Variable(delay.name, delay.type, size=size, about=_about(delay)))
         found.append(Variable(delay.oldest, "whole", about="which of them is the oldest"))
         found.append(Variable(f"work.keep_{delay.number}", delay.type))
-    for edge in edges_of(automaton):
-        found.append(Variable(edge.opposite, "truth", about=f"opposite seen in `{edge.mode}`"))
-        found.append(Variable(f"work.level_{edge.number}", "truth"))
-        found.append(Variable(f"work.edge_{edge.number}", "truth"))
-    for timer, mode, longest in _timers(automaton).values():
-        about = f"ticks since entry of `{mode.name}`, at most {longest}"
-        found.append(Variable(timer, "whole", about=about))
     return found
 
 

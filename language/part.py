@@ -14,6 +14,7 @@ from language.field import (
 from language.history import (
     AGE,
     History,
+    alarms_of,
     fill_block,
     record_block,
 )
@@ -86,12 +87,18 @@ def parts_block(
         ),
         "equations": evaluate,
         **record,
-        "watch": (*now, Choose("memory.mode", watch), Run("load")),
+        "watch": (*_silenced(automaton), *now, Choose("memory.mode", watch), Run("load")),
         "jump": (*none_fired(automaton), *now, by_mode(field, "jump")),
         "flow": (by_mode(field, "move"),),
         "dense": (Choose(field.mode, tuple((m.number, _dense(m)) for m in modes)),),
         "peek": (Run("point"), *ends),
     }
+
+
+def _silenced(automaton: Automaton) -> Block:
+    """What repeats is true for one instant, which is over when guards are watched."""
+    repeating = [alarm for alarm in alarms_of(automaton) if alarm.repeats]
+    return tuple(Assign(alarm.variable, Value(False)) for alarm in repeating)
 
 
 def _dense(mode: Mode) -> Block:

@@ -104,12 +104,16 @@ class TransitionInfo:
 
 @dataclass(frozen=True)
 class Alarm:
-    """A time [s] after the entry of a mode at which a variable becomes true (rule 8)."""
+    """A time [s] after the entry of a mode at which a variable becomes true (rule 8).
+
+    Where it `repeats` the variable is true for that instant, and again each time [s] after it.
+    """
 
     variable: str
     region: str
     mode: int
     time: Fraction
+    repeats: bool = False
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from language.action import (
     first_entry,
     reading,
 )
+from language.activation import activation_variables, elapse
 from language.constants import derive_block, parameter_constants, values_of
 from language.covariance import COVARIANCE_RANGE, covariance_variables
 from language.decision import decision_block, decision_variables
@@ -206,6 +207,7 @@ class _Sampled:
         found += observer_variables(automaton)
         found += covariance_variables(automaton)
         found += memory_variables(automaton, self.delays)
+        found += activation_variables(automaton)
         found += rewind_variables(automaton)
         found += mode_and_fired(automaton, "tick")
         found.append(Variable("memory.started", "truth", about="the first tick is done"))
@@ -293,7 +295,7 @@ class _Sampled:
     def _keep(self) -> Block:
         """What is kept of a tick once it has jumped."""
         delayed = keep_block(self.automaton, self.delays, self.all)
-        return (*delayed, *keep_past(self.automaton))
+        return (*delayed, *elapse(self.automaton), *keep_past(self.automaton))
 
     def _carried(self, mode: Mode) -> Block:
         if mode.name in self.observers:

@@ -56,7 +56,7 @@ BETWEEN = ("work.h", "work.left", "work.merge", "work.elapsed", "work.crossed", 
 class Wait:
     """Something that is due a time after it began, while a mode of a region is active.
 
-    That of a transition begins when its guard turns true; an `after` when its mode is entered.
+    That of a transition begins when its guard turns true; `after` and `every` begin on entry.
     """
 
     timer: str
@@ -87,8 +87,12 @@ def waits_of(infos: tuple[TransitionInfo, ...], alarms: tuple[Alarm, ...]) -> Wa
             found.append(Wait(*place, armed, (Assign(info.timer, real(0.0)),), (), True))
     for number, alarm in enumerate(alarms, start=1):
         rings, silent = Assign(alarm.variable, Value(True)), Assign(alarm.variable, Value(False))
-        place = (f"timer.after_{number}", alarm.time, alarm.region, alarm.mode)
-        found.append(Wait(*place, Unary("not", Ref(alarm.variable)), (rings,), (silent,), False))
+        timer = f"timer.after_{number}"
+        end: Block = (rings,)
+        if alarm.repeats:
+            end = (rings, Assign(timer, add(Ref(timer), real(alarm.time))))
+        place = (timer, alarm.time, alarm.region, alarm.mode)
+        found.append(Wait(*place, Unary("not", Ref(alarm.variable)), end, (silent,), False))
     return tuple(found)
 
 

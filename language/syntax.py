@@ -140,8 +140,9 @@ Tree = (
 
 
 KEPT = ("previous", "delay")
-EDGES = ("rising", "falling")
-MEMORY = (*KEPT, *EDGES, "after")
+EDGES = ("rising", "falling", "changed")
+TIMES = ("after", "every")
+MEMORY = (*KEPT, *EDGES, *TIMES)
 """Functions with memory."""
 
 

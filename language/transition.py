@@ -9,10 +9,10 @@ from fractions import Fraction
 from itertools import accumulate
 
 from language.action import entry, stage, stage_of_regions
+from language.activation import guard_names, leave, watch_edges
 from language.constants import exact_value
 from language.declaration import Formula
 from language.lower import equation_names, expression, reads_of
-from language.memory import guard_names, leave, watch_edges
 from language.model import Automaton, Mode, Transition
 from language.once import once
 from language.operation import (

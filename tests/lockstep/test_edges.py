@@ -125,6 +125,21 @@ equations:
 modes: {{only: {{}}}}
 outputs: [r]
 """,
+    "beats and changes": """\
+inputs: {u: {unit: "1"}, go: {type: bool}}
+discrete: {count: {type: int, initial: 0, range: [0, 9]}}
+initial: a
+modes:
+  a:
+    update: {count: "floor(min(abs(u), 3))"}
+    transitions:
+      b: {when: every(20 ms) and changed(u), priority: 1}
+      again: {to: a, when: changed(go) and not every(30 ms), priority: 2}
+  b:
+    update: {count: count + 1}
+    transitions: {a: {when: changed(count) or changed(count > 3 or go)}}
+outputs: [count, mode]
+""",
     "truth tables": """\
 inputs: {u: {unit: "1"}, go: {type: bool}}
 discrete:
