@@ -177,7 +177,7 @@ class Moment:
 
     def _remembered(self, part: Application) -> Expr:
         automaton = self.automaton
-        if self.tag and part.function in EDGES:
+        if self.tag and part.function in (*EDGES, "every"):
             return Value(False)  # nothing was seen before in this activation
         if part.function == "after":
             if self.tag:
@@ -190,6 +190,9 @@ class Moment:
             time = expression(part.arguments[0], constant_names(automaton))
             return Compare(">=", Ref(ELAPSED), time)
         name = f"memory.{part.function}_{len(self.story.extents)}{self.tag}"
+        if part.function in ("changed", "every"):
+            self.story.extents[name] = Extent("truth")
+            return Ref(name)
         if part.function in EDGES:
             self.story.extents[name] = Extent("truth")
             level = expression(part.arguments[0], self.known)
