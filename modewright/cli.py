@@ -21,6 +21,7 @@ from modewright.commands.doctor import doctor
 from modewright.commands.effects import effects
 from modewright.commands.explain import explain
 from modewright.commands.fit import fit
+from modewright.commands.format import format
 from modewright.commands.generate import generate
 from modewright.commands.graph import graph
 from modewright.commands.lockstep import lockstep
@@ -41,7 +42,7 @@ YOUNG_OBJECTS = 100_000
 """New objects after which garbage is looked for: trees of expressions have no circles."""
 COMMANDS = (
     new, check, test, diagnose, fit, effects, simulate, sweep, lockstep, replay, plot, compare,
-    graph, generate, explain, schema, lsp, demo, doctor,
+    graph, generate, explain, format, schema, lsp, demo, doctor,
 )  # fmt: skip
 
 app = typer.Typer(

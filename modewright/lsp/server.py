@@ -8,6 +8,8 @@ from lsprotocol import types
 from pygls.exceptions import JsonRpcInvalidParams
 from pygls.lsp.server import LanguageServer
 
+from language.problem import SpecError
+from modewright.editing.format import formatted
 from modewright.lsp.completion import complete
 from modewright.lsp.desk import Desk
 from modewright.lsp.hover import hover, mention_at
@@ -74,6 +76,17 @@ def _answer_questions(server: LanguageServer, desk: Desk) -> None:
         world, path = desk.world(params.text_document.uri)
         items = complete(world, path, world.texts.get(path, ""), params.position)
         return types.CompletionList(is_incomplete=False, items=items)
+
+    @server.feature(types.TEXT_DOCUMENT_FORMATTING)
+    def laid_out(params: types.DocumentFormattingParams) -> list[types.TextEdit]:
+        world, path = desk.world(params.text_document.uri)
+        text = world.texts.get(path, "")
+        try:
+            made = formatted(text)
+        except SpecError:
+            return []
+        everything = types.Range(types.Position(0, 0), types.Position(text.count("\n") + 1, 0))
+        return [] if made == text else [types.TextEdit(everything, made)]
 
     @server.feature(types.TEXT_DOCUMENT_DEFINITION)
     def defined(params: types.DefinitionParams) -> list[types.Location]:

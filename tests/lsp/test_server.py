@@ -246,3 +246,12 @@ def test_a_name_that_cannot_be_given_is_refused_with_the_reason(
     talk.open(outside, text)
     asked = {**talk.at(outside, *where(text, "M:")), "newName": "mass"}
     assert "not here" in talk.answer("textDocument/rename", asked)["error"]["message"]
+
+
+def test_a_text_is_laid_out(talk: Talk, heater: Path) -> None:
+    talk.change(heater, HEATER.replace("{P: 0 W}", "{  P: 0 W }"))
+    asked = {**talk.at(heater, 1, 0), "options": {"tabSize": 2, "insertSpaces": True}}
+    (edit,) = talk.ask("textDocument/formatting", asked)
+    assert edit["newText"] == HEATER
+    talk.change(heater, HEATER)
+    assert talk.ask("textDocument/formatting", asked) == []

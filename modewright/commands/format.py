@@ -1,0 +1,50 @@
+"""Command format: specs laid out by rules."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from modewright.console import console, counted
+from modewright.exits import PROBLEMS
+from modewright.files import require_writable, write_files
+
+
+def format(
+    files: Annotated[list[Path], typer.Argument(help="specs, or folders of specs")],
+    check: Annotated[
+        bool, typer.Option("--check", help="write nothing; exit code 1 if a file would change")
+    ] = False,
+) -> None:
+    """Lay specs out: indentation, blanks, alignment; comments, quotes and meaning stay.
+
+    \b
+    modewright format spec
+    modewright format --check spec/plant.yaml
+    """
+    from language.document import read_text
+    from modewright.editing.format import formatted
+
+    paths = [path for file in files for path in _specs(file)]
+    made: dict[Path, bytes] = {}
+    for path in paths:
+        _, text = read_text(path)
+        data = formatted(text, str(path)).encode()
+        if data != path.read_bytes():
+            made[path] = data
+    for path in made:
+        console().print(
+            f"{'would change' if check else 'changed'} {path}", soft_wrap=True, markup=False
+        )
+    if not check:
+        require_writable(*made)
+        write_files(made)
+    console().print(f"{counted(len(paths), 'spec')} read, {counted(len(made), 'change')}")
+    if check and made:
+        raise typer.Exit(PROBLEMS)
+
+
+def _specs(path: Path) -> list[Path]:
+    return sorted(path.rglob("*.yaml")) if path.is_dir() else [path]

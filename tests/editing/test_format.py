@@ -1,0 +1,138 @@
+"""Format: layout follows rules, and nothing else of a spec changes."""
+
+from __future__ import annotations
+
+import random
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from language.finding import source_of
+from language.problem import SpecError
+from language.project import document_of
+from modewright.cli import app
+from modewright.editing.format import formatted
+from modewright.editing.page import page_of
+from tests.editing.corpus import ROOT, documents, plain
+
+UNTIDY = """\
+language: 1
+automaton:   heater   # a room
+
+
+parameters:
+      T_on:             {value: 18 degC,about:   "below, it heats"}  # checked
+      P:                { value: 2 kW }
+      # of the supply
+      limits_of_power: {value: 3 kW}
+
+modes:
+   # at first
+   idle:
+        transitions:   {heating: {when: T < T_on,  priority: 1},
+            off: {when: T > T_on, priority: 2}}
+   heating: {}
+outputs: [ a,b , c ]
+about: >
+    two lines{blanks}
+    of text
+req:
+- A-1
+-   A-2
+
+
+""".replace("{blanks}", "   ")
+TIDY = """\
+language: 1
+automaton: heater     # a room
+
+parameters:
+  T_on: {value: 18 degC, about: "below, it heats"}                   # checked
+  P:    {value: 2 kW}
+  # of the supply
+  limits_of_power: {value: 3 kW}
+
+modes:
+  # at first
+  idle:
+    transitions: {heating: {when: T < T_on, priority: 1},
+        off: {when: T > T_on, priority: 2}}
+  heating: {}
+outputs: [a, b, c]
+about: >
+    two lines{blanks}
+    of text
+req:
+- A-1
+- A-2
+""".replace("{blanks}", "   ")
+
+
+def test_an_untidy_spec_is_laid_out_by_the_rules() -> None:
+    assert formatted(UNTIDY) == TIDY
+
+
+def test_every_spec_here_says_the_same_and_a_second_pass_changes_nothing() -> None:
+    for path, document in documents(("spec", "tests/data")):
+        text = path.read_text("utf-8-sig")
+        made = formatted(text, str(path))
+        again = document_of(source_of(path, made), made)
+        assert plain(again.root) == plain(document.root), path
+        assert _comments(made) == _comments(text), path
+        assert formatted(made) == made, path
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_spec_that_was_shaken_says_the_same_and_is_laid_out_once_and_for_all(seed: int) -> None:
+    chance = random.Random(seed)
+    path = ROOT / "spec" / "ev_driveline" / f"{('estimator', 'plant', 'hko')[seed % 3]}.yaml"
+    text = shaken(path.read_text("utf-8"), chance)
+    made = formatted(text)
+    before, after = (document_of(source_of(path, each), each) for each in (text, made))
+    assert plain(after.root) == plain(before.root)
+    assert _comments(made) == _comments(text)
+    assert formatted(made) == made
+
+
+def shaken(text: str, chance: random.Random) -> str:
+    """Return a text with other indentation, blanks and blank lines, and the same meaning."""
+    width = chance.choice((1, 2, 3, 5))
+    lines = []
+    for line in text.splitlines():
+        bare = line.lstrip(" ")
+        content, sign, comment = bare.partition(" #")
+        if '"' not in content:
+            content = content.replace(", ", chance.choice((", ", ",   ")))
+            content = content.replace("{", chance.choice(("{", "{ ")))
+        depth = (len(line) - len(bare)) // 2
+        lines.append(" " * (depth * width) + content + " " * chance.randint(0, 3) + sign + comment)
+        lines += [""] * chance.choice((0, 0, 0, 2))
+    return "\n".join(lines)
+
+
+def _comments(text: str) -> list[str]:
+    page = page_of(text)
+    return [page.lines[line][column:].rstrip() for line, column in page.comments.items()]
+
+
+def test_a_text_of_several_lines_is_left_as_it_is() -> None:
+    text = "about: |\n     a  # no comment\n\n\n       b   \nreq: 'x\n\n\n  y'\n"
+    assert formatted(text) == text
+
+
+def test_what_is_no_yaml_is_refused() -> None:
+    with pytest.raises(SpecError):
+        formatted("a: {b: 1")
+
+
+def test_check_writes_nothing_and_says_what_would_change(tmp_path: Path) -> None:
+    untidy, tidy = tmp_path / "a.yaml", tmp_path / "b.yaml"
+    untidy.write_text(UNTIDY)
+    tidy.write_text(TIDY)
+    told = CliRunner().invoke(app, ["format", "--check", str(tmp_path)])
+    assert told.exit_code == 1 and untidy.read_text() == UNTIDY
+    assert "would change" in told.output and "b.yaml" not in told.output
+    assert CliRunner().invoke(app, ["format", str(tmp_path)]).exit_code == 0
+    assert untidy.read_text() == TIDY
+    assert CliRunner().invoke(app, ["format", "--check", str(tmp_path)]).exit_code == 0
