@@ -62,9 +62,8 @@ class Candidate:
         for column, name in enumerate(self.predictor.seen):
             fresh = START.format(name)
             if fresh in known:
-                first = series.measured[:, column]
-                first = first[np.isfinite(first)]
-                known[fresh] = float(first[0]) if len(first) else known[fresh]
+                first = float(series.first[column])
+                known[fresh] = first if np.isfinite(first) else known[fresh]
         return np.array([known[name] for name in self.predictor.page])
 
 

@@ -14,7 +14,7 @@ from diagnosis.recipe import node_text
 from diagnosis.series import Series, pieces_of
 from diagnosis.shelf import Shelf, hash_of
 from diagnosis.threshold import EVERYWHERE, Thresholds
-from engine.recording import read_recording
+from engine.recording import Recording, read_recording
 from language.document import Document
 from language.effect import Effect
 from language.experiment import RecordingMap
@@ -29,9 +29,9 @@ Bootstrap = Literal["never", "kept", "made"]
 class Case:
     """What is diagnosed: an expanded automaton, a map, and recordings.
 
-    `names` are those of files whose bare name is not theirs alone; in the folder `stages` it is
-    kept what was found, so that a diagnosis that was ended goes on from there. `before` is called
-    before each fit: it may raise what ends the diagnosis.
+    `names` are those of files whose bare name is not theirs alone, `read` what was read already.
+    In the folder `stages` it is kept what was found, so that a diagnosis that was ended goes on
+    from there. `before` is called before each fit: it may raise what ends the diagnosis.
     """
 
     document: Document
@@ -43,6 +43,7 @@ class Case:
     thresholds: Thresholds = EVERYWHERE
     bootstrap: Bootstrap = "never"
     names: Mapping[Path, str] = field(default_factory=dict)
+    read: Mapping[Path, Recording] = field(default_factory=dict, repr=False)
     stages: Path | None = None
     before: Callable[[], None] = lambda: None
 
@@ -63,7 +64,9 @@ def read_series(
         for column in case.mapping.columns.values()
         if column.to in automaton.inputs or column.compare in seen
     ]
-    recording = read_recording(path, case.mapping, used)
+    recording = case.read.get(path)
+    if recording is None or not recording.channels.keys() >= set(used):
+        recording = read_recording(path, case.mapping, used)
     named = dataclasses.replace(recording, name=case.name_of(path))
     return pieces_of(named, case.mapping, automaton, seen)
 

@@ -14,7 +14,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.free_run import Compared, free_run
+from diagnosis.free_run import Compared, Programs, free_run
 from engine.interpreter import Interpreter, Stepper
 from engine.recording import Channel, Recording, cut, pieces
 from language.experiment import RecordingMap
@@ -87,6 +87,7 @@ def relations(
     found: list[Relation] = []
     left = MOST_SIMULATED
     automaton = _coarse(automaton)
+    made: Programs = {}
     each = min(LONGEST_PIECE, max(SHORTEST_PIECE, MOST_SIMULATED / max(1, len(recordings))))
     for recording in recordings:
         for piece in pieces(recording):
@@ -94,7 +95,7 @@ def relations(
                 return found
             part = _thinned(_part(piece, each))
             left -= part.end - part.start
-            run = free_run(automaton, part, mapping, build)
+            run = free_run(automaton, part, mapping, build, made)
             for name, compared in run.compared.items():
                 relation = relation_of(part.name, name, compared)
                 if relation:

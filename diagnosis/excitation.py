@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import numpy as np
+from matplotlib import mlab
 from numpy.typing import NDArray
-from scipy.signal import welch
 
 from diagnosis.channel_check import ChannelCheck, check_channel
 from diagnosis.needs import EFFECTS, NEEDS
@@ -168,7 +168,10 @@ def _band(values: Values, rate: float, floor: float) -> float:
     """Return the highest frequency [Hz] at which there is clearly more than noise."""
     if len(values) < 64 or not rate:
         return 0.0
-    frequencies, power = welch(values - values.mean(), rate, nperseg=min(len(values), 512))
+    length = min(len(values), 512)
+    power, frequencies = map(
+        np.asarray, mlab.psd(values, length, rate, mlab.detrend_mean, noverlap=length // 2)
+    )
     excited = frequencies[1:][power[1:] > ABOVE_NOISE * 2.0 * floor**2 / rate]
     return float(excited.max()) if len(excited) else 0.0
 

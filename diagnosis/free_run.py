@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 from bisect import bisect_left, bisect_right
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -13,16 +14,21 @@ from numpy.typing import NDArray
 from engine.interpreter import Interpreter, Stepper
 from engine.recording import Channel, Recording
 from engine.simulate import simulate
+from engine.starting import programs_of
 from engine.stimulus import stimulus_of
 from engine.trajectory import Trajectory
+from language.declaration import Formula, Input
 from language.experiment import RecordingMap, Scenario
 from language.model import Automaton
 from language.problem import Problems, SpecError
 from language.program import Program
 from language.signal import Piece, Stimulus
+from language.syntax import Name
 from language.system import around
 
 Values = NDArray[np.float64]
+START = "recorded_start_of_{}"
+"""The input at whose value a state starts."""
 
 
 @dataclass(frozen=True)
@@ -54,15 +60,21 @@ class FreeRun:
     compared: Mapping[str, Compared]
 
 
+Programs = dict[tuple[tuple[str, ...], ...], Mapping[str, Program]]
+"""Programs made for free runs, by the states that were recorded and the inputs that vary."""
+
+
 def free_run(
     automaton: Automaton,
     recording: Recording,
     mapping: RecordingMap,
     build: Callable[[Program], Stepper] = Interpreter,
+    made: Programs | None = None,
 ) -> FreeRun:
     """Simulate from the first measured values of the states on, with nothing fed back.
 
-    The simulation's rows are one major step apart; between them it is taken as linear.
+    The simulation's rows are one major step apart; between them it is taken as linear. Programs
+    `made` for other recordings of the same automaton are not made again.
     """
     fed = [c for c in recording.channels.values() if c.column.to in automaton.inputs]
     outputs = [c for c in recording.channels.values() if c.column.compare in automaton.outputs]
@@ -73,24 +85,44 @@ def free_run(
         label = f"recording `{recording.name}` ends before every input has a value"
         problems.error("range", mapping.span, label)
         raise SpecError(problems.found)
+    known = {
+        source: _value_at(channel, start)
+        for channel in outputs
+        if (source := automaton.source_of(channel.column.compare or "")) in automaton.states
+    }
+    begins = {START.format(name): Stimulus((Piece(Fraction(0), known[name]),)) for name in known}
     scenario = Scenario(
         name=recording.name,
         of=automaton.name,
         horizon=end - start,
-        initial={
-            f"{automaton.name}.{source}": _value_at(channel, start)
-            for channel in outputs
-            if (source := automaton.source_of(channel.column.compare or "")) in automaton.states
-        },
-        inputs=_inputs(automaton, fed, mapping, start),
+        initial={},
+        inputs={**_inputs(automaton, fed, mapping, start), **begins},
         every=automaton.step,
         span=mapping.span,
     )
-    trajectory = simulate(around(automaton), scenario, build)
+    system = around(_startable(automaton, known))
+    varying = [name for name, stimulus in scenario.inputs.items() if stimulus.varies]
+    kind = (tuple(known), tuple(varying))
+    made = {} if made is None else made
+    if kind not in made:
+        made[kind] = programs_of(system, scenario)
+    trajectory = simulate(system, scenario, build, programs=made[kind])
     compared = {
         channel.column.name: _compared(automaton, channel, trajectory, start) for channel in outputs
     }
     return FreeRun(trajectory, start, compared)
+
+
+def _startable(automaton: Automaton, names: Collection[str]) -> Automaton:
+    """Return an automaton some states of which start at the value of an input of their own."""
+    inputs, states = dict(automaton.inputs), dict(automaton.states)
+    for name in names:
+        state, own = states[name], START.format(name)
+        key = f"states.{name}.initial"
+        inputs[own] = Input(own, state.unit, "real", None, None, key, state.span)
+        formula = Formula(Name(own, state.span), key)
+        states[name] = dataclasses.replace(state, initial=formula)
+    return dataclasses.replace(automaton, inputs=inputs, states=states)
 
 
 def _inputs(

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from codegen.predictor import Prediction
 from diagnosis.candidate import Candidate
 from diagnosis.linear import Linear, linearised
-from diagnosis.noise import MAD, noise_of
+from diagnosis.noise import MAD
 from diagnosis.series import Series
 
 Reals = NDArray[np.float64]
@@ -123,8 +123,7 @@ class Outcome:
 
 def noises_of(series: Sequence[Series], drifts: Mapping[str, float]) -> Noises:
     """Return the noise of the signals and inputs of some recordings: the median over them."""
-    seen = [[noise_of(column) for column in one.measured.T] for one in series]
-    inputs = [[noise_of(column) for column in one.inputs.T] for one in series]
+    seen, inputs = [np.array([one.noise[k] for one in series]) for k in (0, 1)]
     floor = [float(np.nanmax(np.abs(one.measured))) * 1e-6 + 1e-12 for one in series]
     known = np.maximum(np.median(seen, axis=0), np.median(floor))
     return Noises(known, np.median(inputs, axis=0), drifts, np.full(len(known), np.inf))

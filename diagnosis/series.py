@@ -11,11 +11,12 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import uniform_filter1d
 
+from diagnosis.noise import noise_of
 from engine.recording import Channel, Recording, pieces
 from language.experiment import RecordingMap
 from language.graph import reachable
@@ -45,6 +46,21 @@ class Series:
     def count(self) -> int:
         """The number of samples."""
         return len(self.inputs)
+
+    @cached_property
+    def first(self) -> Reals:
+        """The first known value of each compared signal (seen,), NaN where there is none."""
+        known = np.isfinite(self.measured)
+        rows = np.argmax(known, axis=0)
+        return np.asarray(self.measured[rows, np.arange(len(rows))], dtype=np.float64)
+
+    @cached_property
+    def noise(self) -> tuple[Reals, Reals]:
+        """The standard deviation of the noise of the compared signals (seen,) and the inputs."""
+        seen, inputs = (
+            [noise_of(column) for column in values.T] for values in (self.measured, self.inputs)
+        )
+        return np.array(seen), np.array(inputs)
 
 
 def compared(mapping: RecordingMap, automaton: Automaton) -> tuple[str, ...]:
@@ -143,7 +159,9 @@ def thinned(series: Series, is_linear: bool = False) -> Series:
     count = series.count // factor
     inputs = series.inputs[: count * factor]
     if is_linear and factor > 1:
-        inputs = uniform_filter1d(inputs, factor | 1, axis=0, mode="nearest")[::factor]
+        around = np.pad(inputs, ((factor // 2, factor // 2), (0, 0)), mode="edge")
+        windows = np.lib.stride_tricks.sliding_window_view(around, 2 * (factor // 2) + 1, axis=0)
+        inputs = np.mean(windows[::factor], axis=-1)
     else:
         inputs = np.mean(inputs.reshape(count, factor, -1), axis=1)
     return Series(

@@ -206,7 +206,9 @@ def _case(
     files = tuple(Path(file) for file in train), tuple(Path(file) for file in held_out)
     candidates = _candidates(effects, project)
     names = {**file_names(files[0]), **file_names(files[1])}
-    return Case(whole, project, checked.mapping, *files, candidates, names=names), automaton
+    read = dict(zip(files[0], checked.recordings, strict=True))
+    case = Case(whole, project, checked.mapping, *files, candidates, names=names, read=read)
+    return case, automaton
 
 
 def _wanted(thresholds: str | Path) -> tuple[Bootstrap, Thresholds]:
