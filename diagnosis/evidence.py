@@ -48,13 +48,20 @@ class Evidence:
         return self.left_out - max(self.each)
 
     @property
+    def most(self) -> float:
+        """What is gained left out without the recording that gains least."""
+        return self.left_out - min(self.each)
+
+    @property
     def total(self) -> float:
         """Their sum: what candidates are ranked by."""
         return self.train + self.left_out
 
 
 def evidence(model: Estimate, base: Estimate, series: Sequence[Series]) -> Evidence:
-    """Return what a model gains over a base that it extends."""
+    """Return what a model gains over a base that it extends; one that is unstable loses all."""
+    if not np.isfinite(model.cost):
+        return Evidence(-np.inf, -np.inf, (-np.inf,) * len(series))
     shrink = 1.0 / inflation(model, series)
     count = float(np.sum(model.outcome.counts()))
     more = _free(model, len(series)) - _free(base, len(series))
@@ -107,12 +114,12 @@ def _gained(before: Reals, after: Reals, counts: Reals) -> Reals:
 def _left_out(model: Estimate, series: Sequence[Series]) -> Reals:
     """Return the squares (recordings, seen) of each block at the point that the others ask for."""
     found = np.zeros((len(series), len(model.candidate.predictor.seen)))
-    for fold in range(FOLDS):
+    for fold in range(FOLDS if model.normal else 0):
         outcome = _without(model, series, fold)
         if not outcome.is_whole:
             return np.full(found.shape, np.inf)
         found += _squares(outcome, fold, False)
-    return found
+    return found if model.normal else np.full(found.shape, np.inf)
 
 
 def _without(model: Estimate, series: Sequence[Series], fold: int) -> Outcome:

@@ -12,20 +12,23 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from diagnosis.bench import Bench
-from diagnosis.estimation import Estimate, with_normal
+from diagnosis.estimation import Estimate, estimated, with_normal
 from diagnosis.evidence import evidence, inflation
-from diagnosis.freedom import freed
+from diagnosis.freedom import SMALL_LEVEL, freed, with_levels
 from diagnosis.layers import DRIFT, Layer, fitting
+from diagnosis.level import units_of
 from diagnosis.locus import Locus
 from diagnosis.search import Tell, Tried
 from diagnosis.selection import Selection
 
 MOST = 0.8
 """Part of the squares of a drift that its loudest samples have."""
-SHORT = 0.15
+SHORT = 0.22
 """Part of all samples that these are at most, of what acts in windows."""
-CLEARLY = 1.1
-"""Times the gain of the best effect that it must gain."""
+LITTLE = 0.5
+"""Part of what it gains that effects explain less of, if it is to stand for them."""
+ROUNDS = 5
+"""Rounds in which what was accepted is fitted without drifts."""
 
 
 def with_hidden(
@@ -37,28 +40,39 @@ def with_hidden(
 ) -> Selection:
     """Return a selection in which a hidden input stands for effects that explain less than it.
 
-    `needed` are the nats that it must gain over the base at least.
+    Gains are those over the base without drifts, of which the base as it is may have taken its
+    part. `needed` are the nats that it must gain at least.
     """
     base = selection.base
-    best = max((t.evidence.train for t in selection.accepted if t.evidence), default=0.0)
     shrink = 1.0 / inflation(base, bench.series)
-    for locus in loci:
-        layer = _layer(bench, locus)
-        if layer is None or shrink * locus.beyond < max(needed, CLEARLY * best):
-            continue
-        drift = next(d for d in bench.drifts if d.place == locus.place)
-        model = with_normal(freed(bench, base, drift), bench.series)
-        if not acts_in_windows(model, drift.named(DRIFT)):
-            continue
-        known = evidence(model, base, bench.series)
-        if known.least > max(needed, CLEARLY * best):
-            tell(f"accepted {layer.id}: {known.least:.0f} nats, silent most of the time")
-            found = Tried(layer, base.cost - model.cost, model, known)
-            first = (found, *selection.first_round)
-            return dataclasses.replace(
-                selection, model=model, accepted=(found,), first_round=first, rivals=()
-            )
-    return selection
+    loud = [one for one in loci if _layer(bench, one) and shrink * one.gain > needed]
+    if not loud:
+        return selection
+    locus, quiet = loud[0], freed(bench, base)
+    drift = next(d for d in bench.drifts if d.place == locus.place)
+    model = with_normal(freed(bench, base, drift), bench.series)
+    if not acts_in_windows(model, drift.named(DRIFT)):
+        return selection
+    if selection.accepted:
+        without = _quieted(bench, selection.model)
+        if quiet.cost - without.cost > LITTLE * (quiet.cost - model.cost):
+            return selection
+    known, layer = evidence(model, quiet, bench.series), _layer(bench, locus)
+    if layer is None or known.least < needed:
+        return selection
+    tell(f"accepted {layer.id}: {known.least:.0f} nats, silent most of the time")
+    found = Tried(layer, quiet.cost - model.cost, model, known)
+    first = (found, *selection.first_round)
+    return dataclasses.replace(
+        selection, model=model, accepted=(found,), first_round=first, rivals=()
+    )
+
+
+def _quieted(bench: Bench, model: Estimate) -> Estimate:
+    """Return a model fitted with next to no drift: what it explains without."""
+    units = units_of(model.candidate, bench.series, model.noises, model.values(0))
+    noises = with_levels(model.noises, units, dict.fromkeys(units, SMALL_LEVEL))
+    return estimated(model.candidate, bench.series, noises, model.point, ROUNDS)
 
 
 def acts_in_windows(model: Estimate, name: str) -> bool:

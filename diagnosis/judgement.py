@@ -29,7 +29,7 @@ from diagnosis.ways import Way, better_way, chosen
 CLEAR = 3.0
 """A rival within this of the best [nats] makes the verdict ambiguous."""
 UNKNOWN = 4.0
-"""Times the threshold that a free drift must gain over the base where no effect was accepted."""
+"""Times the threshold that a free drift must gain where no effect was accepted."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ def _thresholds(
 def _says(selection: Selection, loci: Sequence[Locus], bench: Bench, needed: float) -> Says:
     if not selection.accepted:
         shrink = 1.0 / inflation(selection.base, bench.series)
-        unexplained = max((locus.beyond for locus in loci), default=0.0) * shrink
+        unexplained = max((locus.gain for locus in loci), default=0.0) * shrink
         return "unknown" if unexplained > UNKNOWN * needed else "nothing_missing"
     best = selection.accepted[0].evidence
     rivals = [tried.evidence for tried in selection.rivals if tried.evidence]

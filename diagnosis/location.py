@@ -36,8 +36,7 @@ def located(bench: Bench, base: Estimate) -> tuple[Locus, ...]:
     for section, layer, one in free:
         if np.isfinite(one.cost):
             locus = locus_of(bench, section, layer, one)
-            gain, beyond = quiet - one.cost, base.cost - one.cost
-            found.append(dataclasses.replace(locus, gain=gain, beyond=beyond))
+            found.append(dataclasses.replace(locus, gain=quiet - one.cost))
     return tuple(sorted(found, key=lambda locus: -locus.gain))
 
 

@@ -26,8 +26,7 @@ MOST_WINDOWS = 12
 
 @dataclass(frozen=True)
 class Locus:
-    """One place: `gain` [nats] of its freedom, of it `beyond` the base as it is; `rms` of its drift
-    [SI], and that as a `part` of what acts there; the `windows` (start, end, recording) in which it
+    """One place: `gain` [nats] of its freedom over none; `rms` of its drift [SI], and that as a `part` of what acts there; the `windows` (start, end, recording) in which it
     is loud, its share by mode, and what it goes `along` with. At a `named` one stands an effect
     that was accepted. `values` are the parameters [SI] fitted beside its freedom.
     """
@@ -39,7 +38,6 @@ class Locus:
     windows: tuple[tuple[float, float, str], ...] = ()
     modes: dict[str, float] = dataclasses.field(default_factory=dict)
     along: tuple[tuple[str, float], ...] = ()
-    beyond: float = 0.0
     part: float = 0.0
     named: bool = False
     values: Mapping[str, float] = dataclasses.field(default_factory=dict, repr=False)

@@ -52,9 +52,14 @@ def columns_of(
         k = candidate.names.index(name)
         ahead = point.moved(candidate, k, STEP)
         size = float(ahead.shared[k] - point.shared[k])
-        seen = run(ahead).innovations
-        found[name] = tuple((a - b) / size for a, b in zip(seen, outcome.innovations, strict=True))
+        pairs = zip(run(ahead).innovations, outcome.innovations, strict=True)
+        found[name] = tuple(_known((a - b) / size) for a, b in pairs)
     return found
+
+
+def _known(changes: Reals) -> Reals:
+    """Return changes, 0 where there is none: nothing was seen, or the run left all bounds."""
+    return np.where(np.isfinite(changes), changes, 0.0)
 
 
 def normal_of(candidate: Candidate, outcome: Outcome, columns: Columns) -> Normal:
@@ -68,7 +73,7 @@ def normal_of(candidate: Candidate, outcome: Outcome, columns: Columns) -> Norma
         innovation = outcome.innovations[r][part]
         known = np.isfinite(innovation)
         far = np.maximum(np.abs(innovation) / outcome.limits, 1.0)
-        each = [np.where(known, columns[name][r][part], 0.0) for name in candidate.names]
+        each = [columns[name][r][part] * known for name in candidate.names]
         jacobian = np.array(each).reshape(count, -1)
         weighted = jacobian * np.where(known, scale / far, 0.0).reshape(-1)
         a[place] = weighted @ jacobian.T

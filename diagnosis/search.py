@@ -23,6 +23,8 @@ POOR = 2.0
 """Innovations that count as one, from which on a fit is no good."""
 STARTS = 2
 """Starts of a candidate from which steps are made, the best ones."""
+HOPELESS = 0.05
+"""A candidate that promises less than this part of what another has gained is not fitted."""
 WORTH = 10.0
 """A candidate that promises less [nats] is not fitted."""
 Tell = Callable[[str], None]
@@ -61,9 +63,10 @@ def searched(
             start = bench.kept("screened", candidate, known, make)
             promised.append((base.cost - start.cost, layer, start))
     promised.sort(key=lambda one: -one[0])
-    found = []
+    found: list[Tried] = []
     for place, (gain, layer, start) in enumerate(promised):
-        if place >= FULL_FITS or gain < worth:
+        best = max((one.evidence.train for one in found if one.evidence), default=0.0)
+        if place >= FULL_FITS or gain < max(worth, HOPELESS * best):
             found.append(Tried(layer, gain))
             continue
         given = (base.noises, start.point, units, start.cost - WORTH)

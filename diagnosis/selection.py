@@ -26,6 +26,8 @@ NEXT = 9
 """Candidates that are looked at again beside an accepted one: the best of the round before."""
 AGAIN = 15
 """Candidates that are looked at again where the model itself is found to fit better."""
+FEW = 3
+"""Recordings of which none can be against all others."""
 MUCH = 0.1
 """Part of what the best candidate gained that a model must gain for them to be looked for anew."""
 SHARED = 0.15
@@ -100,8 +102,9 @@ def selected(
         best = next(enough, None)
         if best is None or best.estimate is None or best.evidence is None:
             break
-        needed = PART * best.evidence.least
-        tell(f"accepted {best.layer.id}: {best.evidence.least:.0f} nats")
+        gained = counted(best.evidence, left_out)
+        needed = PART * gained
+        tell(f"accepted {best.layer.id}: {gained:.0f} nats")
         before = [*accepted, best]
         accepted, model = swapped(bench, best.estimate, before, rounds[0], units, tell)
         rounds[0] = _refuted(rounds[0], before, accepted)
@@ -117,13 +120,17 @@ def _refuted(first: list[Tried], before: list[Tried], after: list[Tried]) -> lis
 
 
 def counted(known: Evidence, left_out: float = 1.0) -> float:
-    """Return what an effect gains [nats] as it counts: less where one recording alone shows it.
+    """Return what an effect gains [nats] as it counts: less where one recording is against all.
 
-    A little in one recording is more often an accident of it than physics.
+    A little in one recording is more often an accident of it than physics. One that denies what all
+    others show may be the only one that tells how large it is.
     """
     shared = len(known.each) == 1 or known.rest > SHARED * known.left_out
     least = min(known.train, known.left_out / left_out)
-    return least if shared else least / ALONE
+    whole = least if shared else least / ALONE
+    if len(known.each) < FEW:
+        return whole
+    return max(whole, min(known.train, known.most / left_out) / ALONE)
 
 
 def looked_again(
