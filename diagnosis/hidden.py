@@ -64,7 +64,7 @@ def with_hidden(
     found = Tried(layer, quiet.cost - model.cost, model, known)
     first = (found, *selection.first_round)
     return dataclasses.replace(
-        selection, model=model, accepted=(found,), first_round=first, rivals=()
+        selection, base=quiet, model=model, accepted=(found,), first_round=first, rivals=()
     )
 
 

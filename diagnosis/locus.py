@@ -26,9 +26,10 @@ MOST_WINDOWS = 12
 
 @dataclass(frozen=True)
 class Locus:
-    """One place: `gain` [nats] of its freedom over none; `rms` of its drift [SI], and that as a `part` of what acts there; the `windows` (start, end, recording) in which it
-    is loud, its share by mode, and what it goes `along` with. At a `named` one stands an effect
-    that was accepted. `values` are the parameters [SI] fitted beside its freedom.
+    """One place: `gain` [nats] of its freedom over none; `rms` of its drift [SI], and that as a
+    `part` of what acts there; the `windows` (start, end, recording) in which it is loud, its share
+    by mode, and what it goes `along` with. At a `named` one stands an effect that was accepted.
+    `values` are the parameters [SI] fitted beside its freedom.
     """
 
     section: str

@@ -16,6 +16,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import codegen
@@ -25,6 +26,9 @@ from codegen.cache import cache_fault, cache_folder
 from codegen.predictor import Columns
 from diagnosis.uncertain import Uncertain
 from language.document import Items, Node, Scalar, Table
+
+MAKING = ("candidate", "layers", "recipe", "series", "uncertain")
+"""The files of diagnosis that candidates are made by."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +50,7 @@ class Recipe:
 
 def recipe_key(*parts: str) -> str:
     """Return the key of what candidates of this code are made from."""
-    digest = hashlib.sha256(code_digest().encode())
+    digest = hashlib.sha256(code_digest(MAKING).encode())
     for part in parts:
         digest.update(part.encode() + b"\\0")
     return digest.hexdigest()
@@ -92,18 +96,23 @@ def _folder() -> Path:
 
 
 @cache
-def code_digest() -> str:
-    """Return the hash of the code that candidates and fits follow from."""
+def code_digest(own: tuple[str, ...] = ("*",)) -> str:
+    """Return the hash of the code that fits follow from: of `own` files of diagnosis (patterns)."""
     digest = hashlib.sha256()
-    for package in (language, codegen, diagnosis):
-        for path in sorted(_sources(Path(str(package.__file__)).parent)):
-            digest.update(path.name.encode() + path.read_bytes())
+    files = [file for package in (language, codegen) for file in _sources(_home(package))]
+    files += [file for name in own for file in _sources(_home(diagnosis), name)]
+    for path in sorted(files):
+        digest.update(path.name.encode() + path.read_bytes())
     return digest.hexdigest()
 
 
-def _sources(folder: Path) -> Iterator[Path]:
-    for pattern in ("**/*.py", "**/*.jinja", "**/*.yaml", "**/*.lark"):
-        yield from folder.glob(pattern)
+def _home(package: ModuleType) -> Path:
+    return Path(str(package.__file__)).parent
+
+
+def _sources(folder: Path, name: str = "*") -> Iterator[Path]:
+    for ending in ("py", "jinja", "yaml", "lark"):
+        yield from folder.glob(f"**/{name}.{ending}")
 
 
 def _recipe(known: dict[str, Any]) -> Recipe:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -12,6 +12,7 @@ import numpy as np
 from diagnosis.bench import Bench
 from diagnosis.estimation import Estimate
 from diagnosis.evidence import Evidence, evidence
+from diagnosis.layers import Layer
 from diagnosis.level import settled
 from diagnosis.search import Tell, Tried, searched
 from diagnosis.swap import swapped
@@ -29,7 +30,8 @@ AGAIN = 15
 FEW = 3
 """Recordings of which none can be against all others."""
 MUCH = 0.1
-"""Part of what the best candidate gained that a model must gain for them to be looked for anew."""
+"""Part of what the best candidate gained: a model that gains more has them looked for anew, and
+candidates that gained less are not tried in another way."""
 SHARED = 0.15
 """The part of what an effect gains that must be left without the recording that gains most."""
 ALONE = 4.0
@@ -75,15 +77,17 @@ def selected(
     thresholds: Thresholds = EVERYWHERE,
     tell: Tell = lambda text: None,
     left_out: float = 1.0,
+    known: Sequence[Tried] = (),
 ) -> Selection:
     """Return the effects that the training recordings ask for: at most three, none too many.
 
-    `left_out` is the part of the threshold that is asked for what is left out.
+    `left_out` is the part of the threshold that is asked for what is left out. `known` candidates,
+    best first, were tried with the recordings read in another way: only the best are tried again.
     """
     model = base
     accepted: list[Tried] = []
     rounds: list[list[Tried]] = []
-    layers = list(bench.layers())
+    layers = _near_best(known) or list(bench.layers())
     needed = 0.0
     while len(accepted) < MOST_EFFECTS:
         worth = HOPE * max(needed, thresholds.usual)
@@ -93,7 +97,8 @@ def selected(
             model = better
             base = base if accepted else better
         rounds.append(tried)
-        layers = [other.layer for other in tried[:NEXT] if other.promised > 0.0]
+        likely = [*known, *tried] if known else tried
+        layers = list({t.layer.id: t.layer for t in likely if t.promised > 0.0}.values())[:NEXT]
         enough = (
             t
             for t in tried
@@ -111,6 +116,13 @@ def selected(
     kept, model = _still_needed(bench, base, model, accepted, units, thresholds, tell)
     first = tuple(rounds[0]) if rounds else ()
     return Selection(base, model, kept, first, _rivals(first, kept))
+
+
+def _near_best(known: Sequence[Tried]) -> list[Layer]:
+    """Return the layers of the candidates that gained not much less than the best of them."""
+    gains = {t.layer.id: (t.evidence.total, t.layer) for t in known if t.evidence}
+    best = max((total for total, _ in gains.values()), default=0.0)
+    return [layer for total, layer in gains.values() if total > 0.0 and total > MUCH * best]
 
 
 def _refuted(first: list[Tried], before: list[Tried], after: list[Tried]) -> list[Tried]:

@@ -14,7 +14,7 @@ from diagnosis.bench import Bench
 from diagnosis.estimation import Estimate
 from diagnosis.level import first_fit, recalibrated, units_of
 from diagnosis.prediction import noises_of
-from diagnosis.search import Tell
+from diagnosis.search import Tell, Tried
 from diagnosis.selection import Selection, selected
 from diagnosis.series import paced, require_one_pace
 from diagnosis.starting import settled_at_start, started
@@ -66,9 +66,11 @@ def chosen(
 ) -> tuple[Bench, Estimate, Selection]:
     """Return the way in which the recordings are foreseen best with what is missing, and that."""
     found = []
+    known: tuple[Tried, ...] = ()
     for bench, base in ways:
         units = units_of(base.candidate, bench.series, base.noises, base.values(0))
-        selection = selected(bench, base, units, thresholds, tell)
+        selection = selected(bench, base, units, thresholds, tell, known=known)
+        known = selection.first_round if selection.accepted else ()
         cost = selection.model.cost + thresholds.usual * len(selection.accepted)
         found.append((cost, bench, base, selection))
     _, bench, base, selection = min(found, key=lambda one: one[0])

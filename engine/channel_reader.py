@@ -73,7 +73,7 @@ class ChannelReader:
             elif name == self.mapping.time or text:
                 label = f"the time stamp `{text}` is not a number" if text else "no time stamp"
                 self.problems.error("time", samples.place(k), label)
-            if value is not None and last is not None and value <= last:
+            if value is not None and last is not None and not _is_below(last, value):
                 self._unsorted(text, last, samples.place(k))
             last = value if value is not None else last
             found.append(value)
@@ -110,15 +110,16 @@ class ChannelReader:
         times: list[Fraction] = []
         kept: list[float] = []
         scale = float(column.scale[0]) * column.sign
-        for k, (stamp, *row) in enumerate(zip(stamps, *cells, strict=False)):
-            if any(cell is None for cell in row):
+        means = cells[0] if len(cells) == 1 else _means(cells)
+        for k, (stamp, mean) in enumerate(zip(stamps, means, strict=False)):
+            if mean is None:
                 continue
             if stamp is None:
                 if column.time and not self.file.read(column.time).text(k):
                     label = f"a value of `{column.name}` without a time stamp"
                     self.problems.error("time", parts[0].place(k), label)
                 continue
-            value = _mean(row) * scale
+            value = mean * scale
             if not math.isfinite(value):
                 place = parts[0].place(k)
                 self.problems.error("value", place, f"`{column.name}` is {value} in SI")
@@ -167,15 +168,26 @@ def file_unit(written: str) -> Unit | None:
         return None
 
 
-def _mean(cells: Sequence[float | None]) -> float:
-    total = 0.0
-    for cell in cells:
-        total += cell or 0.0
-    return total / len(cells)
+def _means(columns: Sequence[Sequence[float | None]]) -> list[float | None]:
+    """Return the mean of each row; None where one has no value."""
+    found: list[float | None] = []
+    for row in zip(*columns, strict=False):
+        total = 0.0
+        for cell in row:
+            total += cell or 0.0
+        found.append(None if None in row else total / len(row))
+    return found
 
 
 def _exact(text: str) -> Fraction | None:
     if len(text) > LONGEST_STAMP or not DECIMAL.fullmatch(text):
         return None
-    value = Fraction(text)
-    return value if abs(value) < LATEST_TIME else None
+    whole, _, part = text.partition(".")
+    is_plain = "e" not in text and "E" not in text
+    value = Fraction(int(whole + part), 10 ** len(part)) if is_plain else Fraction(text)
+    return value if abs(value.numerator) < LATEST_TIME * value.denominator else None
+
+
+def _is_below(one: Fraction, other: Fraction) -> bool:
+    """Tell whether a fraction is less than another; `<` takes three times as long."""
+    return one.numerator * other.denominator < other.numerator * one.denominator
