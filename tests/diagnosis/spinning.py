@@ -35,27 +35,30 @@ map: bench_columns
 time: {column: t_s, unit: s}
 columns: {torque: {to: T, unit: N*m}, speed: {compare: w, unit: rad/s}}
 """
-EFFECTS = ("coulomb_friction", "torque_gain", "viscous_friction")
+EFFECTS = ("coulomb_friction", "torque_gain", "unknown_input", "viscous_friction")
 J, B, T_C = 0.55, 0.12, 2.0
 """What the rotor really has: inertia [kg*m^2], viscous [N*m*s/rad] and dry friction [N*m]."""
 RATE, SECONDS, FINE = 100, 10, 20
 
 
-def bench(folder: Path, T_c: float = T_C) -> Path:
-    """Make a project with recordings `run_0.csv` ... `run_2.csv` and a library of effects."""
+def bench(folder: Path, T_c: float = T_C, hit: float = 0.0) -> Path:
+    """Make a project with recordings `run_0.csv` ... `run_2.csv` and a library of effects.
+
+    In each a torque that is not recorded acts for a second: a `hit` [N*m].
+    """
     (folder / "spec").mkdir(parents=True)
     (folder / "spec" / "spinner.yaml").write_text(SPEC, "utf-8")
     (folder / "spec" / "bench_columns.yaml").write_text(MAP, "utf-8")
     (folder / "library").mkdir()
     for name in EFFECTS:
         shutil.copy(ROOT / "spec" / "effects" / f"{name}.yaml", folder / "library")
-    for k, rows in enumerate(recordings(T_c)):
+    for k, rows in enumerate(recordings(T_c, hit)):
         text = "\n".join(f"{k / RATE:.2f},{T:.6f},{w:.6f}" for k, (T, w) in enumerate(rows))
         (folder / f"run_{k}.csv").write_text(f"t_s,torque,speed\n{text}\n", "utf-8")
     return folder
 
 
-def recordings(T_c: float) -> Sequence[np.ndarray]:
+def recordings(T_c: float, hit: float = 0.0) -> Sequence[np.ndarray]:
     """Return rows of torque and speed of three runs: steps of the torque through zero speed."""
     random = np.random.default_rng(1)
     count = RATE * SECONDS
@@ -64,8 +67,9 @@ def recordings(T_c: float) -> Sequence[np.ndarray]:
     h = 1.0 / (RATE * FINE)
     for k in range(count):
         seen[:, k] = w
+        struck = np.where(k // RATE == np.array([2, 5, 7]), hit, 0.0)
         for _ in range(FINE):
-            w = w + h * (T[:, k] - B * w - T_c * np.tanh(w / 0.1)) / J
+            w = w + h * (T[:, k] + struck - B * w - T_c * np.tanh(w / 0.1)) / J
     seen = seen + random.normal(0.0, 0.05, seen.shape)
     return list(np.stack([T, seen], axis=-1))
 

@@ -22,6 +22,18 @@ def test_a_model_that_lacks_nothing_is_told_so(tmp_path: Path) -> None:
     assert "lacks nothing" in (folder / "found" / "report.html").read_text("utf-8")
 
 
+def test_a_torque_that_acts_in_windows_is_an_unknown_input(tmp_path: Path) -> None:
+    folder = bench(tmp_path / "struck", T_c=0.0, hit=3.0)
+    assert run(folder, *COMMAND, "--out", "found") == 0
+    verdict = json.loads((folder / "found" / "verdict.json").read_text("utf-8"))
+    jsonschema.validate(verdict, SCHEMA)
+    (effect,) = verdict["effects"]
+    assert (effect["id"], effect["place"]) == ("unknown_input", "flow.w")
+    loud = [window for window in verdict["location"]["windows"] if window[1] - window[0] > 0.5]
+    assert {(round(start), file) for start, _, file in loud} == {(2, "run_0.csv"), (5, "run_1.csv")}
+    assert run(folder, "check", "found/variant.yaml") == 0
+
+
 def test_a_budget_that_is_over_leaves_what_was_found_and_what_to_go_on_from(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
