@@ -97,6 +97,22 @@ def test_rubber_beside_a_spring_is_stiffer_at_first(tmp_path: Path) -> None:
     assert np.max(np.abs(torque(found) - wanted)) < 1e-8
 
 
+def test_rubber_beside_a_spring_transmits_nothing_while_the_gap_is_open(tmp_path: Path) -> None:
+    effects = "{stiffness_hysteresis@half_shaft: {values: {k_r: 1000 N*m/rad, F_r: 25 N*m}}}"
+    found = ran(
+        tmp_path,
+        "driveline",
+        effects,
+        {"T_em": "{start: 20 N*m, steps: {0.2 s: -20 N*m}}"},
+        horizon="0.6 s",
+        more="outputs: [T_hs, mode, T_r_half_shaft]",
+    )
+    is_open = np.asarray(found.signals["plant.mode"]) == 0
+    assert 2 <= np.sum(is_open) < len(is_open)
+    assert np.max(np.abs(np.asarray(found.signals["plant.T_hs"])[is_open])) < 1e-6
+    assert np.max(np.abs(np.asarray(found.signals["plant.T_r_half_shaft"])[is_open])) > 1.0
+
+
 @pytest.mark.parametrize("q", [3, -3])
 def test_a_spring_that_hardens_or_softens(tmp_path: Path, q: int) -> None:
     effects = f"{{stiffness_nonlinear@spring: {{values: {{q: {q}}}}}}}"
