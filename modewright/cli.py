@@ -34,6 +34,7 @@ from modewright.commands.schema import schema
 from modewright.commands.simulate import simulate
 from modewright.commands.sweep import sweep
 from modewright.commands.test import test
+from modewright.commands.trace import trace
 from modewright.console import configure
 from modewright.exits import EXIT_CODES, exit_code
 from modewright.files import require_writable
@@ -41,8 +42,8 @@ from modewright.files import require_writable
 YOUNG_OBJECTS = 100_000
 """New objects after which garbage is looked for: trees of expressions have no circles."""
 COMMANDS = (
-    new, check, test, diagnose, fit, effects, simulate, sweep, lockstep, replay, plot, compare,
-    graph, generate, explain, format, schema, lsp, demo, doctor,
+    new, check, test, trace, diagnose, fit, effects, simulate, sweep, lockstep, replay, plot,
+    compare, graph, generate, explain, format, schema, lsp, demo, doctor,
 )  # fmt: skip
 
 app = typer.Typer(

@@ -1,0 +1,60 @@
+"""Command trace: requirements with specs, lines of C and tests."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from modewright.commands.options import Json
+from modewright.console import announce, console, working
+from modewright.exits import PROBLEMS
+from modewright.files import OutputError, require_writable, write_files
+
+FORMATS = (".html", ".csv", ".json")
+
+
+def trace(
+    specs: Annotated[list[str], typer.Argument(help="automata or systems: names or files")],
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="write .html, .csv or .json")
+    ] = None,
+    requirements: Annotated[
+        Path | None, typer.Option("--requirements", help="a CSV of requirements: name, text")
+    ] = None,
+    run: Annotated[bool, typer.Option("--run", help="run the tests: with their verdicts")] = False,
+    strict: Annotated[
+        bool, typer.Option("--strict", help="leave with 1 if a requirement is not traced")
+    ] = False,
+    as_json: Json = False,
+) -> None:
+    """Trace requirements (`req:`) through specs, the lines of their C, and tests.
+
+    \b
+    modewright trace ev_driveline
+    modewright trace estimator --requirements needs.csv --run --out trace.html
+    """
+    from modewright import show_trace, traces
+
+    form = out.suffix.lower() if out else ""
+    if out and form not in FORMATS:
+        raise OutputError(f"{out}: a trace ends with {', '.join(FORMATS)}")
+    require_writable(out)
+    with working("tracing requirements"):
+        found = traces.trace(specs, requirements, run=run)
+    data = json.dumps(show_trace.trace_json(found), indent=2) + "\n"
+    if out:
+        text = data if form == ".json" else show_trace.trace_csv(found)
+        if form == ".html":
+            text = show_trace.trace_html(found, ", ".join(specs))
+        write_files({out: text.encode()})
+    if as_json:
+        print(data, end="")
+    else:
+        for line in show_trace.lines_of(found):
+            console().print(line, soft_wrap=True, highlight=False, markup=False)
+        announce([out] if out else [])
+    if strict and len(found.of_state("traced")) < len(found.requirements):
+        raise typer.Exit(PROBLEMS)

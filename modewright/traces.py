@@ -1,0 +1,92 @@
+"""Traces: requirements of a project's specs, their C and their tests, brought together."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+from pathlib import Path
+
+from codegen.source import c_files
+from expectation.expected import Test
+from expectation.trace import Trace, traced
+from language.document import Document, read_text
+from language.load import automaton_of, program_of
+from language.model import Automaton
+from language.project import Project, expanded, read_document
+from language.system import read_system
+from modewright.tests import load_tests, run_test, tests_of
+
+
+def trace(
+    specs: Sequence[str],
+    listed: Path | None = None,
+    root: Path | None = None,
+    *,
+    run: bool = False,
+) -> Trace:
+    """Return which requirements specs, their C and the tests of the project name.
+
+    A spec is an automaton, or a system: then that and the automata of its instances. `listed` is
+    a CSV of requirements with their texts; `run` runs the tests. Raises SpecError, ToolMissing.
+    """
+    project = Project(root or Path())
+    documents = _documents(specs, project)
+    made = [expanded(document, project) for document in documents]
+    names = {document.name for document in documents}
+    tests = [test for test in load_tests(tests_of(root), root) if names & _used(test)]
+    verdicts = [_verdicts(test) if run else {} for test in tests]
+    code = {
+        document.name: c_files(program_of(automaton_of(document, project)))
+        for document, each in zip(documents, made, strict=True)
+        if each.kind == "automaton"
+    }
+    return traced(made, code, zip(tests, verdicts, strict=True), requirements(listed))
+
+
+def requirements(path: Path | None) -> dict[str, str]:
+    """Return the requirements of a CSV: names in its first column, texts in the second.
+
+    Raises SpecError.
+    """
+    if path is None:
+        return {}
+    rows = csv.reader(io.StringIO(read_text(path)[1]))
+    return {
+        row[0].strip(): row[1].strip() if len(row) > 1 else ""
+        for row in rows
+        if row and row[0].strip()
+    }
+
+
+def _documents(specs: Sequence[str], project: Project) -> list[Document]:
+    """Return the documents of specs, of the instances of systems, and of models, each once."""
+    found: dict[str, Document] = {}
+    for spec in specs:
+        document = read_document(project.path_of(spec))
+        found[document.name] = document
+        automata: list[Automaton] = []
+        match expanded(document, project).kind:
+            case "system":
+                instances = read_system(document, project).instances.values()
+                automata = [instance.automaton for instance in instances]
+            case "automaton":
+                automata = [automaton_of(document, project)]
+        models = [automaton.model for automaton in automata if automaton.model]
+        for automaton in (*automata, *models):
+            inner = read_document(Path(automaton.span.source.name))
+            found.setdefault(inner.name, inner)
+    return list(found.values())
+
+
+def _used(test: Test) -> set[str]:
+    """Return the names of a test's system and of what is in it."""
+    automata = {instance.automaton.name for instance in test.system.instances.values()}
+    return {test.system.name, *automata}
+
+
+def _verdicts(test: Test) -> dict[str, bool]:
+    """Return the verdict of each expectation, on engine and C."""
+    run = run_test(test)
+    fine = not run.difference and run.stopped is None
+    return {outcome.name: outcome.passed and fine for outcome in run.outcomes}

@@ -1,0 +1,82 @@
+"""Requirements are found in specs, in the C that cites them, and in tests; gaps are told."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from expectation.trace import Trace
+from modewright import show_trace, traces
+from modewright.cli import app
+from tests.expectation.latching import AUTOMATON, HEAD, project
+
+REQUIRED = (
+    AUTOMATON.replace("wait: 2 ms}", "wait: 2 ms, req: [L-1, L-2]}")
+    .replace("high: {number: 1,", "high: {number: 1, like: upper,")
+    .replace("modes:\n", "templates: {upper: {req: L-3}}\nmodes:\n")
+)
+
+
+@pytest.fixture
+def found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Trace:
+    """A trace in which one requirement is untested, one unimplemented, one only listed."""
+    head = HEAD.replace("expect:", "req: L-1\nexpect:")
+    project(
+        tmp_path, "met: {event: high, req: [L-3, L-4]}", "late: {event: high, at: 6 ms}", head=head
+    )
+    (tmp_path / "spec" / "latch.yaml").write_text(REQUIRED)
+    (tmp_path / "needs.csv").write_text("L-5,nobody did it\nL-1,goes high\n\n")
+    monkeypatch.chdir(tmp_path)
+    return traces.trace(["latch"], Path("needs.csv"))
+
+
+def test_what_is_missing_is_told(found: Trace) -> None:
+    assert [each.name for each in found.requirements] == ["L-5", "L-1", "L-3", "L-2", "L-4"]
+    assert found.of_state("traced") == ["L-1", "L-3"]
+    assert found.of_state("untested") == ["L-2"]
+    assert found.of_state("unimplemented") == ["L-5", "L-4"]
+    assert show_trace.summary(found) == (
+        "5 requirements; 1 untested: L-2; 2 unimplemented: L-5, L-4"
+    )
+
+
+def test_the_lines_of_c_are_those_that_cite_the_place(found: Trace) -> None:
+    code = Path("latch.c")
+    assert CliRunner().invoke(app, ["generate", "latch", "--out", "."]).exit_code == 0
+    lines = code.read_text().splitlines()
+    claims = {each.name: each.claims for each in found.requirements}
+    (guard,) = claims["L-1"]
+    assert guard.path == "modes.low.transitions.high" and guard.place == "spec/latch.yaml:11"
+    cited = [k for k, line in enumerate(lines, 1) if "modes.low.transitions.high" in line]
+    assert guard.code == tuple(("latch.c", k) for k in cited) and len(cited) >= 2
+    (template,) = claims["L-3"]
+    assert template.path == "templates.upper"
+    own = [k for k, line in enumerate(lines, 1) if "latch modes.high." in line]
+    assert template.code == tuple(("latch.c", k) for k in own) and own
+
+
+def test_a_trace_is_written_in_every_form(found: Trace) -> None:
+    rows = list(csv.DictReader(io.StringIO(show_trace.trace_csv(found))))
+    assert [(row["requirement"], row["test"], row["verdict"]) for row in rows] == [
+        ("L-5", "", ""), ("L-1", "latched", "not run"), ("L-3", "latched.met", "not run"),
+        ("L-2", "", ""), ("L-4", "latched.met", "not run"),
+    ]  # fmt: skip
+    page = show_trace.trace_html(found, "latch <1>")
+    assert "Trace of latch &lt;1&gt;" in page and page.count("<tr>") == 6
+    data = show_trace.trace_json(found)
+    assert data["untested"] == ["L-2"] and data["requirements"][1]["text"] == "goes high"
+
+
+def test_the_command_runs_tests_and_is_strict(found: Trace) -> None:
+    command = ["trace", "latch", "--run", "--strict", "--out", "trace.json"]
+    told = CliRunner().invoke(app, command)
+    assert told.exit_code == 1
+    assert "spec/test_latched.yaml:9: latched.met, passed" in told.output
+    assert "spec/test_latched.yaml:2: latched, failed" in told.output
+    assert json.loads(Path("trace.json").read_text())["unimplemented"] == ["L-4"]
+    assert CliRunner().invoke(app, ["trace", "latch", "--out", "t.txt"]).exit_code == 1
