@@ -20,6 +20,7 @@ from language.project import Project, expanded
 from language.reader import Reader, about_of
 from language.region import with_regions
 from language.table import TableReader, section
+from language.transition_table import with_transition_tables
 from language.truth_table import TruthTableReader
 from language.units import NO_UNIT, SECOND, Unit, fits, parse_unit
 from language.values import with_value
@@ -27,7 +28,7 @@ from language.variable import VariableReader
 
 COMMON_KEYS = ("language", "automaton", "parameters", "inputs", "states", "discrete", "equations")
 LOGIC_KEYS = ("flow", "terms", "initial", "modes", "regions", "templates", "outputs")
-DECISION_KEYS = ("tables",)
+DECISION_KEYS = ("tables", "transition_table")
 LAID_KEYS = ("elements", "places")
 RECORDING_KEYS = ("recording_map",)
 FAULT_KEYS = ("faults", "fault_mode")
@@ -130,6 +131,7 @@ class _AutomatonReader(Reader):
 
     def read(self, document: Document, tree: Table, model: Automaton | None) -> Automaton:
         tree = self.table(tree, f"automaton {document.name}", KEYS)
+        tree = with_transition_tables(tree, self.problems)
         self.at = document.name_span
         check_file_name(document.name, document.name_span, self.problems)
         self.model = model

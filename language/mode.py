@@ -16,7 +16,7 @@ from language.reader import Reader
 from language.syntax import Arithmetic, Broken, Tree
 
 MODE_KEYS = ("number", "equations", "flow", "terms", "update", "observer", "runs", "transitions")
-REGION_KEYS = ("initial", "modes")
+REGION_KEYS = ("initial", "modes", "transition_table")
 ALWAYS = "always"
 """The mode of an automaton that has none of its own."""
 ACTION_KEYS = ("entry", "exit", "invariant")

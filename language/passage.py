@@ -22,6 +22,7 @@ MODE: dict[str, Any] = {
     "observer": {**OBSERVER, "correct": EVERY},
     "transitions": {"*": TRANSITION},
 }
+MODE["transition_table"] = {"columns": {"*": TRANSITION}}
 MODE["modes"] = {"*": MODE}
 AUTOMATON: dict[str, Any] = {
     **MODE,
