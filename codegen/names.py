@@ -11,7 +11,9 @@ from language.program import MODE, Program, Variable, mode_variable, short
 
 REAL: Mapping[NumberType, str] = {"float64": "double", "float32": "float"}
 MODES = ("memory.mode", "memory.run_mode")
-UNSIGNED = ("timer.", "memory.fired", "memory.faults")
+CHOSEN = ("memory.fired", "memory.log", "work.wish_", "work.takes_")
+"""Variables that hold the number of a transition."""
+UNSIGNED = ("timer.", "memory.faults", *CHOSEN)
 
 
 @dataclass(frozen=True)
@@ -87,7 +89,7 @@ def c_type(variable: Variable, number: NumberType) -> str:
         return "uint16_t"
     if variable.name == "memory.faults":
         return "uint32_t"
-    if variable.name.startswith("memory.fired"):
+    if variable.name.startswith(CHOSEN):
         return "uint16_t"
     return "int16_t" if variable.name.startswith(MODES) else "int32_t"
 
@@ -95,7 +97,7 @@ def c_type(variable: Variable, number: NumberType) -> str:
 def mode_constant(program: Program, number: int, region: str = CHART) -> str:
     """Return the name of a mode in C."""
     where = "MODE" if region == CHART else region
-    return f"{program.name}_{where}_{program.mode_name(number, region)}"
+    return f"{program.name}_{where}_{program.mode_name(number, region)}".replace(".", "_")
 
 
 def run_mode_constant(program: Program, number: int) -> str:

@@ -168,6 +168,22 @@ def loop(count: int, slot: int, body: Action) -> Action:
     return act
 
 
+def loop_while(count: int, slot: int, condition: Read, body: Action) -> Action:
+    """Return what does an action a number of times, but no longer than a condition holds.
+
+    Once that is false it stays so: nothing else is done in the loop.
+    """
+
+    def act(v: Frame) -> None:
+        for index in range(count):
+            v[slot] = index
+            if not condition(v):
+                break
+            body(v)
+
+    return act
+
+
 def count(slot: int, condition: Read, limit: int) -> Action:
     """Return what counts up to a limit while a condition holds, else back to 0."""
 

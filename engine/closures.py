@@ -33,7 +33,7 @@ from language.operation import (
     Value,
 )
 from language.program import Function, Program
-from language.traversal import with_value
+from language.traversal import expr_names, with_value
 
 AT_ONCE = 4
 """Most assignments in one function (engine/actions.py)."""
@@ -133,6 +133,11 @@ class Compiler:
                 turns = [with_value(body, index, k) for k in range(count)]
                 last = Assign(index, Value(count - 1))
                 return self._block((*(op for turn in turns for op in turn), last))
+            case Loop(count, index, (Branch(condition, then, ()),)) if index not in expr_names(
+                condition
+            ):
+                more = self._read(condition)
+                return actions.loop_while(count, slots[index], more, self._block(then))
             case Loop(count, index, body):
                 return actions.loop(count, slots[index], self._block(body))
             case Count(timer, condition, limit, _):

@@ -5,11 +5,17 @@ from __future__ import annotations
 from engine.interpreter import Stepper
 from engine.trajectory import Event
 from language.model import CHART
-from language.program import Program, TransitionInfo
+from language.program import LOG, LOGGED, Program, TransitionInfo
 
 
 def fired(program: Program, stepper: Stepper) -> list[TransitionInfo]:
-    """Return the transitions of the last micro-step, at most one of each region."""
+    """Return the transitions of the last micro-step, at most one of each region.
+
+    Of a chart with several micro-steps in a tick those of all of them, in their order.
+    """
+    if any(variable.name == LOG for variable in program.variables):
+        log = stepper.get(LOG)
+        return [program.transitions[log[k] - 1] for k in range(stepper.get(LOGGED))]
     numbers = [stepper.get(name) for name in program.fired_variables()]
     return [program.transitions[number - 1] for number in numbers if number]
 
@@ -18,8 +24,10 @@ def event(
     name: str, program: Program, info: TransitionInfo, time: float, micro_step: int = 0
 ) -> Event:
     """Return a transition of an instance at a time [s] as an event."""
-    source = program.mode_name(info.source, info.region)
-    target = program.mode_name(info.target, info.region)
+    source, target = info.between or (
+        program.mode_name(info.source, info.region),
+        program.mode_name(info.target, info.region),
+    )
     return Event(time, micro_step, name, info.name, source, target, info.region)
 
 

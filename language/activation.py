@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
+from language.activity import is_active
 from language.lower import Names, expression
 from language.memory import ticks_of, type_of
 from language.model import Automaton, Mode
@@ -131,12 +132,12 @@ def watch_edges(automaton: Automaton, mode: Mode, known: Names) -> list[Op]:
 def elapse(automaton: Automaton) -> Iterator[Op]:
     """One more tick was spent in the mode."""
     for timer, mode, longest in _timers(automaton).values():
-        yield Count(timer, _is_active(mode), longest, f"{automaton.name} {mode.key}")
+        yield Count(timer, _is_active(automaton, mode), longest, f"{automaton.name} {mode.key}")
     for beat in _beats(automaton).values():
         count = Ref(beat.timer)
         full = Compare(">=", count, whole(beat.ticks))
         on = Assign(beat.timer, Select(full, whole(1), add(count, whole(1))))
-        yield Branch(_is_active(beat.mode), (on,))
+        yield Branch(_is_active(automaton, beat.mode), (on,))
 
 
 def leave(automaton: Automaton, source: Mode, target: Mode) -> list[Op]:
@@ -144,7 +145,13 @@ def leave(automaton: Automaton, source: Mode, target: Mode) -> list[Op]:
     ops: list[Op] = [
         Assign(edge.opposite, Value(False)) for edge in edges_by_mode(automaton).get(source.key, ())
     ]
+    return [*ops, *begin(automaton, target)]
+
+
+def begin(automaton: Automaton, target: Mode) -> list[Op]:
+    """Return what starts the times in a mode that is entered."""
     timers = _timers(automaton)
+    ops: list[Op] = []
     if target.key in timers:
         ops.append(Assign(timers[target.key][0], whole(0)))
     beats = [beat for beat in _beats(automaton).values() if beat.mode.key == target.key]
@@ -172,7 +179,10 @@ def activation_variables(automaton: Automaton) -> list[Variable]:
     return found
 
 
-def _is_active(mode: Mode) -> Expr:
+def _is_active(automaton: Automaton, mode: Mode) -> Expr:
+    if automaton.tree:
+        node = next(node for node in automaton.tree.nodes if node.mode == mode.key)
+        return is_active(automaton.tree, node, "memory.mode")
     return Compare("==", Ref(mode_variable("memory.mode", mode.region)), whole(mode.number))
 
 

@@ -6,9 +6,12 @@ from collections.abc import Mapping
 from fractions import Fraction
 from typing import Literal, cast
 
+from language.chart_reader import CHART_KEYS, ChartReader, is_chart
+from language.chart_target import mode_paths
 from language.declaration import Fitting, Formula, Kind, Parameter, Range
 from language.document import Document, Entry, Node, Scalar, Table
 from language.element import ElementReader
+from language.event import event_inputs
 from language.mode import ModeReader
 from language.model import Automaton
 from language.names import check_file_name
@@ -34,7 +37,7 @@ RECORDING_KEYS = ("recording_map",)
 FAULT_KEYS = ("faults", "fault_mode")
 CLOCK_KEYS = ("period", "step", "method", "numbers", "model")
 KEYS = (
-    *(*COMMON_KEYS, *LOGIC_KEYS, *DECISION_KEYS, *LAID_KEYS),
+    *(*COMMON_KEYS, *LOGIC_KEYS, *CHART_KEYS, *DECISION_KEYS, *LAID_KEYS),
     *(*CLOCK_KEYS, *FAULT_KEYS, *RECORDING_KEYS),
 )
 FITTING_KEYS = ("neutral", "starts", "per", "form")
@@ -140,10 +143,14 @@ class _AutomatonReader(Reader):
         self.sampled = period is not None
         numbers = self._numbers(tree)
         own = {e.key: self._parameter(e) for e in self.named(tree.get("parameters"), "parameters")}
-        chart, *beside = ModeReader(self.problems, model).regions(tree, self.at)
+        modes = ModeReader(self.problems, model)
+        read = ChartReader(modes, tree).read(self.at) if is_chart(tree) else None
+        chart, *beside = read.regions if read else modes.regions(tree, self.at)
+        places = mode_paths(read.tree) if read else chart.modes
         laid_on = ElementReader(self.problems)
-        variables = VariableReader(self.problems, model, self.sampled, tree, chart.modes)
+        variables = VariableReader(self.problems, model, self.sampled, tree, places)
         outputs = laid_on.outputs(tree.get("outputs"))
+        events = event_inputs(read.tree, tree.get("events")) if read else {}
         automaton = Automaton(
             name=document.name,
             period=period,
@@ -151,7 +158,7 @@ class _AutomatonReader(Reader):
             method=self.choice(tree.get("method"), "method", METHODS, "rk4"),
             model=model,
             parameters={**(model.parameters if model else {}), **own},
-            inputs=variables.inputs(tree.get("inputs")),
+            inputs={**variables.inputs(tree.get("inputs")), **events},
             states=variables.states(tree.get("states")),
             discrete=variables.discrete(tree.get("discrete")),
             modes=with_regions(chart.modes, tuple(beside)),
@@ -167,6 +174,8 @@ class _AutomatonReader(Reader):
             fault_mode=variables.fault_mode,
             recording_map=self._recording_map(tree.get("recording_map")),
             tables=TruthTableReader(self.problems).tables(tree),
+            superstates=read.superstates if read else (),
+            tree=read.tree if read else None,
         )
         self._check_sections(tree)
         return automaton

@@ -5,7 +5,9 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Mapping
 
+from language.chart_target import mode_paths
 from language.check_balance import check_balances, check_flow
+from language.check_chart import check_chart, never_entered
 from language.check_cycle import report_refiring
 from language.check_domain import check_domains
 from language.check_element import check_laid_on
@@ -28,7 +30,7 @@ from language.dimension import DimensionCheck, Scope
 from language.guards import report_overlaps
 from language.inquiry import Inquiry
 from language.kind import Enumeration, Kind, Whole
-from language.model import Automaton, Mode, Region
+from language.model import CHART, Automaton, Mode, Region
 from language.order import equation_order, report_circle, unreached
 from language.parameter import parameter_kinds
 from language.problem import Problems, nearest
@@ -52,10 +54,8 @@ def check_automaton(automaton: Automaton, problems: Problems) -> Automaton:
     check_reach(checked, problems)
     check_domains(checked, problems)
     problems.stop_if_any()
-    for region in checked.all_regions:
-        for name in _never_entered(checked, region):
-            label = f"mode `{name}` is never entered"
-            problems.warning("unreached", region.modes[name].span, label)
+    for mode in _never_entered(checked):
+        problems.warning("unreached", mode.span, f"mode `{mode.name}` is never entered")
     report_overlaps(checked, Inquiry(checked), problems)
     report_refiring(checked, problems)
     if checked.model:
@@ -88,6 +88,7 @@ class _Check:
         self._initials()
         check_size(automaton, self.problems)
         check_regions(automaton, self.problems)
+        check_chart(automaton, self.problems)
         for mode in automaton.modes.values():
             with self.problems.collecting():
                 self._mode(mode)
@@ -95,6 +96,9 @@ class _Check:
             for mode in region.modes.values():
                 with self.problems.collecting():
                     self._beside(mode)
+        for mode in automaton.superstates:
+            with self.problems.collecting():
+                self._beside(mode)
         with self.problems.collecting():
             check = self._everywhere("in every mode of the chart, for a table")
             check_truth_tables(automaton, check, self.problems)
@@ -195,12 +199,12 @@ class _Check:
             check_observer(automaton, mode.observer, self.names, plain)
         check_writers(automaton, mode, self.problems)
 
-    def _everywhere(self, place: str) -> DimensionCheck:
-        """What is beside the chart reads what every mode of the chart has."""
+    def _everywhere(self, place: str, beside: Iterable[Mode] = ()) -> DimensionCheck:
+        """What is beside the chart reads what every mode of it, or each of some of them, has."""
         automaton = self.automaton
         groups = [automaton.parameters, automaton.inputs, automaton.carried]
         known = dict(self._scope(groups, "").names)
-        modes = [sources(other) for other in automaton.modes.values()]
+        modes = [sources(other) for other in beside or automaton.modes.values()]
         everywhere = [name for name in modes[0] if all(name in other for other in modes)]
         known.update({name: self.names.get(name) for name in everywhere})
         scope = Scope(
@@ -211,12 +215,25 @@ class _Check:
     def _beside(self, mode: Mode) -> None:
         automaton = self.automaton
         place = f"beside every mode of the chart, in region `{mode.region}`"
-        check = self._everywhere(place)
+        if automaton.tree:
+            place = f"in every mode of the chart that is active with `{mode.name}`"
+        check = self._everywhere(place, self._with(mode))
         check_balances(automaton, mode, check)
         for assignments in (mode.update, mode.entry, mode.exit):
             self._assignments(assignments, check)
         self._transitions(mode, check)
         check_writers(automaton, mode, self.problems)
+
+    def _with(self, mode: Mode) -> list[Mode]:
+        """Return the modes of the chart that may be active together with another."""
+        automaton = self.automaton
+        found = list(automaton.modes.values())
+        if automaton.tree:
+            chart = automaton.tree
+            node = next(node for node in chart.nodes if node.mode == mode.key)
+            leaves = [n for n in chart.leaves(CHART) if chart.nested(n.index, node.index)]
+            found = [automaton.by_key[leaf.mode] for leaf in leaves] or found
+        return found
 
     def _agreed(self, name: str, kind: Kind | None, formula: Formula) -> Kind | None:
         """Return what a name is, and report where two modes disagree on it."""
@@ -265,7 +282,7 @@ class _Check:
         guard = DimensionCheck(guards, self.problems)
         for transition in mode.transitions:
             region = automaton.region(transition.region)
-            if transition.target not in region.modes:
+            if automaton.tree is None and transition.target not in region.modes:
                 label = f"there is no mode `{transition.target}`"
                 if automaton.regions:
                     label += f" in region `{region.name}`"
@@ -294,8 +311,16 @@ class _Check:
                 self.problems.error("wait", read.span, label)
 
 
-def _never_entered(automaton: Automaton, region: Region) -> list[str]:
-    """Return the modes that neither the initial mode nor a fault leads to."""
+def _never_entered(automaton: Automaton) -> list[Mode]:
+    """Return the modes that neither an initial mode nor a fault leads to."""
+    if automaton.tree:
+        return never_entered(automaton, automaton.tree)
+    return [
+        region.modes[name] for region in automaton.all_regions for name in _left(automaton, region)
+    ]
+
+
+def _left(automaton: Automaton, region: Region) -> list[str]:
     found = unreached(region.modes, region.initial)
     fault_mode = automaton.fault_mode
     if fault_mode is not None and fault_mode in region.modes:
@@ -309,6 +334,8 @@ def _of_model(automaton: Automaton) -> Mapping[str, object]:
 
 def _mode_paths(automaton: Automaton) -> frozenset[str]:
     """Return the modes that `in` may name: of parallel regions, by region and mode."""
+    if automaton.tree:
+        return frozenset(mode_paths(automaton.tree))
     if not automaton.regions:
         return frozenset()
     return frozenset(f"{m.region}.{m.name}" for m in automaton.all_modes)

@@ -43,6 +43,8 @@ def _check_mode(region: Region, mode: Mode, problems: Problems) -> None:
 def _check_writers(automaton: Automaton, problems: Problems) -> None:
     """One region defines, balances or assigns to a name, whatever the stage."""
     for what in ("equation", "balance", "assignment"):
+        if automaton.tree and what == "assignment":
+            continue
         writers: dict[str, str] = {}
         for region in automaton.all_regions:
             for name, span in _written(region, what):

@@ -76,6 +76,8 @@ class _Guards:
         """Return a guard, None if it has no form that questions can be asked of."""
         if transition.key not in self.known:
             self.known[transition.key] = None
+            if transition.events or transition.completes:
+                return None
             with suppress(KeyError, SpecError):
                 self.known[transition.key] = self.moment.expression(transition.when.tree)
         return self.known[transition.key]

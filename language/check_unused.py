@@ -20,6 +20,7 @@ def check_unused(automaton: Automaton, problems: Problems) -> None:
     """
     model = automaton.model
     read = {*_names(automaton), *map(automaton.source_of, automaton.outputs)}
+    read |= {name for m in automaton.all_modes for way in m.transitions for name in way.events}
     read |= {*_observed(automaton), *(_run_names(automaton) if model else ())}
     for name, parameter in automaton.parameters.items():
         if not (model and name in model.parameters) and name not in read:

@@ -40,6 +40,7 @@ CODES: Mapping[str, tuple[str, str]] = {
     "stuck": ("MW215", "No transition out of a mode ever fires."),
     "overlap": ("MW220", "Two rows of a truth table hold together."),
     "incomplete": ("MW221", "A table says nothing of some case."),
+    "target": ("MW230", "A transition of a chart cannot have these targets."),
     # Expressions, units, values.
     "expression": ("MW301", "A text is not an expression."),
     "power": ("MW302", "An exponent is not a small whole number."),

@@ -5,9 +5,11 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Mapping
 
+from language.chart import Chart, Way
+from language.chart_target import mode_paths
 from language.declaration import Formula
 from language.limit import MAX_FAULTS, fault_of, limited_things
-from language.model import Automaton, Mode, Transition
+from language.model import CHART, Automaton, Mode, Transition
 from language.operation import Block, FaultBit
 from language.problem import Problems
 from language.region import with_regions
@@ -25,11 +27,23 @@ def with_fault_transitions(automaton: Automaton) -> Automaton:
     if automaton.fault_mode is None:
         return automaton
     modes = {name: _with_way_out(automaton, mode) for name, mode in automaton.modes.items()}
-    return dataclasses.replace(automaton, modes=with_regions(modes, automaton.regions))
+    tree = automaton.tree and _with_ways(automaton, automaton.tree)
+    modes = with_regions(modes, automaton.regions)
+    return dataclasses.replace(automaton, modes=modes, tree=tree)
+
+
+def _with_ways(automaton: Automaton, chart: Chart) -> Chart:
+    """Return a chart that knows what these transitions leave."""
+    target = mode_paths(chart)[automaton.fault_mode or ""]
+    ways = dict(chart.ways)
+    for leaf in chart.leaves(CHART):
+        domain = chart.domain(leaf, [target], internal=False)
+        ways[f"{leaf.mode}.fault_mode"] = Way(leaf.index, (target.index,), domain)
+    return dataclasses.replace(chart, ways=ways)
 
 
 def _with_way_out(automaton: Automaton, mode: Mode) -> Mode:
-    if mode.name == automaton.fault_mode:
+    if f"{mode.name}.".startswith(f"{automaton.fault_mode}."):
         return mode
     assert automaton.fault_mode is not None
     key = f"{mode.key}.fault_mode"

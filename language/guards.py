@@ -33,7 +33,8 @@ def _overlaps(mode: Mode) -> Iterator[tuple[Transition, Transition]]:
     for position, later in enumerate(mode.transitions):
         for earlier in mode.transitions[:position]:
             same = (later.priority or 0) == (earlier.priority or 0)
-            if same and not excluded(earlier.when.tree, later.when.tree):
+            apart = earlier.events and later.events and not {*earlier.events} & {*later.events}
+            if same and not apart and not excluded(earlier.when.tree, later.when.tree):
                 yield earlier, later
 
 

@@ -36,7 +36,8 @@ MAX_FAULTS = 32
 """Fault bits of an instance: one word."""
 PENDING = "memory.fault_pending"
 HAPPENED = "work.fault_happened"
-OWN_FAULTS = ("event_limit", "rewind_limit", "stale_calibration")
+MICRO_STEP_LIMIT = "micro_step_limit"
+OWN_FAULTS = ("event_limit", MICRO_STEP_LIMIT, "rewind_limit", "stale_calibration")
 """Faults that the product names itself."""
 
 

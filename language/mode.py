@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterator
 from typing import Literal, cast
 
+from language.chart import Keeping
 from language.declaration import Formula
-from language.document import Entry, Node, Table
+from language.document import Entry, Items, Node, Scalar, Table
 from language.model import CHART, Automaton, Balance, Invariant, Mode, Region, Rewind, Transition
 from language.observer import read_observer, read_run
 from language.overlay import lay, without
 from language.parse import parse_balance
 from language.problem import Problems, Span, nearest
 from language.reader import Reader
-from language.syntax import Arithmetic, Broken, Tree
+from language.syntax import Arithmetic, Broken, Tree, Truth
 
 MODE_KEYS = ("number", "equations", "flow", "terms", "update", "observer", "runs", "transitions")
 REGION_KEYS = ("initial", "modes", "transition_table")
@@ -21,7 +23,8 @@ ALWAYS = "always"
 """The mode of an automaton that has none of its own."""
 ACTION_KEYS = ("entry", "exit", "invariant")
 TRANSITION_KEYS = ("to", "when", "wait", "priority", "reset", "memory", "rewind")
-Keeping = Literal["reset", "continue"]
+CHART_WAY_KEYS = ("event", "raise", "history", "internal")
+Remembering = Literal["reset", "continue"]
 
 
 class ModeReader(Reader):
@@ -31,6 +34,8 @@ class ModeReader(Reader):
         """Report into `problems`."""
         super().__init__(problems)
         self.model = model
+        self.completing = False
+        self.events: tuple[str, ...] = ()
 
     def regions(self, tree: Table, at: Span) -> tuple[Region, ...]:
         """Return the chart and the regions beside it; one mode `always` where none is written."""
@@ -97,37 +102,61 @@ class ModeReader(Reader):
 
     def _mode(self, entry: Entry, body: Table, root: Table, position: int, region: str) -> Mode:
         key = f"modes.{entry.key}" if region == CHART else f"regions.{region}.modes.{entry.key}"
+        return self.inner_mode(entry, body, root, position, region, key, None)
+
+    def inner_mode(
+        self,
+        entry: Entry,
+        body: Table,
+        root: Table,
+        position: int,
+        region: str,
+        key: str,
+        above: Mode | None,
+    ) -> Mode:
+        """Return a mode that has what the mode `above` hands down, else what the root says."""
         table = self.table(body, key, (*MODE_KEYS, *ACTION_KEYS))
-        shared = root if region == CHART else Table({}, root.span)
-        equations = self._formulas(shared.get("equations"), "equations")
+        shared = root if region == CHART and above is None else Table({}, root.span)
+        handed = above.equations if above else {}
+        equations = {**handed, **self._formulas(shared.get("equations"), "equations")}
         for name, formula in self._formulas(table.get("equations"), f"{key}.equations").items():
             if name in equations:
                 label = f"`{name}` has an equation for every mode already"
                 hint = f"it is given at {equations[name].span}"
                 self.problems.error("duplicate", formula.span, label, hint)
             equations[name] = formula
-        flow = self._flow(shared.get("flow"), "flow")
+        flow = {**(above.flow if above else {}), **self._flow(shared.get("flow"), "flow")}
         flow.update(self._flow(table.get("flow"), f"{key}.flow"))
         self._add_terms(flow, shared.get("terms"), "terms")
         self._add_terms(flow, table.get("terms"), f"{key}.terms")
+        update = self._formulas(table.get("update"), f"{key}.update")
+        for name, formula in update.items():
+            if above and name in above.update:
+                label = f"`{name}` has an update in a mode around this one already"
+                hint = f"it is given at {above.update[name].span}"
+                self.problems.error("duplicate", formula.span, label, hint)
         observer_node, run_node = table.get("observer"), table.get("runs")
+        observer, run = (above.observer, above.run) if above else (None, None)
+        if observer_node:
+            observer = read_observer(self, observer_node, f"{key}.observer", self.model)
+        if run_node:
+            run = read_run(self, run_node, f"{key}.runs", self.model)
+        invariants = self._invariants(table.get("invariant"), f"{key}.invariant")
         return Mode(
             name=entry.key,
             number=self.whole(table.get("number"), "number", position, -100, 100),
             equations=equations,
             flow=flow,
-            update=self._formulas(table.get("update"), f"{key}.update"),
-            observer=read_observer(self, observer_node, f"{key}.observer", self.model)
-            if observer_node
-            else None,
-            run=read_run(self, run_node, f"{key}.runs", self.model) if run_node else None,
+            update={**(above.update if above else {}), **update},
+            observer=observer,
+            run=run,
             transitions=tuple(self._transitions(table.get("transitions"), entry.key, key, region)),
             key=key,
             span=entry.span,
             region=region,
             entry=self._formulas(table.get("entry"), f"{key}.entry"),
             exit=self._formulas(table.get("exit"), f"{key}.exit"),
-            invariants=self._invariants(table.get("invariant"), f"{key}.invariant"),
+            invariants={**(above.invariants if above else {}), **invariants},
         )
 
     def _formulas(self, node: Node | None, key: str) -> dict[str, Formula]:
@@ -178,40 +207,68 @@ class ModeReader(Reader):
 
     def _transitions(
         self, node: Node | None, source: str, mode: str, region: str
-    ) -> list[Transition]:
-        found = []
+    ) -> Iterator[Transition]:
         for entry in self.named(node, "transitions"):
             key = f"{mode}.transitions.{entry.key}"
-            table = self.table(entry.node, key, TRANSITION_KEYS)
+            table = self.table(entry.node, key, (*TRANSITION_KEYS, *CHART_WAY_KEYS))
             to = table.get("to")
-            target = self.text(to, "to", entry.span) if to else entry.key
-            when = self.expression(table.get("when"), f"{key}.when", entry.span)
+            targets = self._words(to, "to") if to else (entry.key,)
+            events = self._events(table, "event")
+            when = self._guard(table, key, entry, bool(events))
             wait_node = table.get("wait")
             wait = self.expression(wait_node, f"{key}.wait", entry.span) if wait_node else None
             priority_node = table.get("priority")
             priority = self.whole(priority_node, "priority", 0, 0, 1000) if priority_node else None
-            reset = self._formulas(table.get("reset"), f"{key}.reset")
             keeping = ("reset", "continue")
-            memory = cast(Keeping, self.choice(table.get("memory"), "memory", keeping, "reset"))
+            memory = self.choice(table.get("memory"), "memory", keeping, "reset")
+            history = self.choice(table.get("history"), "history", ("shallow", "deep"), "")
+            internal = self.choice(table.get("internal"), "internal", ("true", "false"), "false")
             if when:
-                at = to.span if to else entry.span
-                found.append(
-                    Transition(
-                        entry.key,
-                        source,
-                        target,
-                        when,
-                        wait,
-                        priority,
-                        reset,
-                        key,
-                        at,
-                        region,
-                        memory,
-                        self._rewind(table.get("rewind"), f"{key}.rewind"),
-                    )
+                yield Transition(
+                    name=entry.key,
+                    source=source,
+                    target=targets[0] if targets else source,
+                    when=when,
+                    wait=wait,
+                    priority=priority,
+                    reset=self._formulas(table.get("reset"), f"{key}.reset"),
+                    key=key,
+                    span=to.span if to else entry.span,
+                    region=region,
+                    memory=cast(Remembering, memory),
+                    rewind=self._rewind(table.get("rewind"), f"{key}.rewind"),
+                    targets=targets,
+                    events=events,
+                    raises=self._events(table, "raise"),
+                    history=cast(Keeping, history),
+                    internal=internal == "true",
+                    completes="when" not in table.entries and not events,
                 )
+
+    def _words(self, node: Node | None, what: str) -> tuple[str, ...]:
+        """Return the names of a list, or the only one."""
+        if isinstance(node, Items):
+            return tuple(item.text for item in self.items(node, what))
+        word = self.text(node, what, node.span) if node else ""
+        return (word,) if word else ()
+
+    def _events(self, table: Table, what: str) -> tuple[str, ...]:
+        """Return the names of events, which are declared."""
+        node = table.get(what)
+        found = self._words(node, what)
+        for item in node.nodes if isinstance(node, Items) else (node,):
+            if isinstance(item, Scalar) and item.text not in self.events:
+                label = f"there is no event `{item.text}`"
+                hint = nearest(item.text, self.events) or "events are declared under `events`"
+                self.problems.error("name", item.span, label, hint)
         return found
+
+    def _guard(self, table: Table, key: str, entry: Entry, on_event: bool) -> Formula | None:
+        """Return the guard; an event needs none, nor does the end of a mode with modes inside."""
+        node = table.get("when")
+        if node is None and (on_event or self.completing):
+            return Formula(Truth(True, entry.span), f"{key}.when")
+        return self.expression(node, f"{key}.when", entry.span)
 
     def _rewind(self, node: Node | None, key: str) -> Rewind | None:
         """Read how far back a transition reaches, and to what."""

@@ -8,6 +8,7 @@ from fractions import Fraction
 from functools import cached_property
 from typing import Literal
 
+from language.chart import Chart, Keeping
 from language.declaration import (
     Formula,
     Input,
@@ -54,7 +55,12 @@ class Rewind:
 
 @dataclass(frozen=True)
 class Transition:
-    """From its mode to `target` when the guard held for `wait`, with resets."""
+    """From its mode to `target` when the guard held for `wait`, with resets.
+
+    In a chart it may wait for one of `events`, raise others, have several `targets` (none: it
+    stays), enter what its target was left in (`history`), and not leave its source (`internal`);
+    where it `completes` its guard is that its source has come to its end.
+    """
 
     name: str
     source: str
@@ -68,6 +74,12 @@ class Transition:
     region: str = CHART
     memory: Literal["reset", "continue"] = "reset"
     rewind: Rewind | None = None
+    targets: tuple[str, ...] = ()
+    events: tuple[str, ...] = ()
+    raises: tuple[str, ...] = ()
+    history: Keeping = ""
+    internal: bool = False
+    completes: bool = False
 
 
 @dataclass(frozen=True)
@@ -146,17 +158,22 @@ class Mode:
     @property
     def label(self) -> str:
         """The name of the mode, with that of its region if that is not the chart."""
-        return self.name if self.region == CHART else f"{self.region}_{self.name}"
+        name = self.name if self.region == CHART else f"{self.region}_{self.name}"
+        return name.replace(".", "_")
 
 
 @dataclass(frozen=True)
 class Region:
-    """A parallel region: one of its modes is active at any time (rule 14)."""
+    """A parallel region: one of its modes is active at any time (rule 14).
+
+    One that stands inside a mode is in none, and has the number `inactive`, while that is left.
+    """
 
     name: str
     modes: Mapping[str, Mode]
     initial: str
     span: Span
+    inactive: int | None = None
 
     @cached_property
     def widest(self) -> int:
@@ -206,7 +223,8 @@ class Element:
 class Automaton:
     """A hybrid automaton: sampled if it has a period, continuous otherwise.
 
-    `modes` and `initial` are those of the chart; `regions` run parallel to it.
+    `modes` and `initial` are those of the chart; `regions` run parallel to it. Where modes stand
+    inside modes, `modes` are the innermost ones, `superstates` all others; `tree` is their order.
     """
 
     name: str
@@ -233,6 +251,8 @@ class Automaton:
     numbers: NumberType = "float64"
     recording_map: Scalar | None = field(default=None, repr=False)
     tables: tuple[TruthTable, ...] = ()
+    superstates: tuple[Mode, ...] = ()
+    tree: Chart | None = None
 
     def source_of(self, output: str) -> str:
         """Return the state or equation that an output reads: its own name unless it says more."""
@@ -255,8 +275,14 @@ class Automaton:
 
     @cached_property
     def all_modes(self) -> tuple[Mode, ...]:
-        """The modes of all regions, those of the chart first."""
-        return tuple(mode for region in self.all_regions for mode in region.modes.values())
+        """The modes of all regions, those of the chart first; superstates last."""
+        inner = (mode for region in self.all_regions for mode in region.modes.values())
+        return (*inner, *self.superstates)
+
+    @cached_property
+    def by_key(self) -> Mapping[str, Mode]:
+        """All modes by their key path."""
+        return {mode.key: mode for mode in self.all_modes}
 
     @cached_property
     def _by_name(self) -> Mapping[str, Region]:
@@ -268,7 +294,12 @@ class Automaton:
 
     def source(self, transition: Transition) -> Mode:
         """Return the mode that a transition leaves."""
-        return self.region(transition.region).modes[transition.source]
+        found = self.region(transition.region).modes.get(transition.source)
+        return found or next(
+            mode
+            for mode in self.superstates
+            if (mode.region, mode.name) == (transition.region, transition.source)
+        )
 
     def target(self, transition: Transition) -> Mode:
         """Return the mode that a transition enters."""

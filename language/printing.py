@@ -112,7 +112,8 @@ def _program_lines(program: Program) -> Iterator[str]:
     for t in program.transitions:
         wait = f" wait {t.wait} s = {t.ticks} ticks" if t.wait else ""
         back = f" rewind {t.rewind} ticks" if t.rewind else ""
-        yield f"transition {t.number} {t.name}: {t.source} -> {t.target}{wait}{back}"
+        source, target = t.between or (t.source, t.target)
+        yield f"transition {t.number} {t.name}: {source} -> {target}{wait}{back}"
     for alarm in program.alarms:
         yield f"alarm {alarm.variable}: {alarm.time} s in {alarm.region} mode {alarm.mode}"
     for info in program.invariants:

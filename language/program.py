@@ -25,6 +25,9 @@ from language.operation import Block
 
 MODE = "memory.mode"
 """The variable of the chart's mode; a run keeps its own."""
+LOG = "memory.log"
+LOGGED = "memory.count_of_log"
+"""The transitions of a tick with several micro-steps, and how many they are."""
 ValueType = Literal["real", "truth", "whole"]
 
 
@@ -86,7 +89,7 @@ class TransitionInfo:
     """A transition: number (from 1), modes, wait in seconds (exact) and in ticks.
 
     `slot` is the ending of the variables of its guard, see language/region.py; `rewind` are the
-    ticks that it looks back.
+    ticks that it looks back; `between` are the paths of source and target in a chart.
     """
 
     number: int
@@ -100,6 +103,7 @@ class TransitionInfo:
     region: str = CHART
     slot: str = "0"
     rewind: int = 0
+    between: tuple[str, str] | None = None
 
 
 @dataclass(frozen=True)
@@ -245,12 +249,12 @@ class Program:
 
 def mode_variable(base: str, region: str) -> str:
     """Return the variable that holds a region's mode; `base` is that of the chart."""
-    return base if region == CHART else f"{base}_{region}"
+    return base if region == CHART else f"{base}_{region.replace('.', '_')}"
 
 
 def fired_variable(region: str) -> str:
     """Return the variable that holds the transition of a region in a micro-step, 0 for none."""
-    return "memory.fired" if region == CHART else f"memory.fired_{region}"
+    return mode_variable("memory.fired", region)
 
 
 def value_type(kind: str) -> ValueType:

@@ -9,6 +9,8 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator, Mapping
 
+from language.activity import is_active
+from language.chart_target import mode_paths
 from language.declaration import Formula
 from language.model import CHART, Automaton, Balance, Mode, Region, Transition
 from language.once import once
@@ -79,7 +81,7 @@ def by_priority(mode: Mode) -> list[tuple[int, Transition]]:
 
 def slot(region: str, index: int) -> str:
     """Return the ending of the variables of a mode's guard: `guard_0`, `guard_gap_0`."""
-    return str(index) if region == CHART else f"{region}_{index}"
+    return str(index) if region == CHART else f"{region.replace('.', '_')}_{index}"
 
 
 @once
@@ -98,9 +100,14 @@ def all_slots(automaton: Automaton) -> list[str]:
 def in_modes(automaton: Automaton, base: str, prefix: str = "") -> dict[str, Expr]:
     """Return what `in(region.mode)` is, and under `mode region` the variable that says it."""
     found: dict[str, Expr] = {}
+    if automaton.tree:
+        for path, node in mode_paths(automaton.tree).items():
+            found[f"in {prefix}{path}"] = is_active(automaton.tree, node, base)
     for region in automaton.all_regions:
         variable = Ref(mode_variable(base, region.name))
         found[f"mode {prefix}{region.name}"] = variable
+        if automaton.tree:
+            continue
         for mode in region.modes.values():
             is_in = Compare("==", variable, whole(mode.number))
             found[f"in {prefix}{region.name}.{mode.name}"] = is_in

@@ -19,21 +19,26 @@ from language.action import (
     reading,
 )
 from language.activation import activation_variables, elapse
+from language.chart import Chart
+from language.charting import Charting
 from language.constants import derive_block, parameter_constants, values_of
 from language.covariance import COVARIANCE_RANGE, covariance_variables
 from language.decision import decision_block, decision_variables
 from language.evaluate import Scalar
+from language.event import capacity
 from language.fault import FAULT_GUARD, fault_names, with_fault_transitions
 from language.invariant import INVARIANTS, invariant_block, invariant_variables
 from language.kalman import Kalman, kalman, observer_variables
 from language.limit import (
     HAPPENED,
+    MICRO_STEP_LIMIT,
     first_latched,
     latch,
     limit_variables,
 )
 from language.lower import equation_names, equations, variable_names
 from language.memory import delays_of, keep_block, memory_variables, with_delays
+from language.micro_step import chart_blocks, chart_variables, first_entries, nothing_left
 from language.model import CHART, Automaton, Mode
 from language.operation import (
     Assign,
@@ -104,6 +109,16 @@ class _Sampled:
         names = equation_names(automaton, "equation.")
         self.all = with_delays(self.delays, {**self._names("input"), **names})
         self.now = {name: value for name, value in self.all.items() if name not in names}
+        self.charting = self._charting(automaton.tree) if automaton.tree else None
+        if self.charting and MICRO_STEP_LIMIT not in self.faults and self.charting.may_fault:
+            self.faults.append(MICRO_STEP_LIMIT)
+
+    def _charting(self, chart: Chart) -> Charting:
+        infos = {info.key.partition(" ")[2]: info for info in self.transitions}
+        ways = [way for mode in self.automaton.all_modes for way in mode.transitions]
+        everywhere = {**self.now, **equation_names(self.automaton, "equation.")}
+        size = capacity(chart, ways)
+        return Charting(self.automaton, chart, infos, self.now, everywhere, size)
 
     def _names(self, group: str) -> dict[str, Expr]:
         automaton = self.automaton
@@ -132,10 +147,13 @@ class _Sampled:
             self.motion = motion.info
         for mode in modes:
             blocks.update(self._advance(mode))
-        for mode in automaton.all_modes:
-            blocks.update(self._phases(mode))
-        if automaton.regions:
-            again = by_mode(automaton.chart, "equations")
+        for region in automaton.all_regions:
+            for mode in region.modes.values():
+                blocks.update(self._phases(mode))
+        again = by_mode(automaton.chart, "equations")
+        if self.charting:
+            blocks.update(chart_blocks(self.charting, again))
+        elif automaton.regions:
             blocks["commit"] = sampled_commit(automaton, self.transitions, self.now, again)
         blocks.update(self._entries())
         blocks.update(invariant_block(automaton, self.now))
@@ -155,13 +173,14 @@ class _Sampled:
         found: dict[str, Block] = {}
         if mode.region == CHART:
             ops = equations(mode, dict(self.now), "equation.", self.prefix)
-            found[f"equations_{mode.name}"] = tuple(ops)
+            found[f"equations_{mode.label}"] = tuple(ops)
         back = rewind_blocks(self.automaton, mode, self.now)
         if back and REWIND_LIMIT not in self.faults:
             self.faults.append(REWIND_LIMIT)
         found.update(back)
-        jump = sampled_jump(self.automaton, mode, self.transitions, self.now)
-        found[f"jump_{mode.label}"] = jump
+        if self.charting is None:
+            jump = sampled_jump(self.automaton, mode, self.transitions, self.now)
+            found[f"jump_{mode.label}"] = jump
         if mode.update:
             found[f"update_{mode.label}"] = self._update(mode)
             found[f"store_{mode.label}"] = self._store(mode)
@@ -210,6 +229,7 @@ class _Sampled:
         found += activation_variables(automaton)
         found += rewind_variables(automaton)
         found += mode_and_fired(automaton, "tick")
+        found += chart_variables(self.charting) if self.charting else ()
         found.append(Variable("memory.started", "truth", about="the first tick is done"))
         found.append(Variable("memory.faults", "whole", about="latched fault bits"))
         found += action_variables(automaton)
@@ -259,11 +279,12 @@ class _Sampled:
         initial = self.automaton.modes[self.automaton.initial]
         ops = initial_ops(self.automaton, self.now, self.prefix)
         ops += enter_initial(self.automaton, "memory.mode")
+        ops += nothing_left(self.charting) if self.charting else ()
         if self.automaton.model and any(mode.run for mode in self.automaton.modes.values()):
             ops += start_regions(self.automaton.model)
         ops.append(STARTED)
         ops += enter_run(self.automaton, initial)
-        ops += entry(self.automaton, initial, first_entry(self.automaton), self.now)
+        ops += self._first_entries(initial)
         starts = [o.start for name, o in self.observers.items() if name == initial.name and o.start]
         starts += [observer.start for observer in self.observers.values() if observer.start]
         ops += starts[0] if starts else ()
@@ -271,11 +292,18 @@ class _Sampled:
             ops.append(Run(f"correct_{initial.name}"))
         return tuple(ops)
 
+    def _first_entries(self, initial: Mode) -> Block:
+        automaton = self.automaton
+        if automaton.tree:
+            return first_entries(automaton, automaton.tree, self.now)
+        return entry(automaton, initial, first_entry(automaton), self.now)
+
     def _init(self, stamps: bool) -> Block:
         """Before the first tick: nothing has started."""
         ops: list[Op] = [
             *((Assign("memory.started", Value(False)),) if self._starts() else ()),
             *enter_initial(self.automaton, "memory.mode"),
+            *(nothing_left(self.charting) if self.charting else ()),
             Assign("memory.faults", whole(0)),
             *first_latched(self.automaton),
         ]

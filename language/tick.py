@@ -62,6 +62,8 @@ def _jump(automaton: Automaton) -> Block:
         ops += [Run("decide"), *((equations,) if decided_equations(automaton) else ())]
     if automaton.fault_mode:
         ops += [Assign(HAPPENED, Ref(PENDING)), Assign(PENDING, Value(False))]
+    if automaton.tree:
+        return (*ops, Run("jump"))
     ops += [by_mode(region, "jump") for region in automaton.all_regions]
     commit: Block = (Run("commit"),) if automaton.regions else ()
     return (*ops, Branch(any_fired(automaton), (*commit, equations)))

@@ -55,12 +55,13 @@ def transition_infos(automaton: Automaton, problems: Problems) -> tuple[Transiti
                 label = f"a wait of {ticks} ticks is longer than {MAX_TICKS}"
                 problems.error("wait", transition.wait.span, label)
             timed = ticks > 0 if automaton.period else wait > 0
+            target = 0 if automaton.tree else automaton.target(transition).number
             found.append(
                 TransitionInfo(
                     number=len(found) + 1,
                     name=transition.name,
                     source=mode.number,
-                    target=automaton.target(transition).number,
+                    target=target,
                     wait=wait,
                     ticks=ticks,
                     timer=f"timer.{mode.label}_{transition.name}" if timed else None,
@@ -68,9 +69,19 @@ def transition_infos(automaton: Automaton, problems: Problems) -> tuple[Transiti
                     region=mode.region,
                     slot=slot(mode.region, k),
                     rewind=back.get(id(transition), 0),
+                    between=_between(automaton, transition),
                 )
             )
     return tuple(found)
+
+
+def _between(automaton: Automaton, transition: Transition) -> tuple[str, str] | None:
+    """Return the paths of source and target in a chart; where nothing is entered, of the source."""
+    if automaton.tree is None:
+        return None
+    way, nodes = automaton.tree.ways[transition.key], automaton.tree.nodes
+    source = nodes[way.source].path
+    return source, ", ".join(nodes[target].path for target in way.targets) or source
 
 
 def infos_of(

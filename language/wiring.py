@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Mapping
 
+from language.chart import Chart
 from language.declaration import State
 from language.functions import FUNCTIONS_OF
 from language.graph import post_order
@@ -43,6 +44,9 @@ from language.program import (
 from language.traversal import block_names, walk
 from language.units import Dimension
 from language.working import in_working_type
+
+INACTIVE = "inactive"
+"""What a region inside a mode is in while that is left."""
 
 
 def input_variables(automaton: Automaton, group: str) -> list[Variable]:
@@ -110,7 +114,7 @@ def output_wires(automaton: Automaton) -> tuple[Wire, ...]:
         if name == "mode":
             for region in automaton.all_regions:
                 variable = mode_variable("memory.mode", region.name)
-                wire = output if region.name == CHART else region.name
+                wire = output if region.name == CHART else region.name.replace(".", "_")
                 found.append(Wire(wire, variable, "whole", "1"))
             continue
         thing = automaton.carried.get(name)
@@ -153,10 +157,22 @@ def any_fired(automaton: Automaton) -> Expr:
 
 def enter_initial(automaton: Automaton, base: str) -> list[Assign]:
     """Return what makes the initial modes active; `base` is the variable of the chart."""
+    if automaton.tree:
+        return _enter_tree(automaton, automaton.tree, base)
     return [
         Assign(mode_variable(base, region.name), whole(region.modes[region.initial].number))
         for region in automaton.all_regions
     ]
+
+
+def _enter_tree(automaton: Automaton, chart: Chart, base: str) -> list[Assign]:
+    numbers = {node.region: node.number for node in chart.started() if node.number is not None}
+    found = []
+    for region in automaton.all_regions:
+        number = numbers.get(region.name, region.inactive)
+        assert number is not None
+        found.append(Assign(mode_variable(base, region.name), whole(number)))
+    return found
 
 
 def initial_ops(automaton: Automaton, known: Mapping[str, Expr], prefix: str) -> list[Op]:
@@ -208,7 +224,10 @@ def assembled(
 
 def mode_infos(region: Region) -> tuple[ModeInfo, ...]:
     """Return the modes of a region with their numbers."""
-    return tuple(ModeInfo(mode.name, mode.number) for mode in region.modes.values())
+    found = [ModeInfo(mode.name, mode.number) for mode in region.modes.values()]
+    if region.inactive is not None:
+        found.append(ModeInfo(INACTIVE, region.inactive))
+    return tuple(found)
 
 
 def finished(program: Program, entries: tuple[str, ...], keep: tuple[str, ...] = ()) -> Program:

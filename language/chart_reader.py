@@ -1,0 +1,344 @@
+"""Chart reader: modes inside modes to a tree, innermost modes by region, and superstates."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, cast
+
+from language.chart import ROOT, Chart, Keeping, Kind, Node, Order, Signal
+from language.chart_target import inside
+from language.chart_way import ways_of
+from language.document import Entry, Items, Node as YamlNode, Scalar, Table
+from language.model import CHART, Mode, Region
+from language.problem import Span, nearest
+
+if TYPE_CHECKING:
+    from language.mode import ModeReader
+
+CHART_KEYS = ("events", "order", "micro_steps")
+"""Keys at the root that make the modes a chart."""
+INNER_KEYS = ("modes", "regions", "initial", "final", "history", "priority")
+MODE_MARKS = ("modes", "regions", "final", "history")
+WAY_MARKS = ("event", "raise", "history", "internal")
+MOST_MICRO_STEPS = 255
+NOWHERE = -1
+
+
+def is_chart(root: Table) -> bool:
+    """Tell whether an automaton has modes inside modes, events, or several micro-steps."""
+    if any(key in root.entries for key in CHART_KEYS):
+        return True
+    owners = [root]
+    for entry in _tables(root.get("regions")):
+        owners.append(entry)
+        if "regions" in entry.entries:
+            return True
+    return any(_is_nested(mode) for owner in owners for mode in _modes(owner))
+
+
+def _modes(owner: Table) -> Iterator[Table]:
+    yield from _tables(owner.get("modes"))
+    yield from _tables(owner.get("templates"))
+
+
+def _is_nested(mode: Table) -> bool:
+    ways = _tables(mode.get("transitions"))
+    return any(key in mode.entries for key in MODE_MARKS) or any(
+        any(key in way.entries for key in WAY_MARKS) or isinstance(way.get("to"), Items)
+        for way in ways
+    )
+
+
+def _tables(node: YamlNode | None) -> Iterator[Table]:
+    for entry in node if isinstance(node, Table) else ():
+        if isinstance(entry.node, Table):
+            yield entry.node
+
+
+@dataclass
+class _Raw:
+    """A node while it is read; indices are places in the list of all."""
+
+    name: str
+    path: str
+    kind: Kind
+    parent: int
+    region: str
+    is_region: bool
+    span: Span
+    table: Table
+    mode: Mode | None = None
+    children: list[int] = field(default_factory=list)
+    number: int | None = None
+    last: int = 0
+    initial: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class ReadChart:
+    """What was read: the chart and the regions beside it, the superstates, the tree."""
+
+    regions: tuple[Region, ...]
+    superstates: tuple[Mode, ...]
+    tree: Chart
+
+
+class ChartReader:
+    """Reads the tree of an automaton with the help of the reader of modes."""
+
+    def __init__(self, modes: ModeReader, root: Table) -> None:
+        self.modes = modes
+        self.problems = modes.problems
+        self.root = root
+        self.templates = modes.table(root.get("templates"), "templates")
+        self.raw: list[_Raw] = []
+        self.broken = False
+
+    def read(self, at: Span) -> ReadChart:
+        """Return the chart of an automaton. Raises SpecError where there is no tree."""
+        signals = self._signals()
+        self.modes.events = tuple(signals)
+        top = Table({}, at)
+        self.raw.append(_Raw("", "", "parallel", NOWHERE, "", False, at, top))
+        entries = list(self.modes.named(self.root.get("regions"), "regions"))
+        if "modes" in self.root.entries:
+            kept = {k: e for k, e in self.root.entries.items() if k in ("modes", "initial")}
+            self._region(Entry(CHART, at, Table(kept, at)), ROOT, "", None)
+        entries.sort(key=lambda entry: entry.key != CHART)
+        for entry in entries:
+            self._region(entry, ROOT, "", None)
+        self.raw[ROOT].last = len(self.raw) - 1
+        if len(self.raw) == 1:
+            self.problems.error("missing", at, "a chart has at least one mode in `modes`")
+            self.problems.stop_if_any()
+        known = len(self.problems.found)
+        self._initials()
+        if len(self.problems.found) > known or self.broken:
+            self.problems.stop_if_any()
+        nodes = tuple(self._node(index) for index in range(len(self.raw)))
+        bare = Chart(nodes, signals, "outer_first", 1, {})
+        modes_of = {n: raw.mode for n, raw in enumerate(self.raw) if raw.mode is not None}
+        ways = ways_of(bare, modes_of, self.problems)
+        modes = [raw.mode for raw in self.raw if raw.mode is not None]
+        chart = dataclasses.replace(
+            bare,
+            ways=ways,
+            order=cast(Order, self._order()),
+            micro_steps=self._micro_steps(signals, modes),
+        )
+        regions = tuple(self._as_region(chart, node) for node in chart.regions)
+        outer = tuple(
+            dataclasses.replace(
+                raw.mode, equations={}, flow={}, update={}, observer=None, run=None, invariants={}
+            )
+            for raw in self.raw
+            if raw.mode is not None and raw.number is None
+        )
+        return ReadChart(regions, outer, chart)
+
+    def _region(self, entry: Entry, parent: int, prefix: str, above: Mode | None) -> None:
+        """Read a region: a node that its parent is always in, with what is inside it."""
+        is_root = parent == ROOT
+        path = f"{prefix}{entry.key}"
+        key = f"regions.{entry.key}" if is_root else ""
+        if not is_root:
+            outer = self.raw[parent]
+            base = outer.mode.key if outer.mode else ""
+            key = f"{base}.regions.{entry.key}"
+        what = INNER_KEYS if is_root else None
+        table = self.modes.table(entry.node, key or "regions", what)
+        self._enter(entry, table, parent, path, path, True, key, None)
+
+    def _enter(
+        self,
+        entry: Entry,
+        table: Table,
+        parent: int,
+        path: str,
+        region: str,
+        is_region: bool,
+        key: str,
+        above: Mode | None,
+    ) -> None:
+        index = len(self.raw)
+        table = self.modes._like(table, self.templates)
+        kind = self._kind(entry, table)
+        if kind == "history":
+            is_region, region = False, self.raw[parent].region
+        raw = _Raw(entry.key, path, kind, parent, region, is_region, entry.span, table)
+        self.raw.append(raw)
+        self.raw[parent].children.append(index)
+        is_root = is_region and parent == ROOT
+        if kind == "history":
+            self.modes.table(table, key, ("history", "initial"))
+        elif not is_root:
+            raw.mode = self._mode(entry, raw, key, above)
+        elif kind != "compound":
+            self.problems.error("missing", entry.span, "a region has at least one mode in `modes`")
+            self.broken = True
+        self._inside(raw, index, key, path, raw.mode if not is_region else None)
+        raw.last = len(self.raw) - 1
+        if kind in ("atomic", "parallel") and raw.mode:
+            raw.number = raw.mode.number
+
+    def _inside(self, raw: _Raw, index: int, key: str, path: str, above: Mode | None) -> None:
+        prefix = "" if path == CHART else f"{path}."
+        if raw.kind == "parallel":
+            for entry in self.modes.named(raw.table.get("regions"), f"{key}.regions"):
+                self._region(entry, index, prefix, None)
+        elif raw.kind == "compound":
+            base = "" if key == f"regions.{CHART}" else f"{key}."
+            for entry in self.modes.named(raw.table.get("modes"), f"{key}.modes"):
+                inner = f"{base}modes.{entry.key}"
+                table = self.modes.table(entry.node, inner)
+                where = f"{prefix}{entry.key}"
+                self._enter(entry, table, index, where, raw.region, False, inner, above)
+
+    def _kind(self, entry: Entry, table: Table) -> Kind:
+        if "history" in table.entries:
+            return "history"
+        if "modes" in table.entries and "regions" in table.entries:
+            label = f"`{entry.key}` has both `modes` and `regions`"
+            hint = "put the modes into one more region"
+            self.problems.error("form", table.entries["regions"].span, label, hint)
+        if "modes" in table.entries:
+            return "compound"
+        return "parallel" if "regions" in table.entries else "atomic"
+
+    def _mode(self, entry: Entry, raw: _Raw, key: str, above: Mode | None) -> Mode:
+        """Return the mode of a node; what superstates of its region hold is handed down."""
+        name = raw.path.removeprefix(f"{raw.region}.") if raw.region != CHART else raw.path
+        if raw.is_region:
+            name = raw.name
+        if raw.kind == "compound" and "number" in raw.table.entries:
+            span = raw.table.entries["number"].span
+            self.problems.error("form", span, "a superstate has no number: its innermost modes do")
+        kept = {k: e for k, e in raw.table.entries.items() if k not in INNER_KEYS}
+        body = Table(kept, raw.table.span)
+        position = sum(1 for r in self.raw if r.region == raw.region and r.number is not None)
+        self.modes.completing = raw.kind != "atomic"
+        named = Entry(name, entry.span, body)
+        made = self.modes.inner_mode(named, body, self.root, position, raw.region, key, above)
+        self.modes.completing = False
+        return made
+
+    def _initials(self) -> None:
+        for index, raw in enumerate(self.raw):
+            if index != ROOT:
+                self._initial(index, raw)
+        for raw in self.raw:
+            if raw.kind == "history" and not raw.initial:
+                raw.initial = self.raw[raw.parent].initial
+
+    def _initial(self, index: int, raw: _Raw) -> None:
+        node = raw.table.get("initial")
+        if raw.kind == "history":
+            words = self._words(node, "initial", raw.span) if node else []
+            owner = raw.parent
+        elif raw.kind != "compound":
+            if node is not None:
+                label = f"`{raw.name}` has no modes inside: there is no `initial`"
+                self.problems.error("form", node.span, label)
+            return
+        else:
+            own = [c for c in raw.children if self.raw[c].kind != "history"]
+            if not own:
+                label = f"`{raw.name}` has no mode inside"
+                self.problems.error("missing", raw.span, label)
+                return
+            if node is None and len(own) == 1:
+                raw.initial = (own[0],)
+                return
+            words, owner = self._words(node, "initial", raw.span), index
+        found = []
+        for word in words:
+            hit = inside(self.raw, owner, word.text)
+            if hit is None or hit == index:
+                label = f"there is no mode `{word.text}` in `{self.raw[owner].name}`"
+                names = [self.raw[c].name for c in self.raw[owner].children]
+                self.problems.error("name", word.span, label, nearest(word.text, names))
+            else:
+                found.append(hit)
+        raw.initial = tuple(found)
+
+    def _words(self, node: YamlNode | None, what: str, at: Span) -> list[Scalar]:
+        """Return the names that stand in a list, or the only one."""
+        if isinstance(node, Items):
+            return self.modes.items(node, what)
+        word = self.modes.scalar(node, what, at)
+        return [word] if word else []
+
+    def _node(self, index: int) -> Node:
+        raw = self.raw[index]
+        table = raw.table
+        final = self.modes.choice(table.get("final"), "final", ("true", "false"), "false")
+        if final == "true" and raw.kind != "atomic":
+            label = "a final mode has no modes inside"
+            self.problems.error("form", table.entries["final"].span, label)
+        kept = ("shallow", "deep")
+        return Node(
+            index=index,
+            last=raw.last,
+            name=raw.name,
+            path=raw.path,
+            kind=raw.kind,
+            parent=raw.parent,
+            children=tuple(raw.children),
+            region=raw.region,
+            is_region=raw.is_region,
+            mode=raw.mode.key if raw.mode else "",
+            number=raw.number,
+            initial=raw.initial,
+            history=cast(Keeping, self.modes.choice(table.get("history"), "history", kept, "")),
+            final=final == "true",
+            rank=self.modes.whole(table.get("priority"), "priority", 0, 0, 1000),
+        )
+
+    def _signals(self) -> dict[str, Signal]:
+        found: dict[str, Signal] = {}
+        for entry in self.modes.named(self.root.get("events"), "events"):
+            table = self.modes.table(entry.node, f"events.{entry.key}", ("from",))
+            comes = self.modes.choice(table.get("from"), "from", ("input",), "")
+            found[entry.key] = Signal(entry.key, len(found) + 1, comes == "input")
+        return found
+
+    def _order(self) -> str:
+        allowed = ("outer_first", "inner_first")
+        return self.modes.choice(self.root.get("order"), "order", allowed, "outer_first")
+
+    def _micro_steps(self, signals: Mapping[str, Signal], modes: list[Mode]) -> int:
+        """One, or as many as modes where one tick may have several events to take."""
+        raised = any(way.raises for mode in modes for way in mode.transitions)
+        several = raised or sum(signal.is_input for signal in signals.values()) > 1
+        count = max(2, sum(raw.number is not None for raw in self.raw))
+        node = self.root.get("micro_steps")
+        given = self.modes.whole(
+            node, "micro_steps", min(count, MOST_MICRO_STEPS) if several else 1, 1, MOST_MICRO_STEPS
+        )
+        if node is not None and raised and given < 2:
+            label = "an event that is raised is taken in the next micro-step: one is too few"
+            self.problems.error("event", node.span, label)
+        return given
+
+    def _as_region(self, chart: Chart, node: Node) -> Region:
+        leaves = chart.leaves(node.region)
+        modes = {}
+        numbers: dict[int, str] = {}
+        for leaf in leaves:
+            mode = self.raw[leaf.index].mode
+            assert mode is not None
+            modes[mode.name] = mode
+            if mode.number in numbers:
+                label = f"number {mode.number} is that of mode `{numbers[mode.number]}`"
+                free = next(n for n in range(len(numbers) + 1) if n not in numbers)
+                hint = f"another `number`, like {free}; without one, modes count from 0"
+                self.problems.error("duplicate", mode.span, label, hint)
+            numbers.setdefault(mode.number, mode.name)
+        active = chart.first(node, ())
+        initial = next(n for n in active if n.region == node.region and n.number is not None)
+        start = self.raw[initial.index].mode
+        assert start is not None
+        inactive = None if node.parent == ROOT else min(-1, *(n - 1 for n in numbers))
+        return Region(node.region, modes, start.name, self.raw[node.index].span, inactive)

@@ -1,0 +1,65 @@
+"""Chart way: the transitions of a chart with their targets found, and what they leave."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from language.chart import ROOT, Chart, Node, Way
+from language.chart_target import known_targets, looked_up
+from language.model import Mode, Transition
+from language.problem import Problems, nearest
+
+
+def ways_of(chart: Chart, modes: Mapping[int, Mode], problems: Problems) -> dict[str, Way]:
+    """Return the ways of the modes of some nodes by their key path; wrong targets are reported."""
+    found: dict[str, Way] = {}
+    for index, mode in modes.items():
+        for transition in mode.transitions:
+            found[transition.key] = _way(chart, chart.nodes[index], transition, problems)
+    return found
+
+
+def _way(chart: Chart, source: Node, transition: Transition, problems: Problems) -> Way:
+    targets: list[Node] = []
+    for name in transition.targets:
+        hit = looked_up(chart, source, name)
+        if hit is None:
+            label = f"there is no mode `{name}`"
+            hint = nearest(name, known_targets(chart))
+            problems.error("name", transition.span, label, hint)
+        else:
+            targets.append(hit)
+    if transition.events and transition.wait:
+        label = "an event is an instant: it cannot hold for a wait"
+        problems.error("wait", transition.wait.span, label)
+    _check_together(chart, transition, targets, problems)
+    _check_internal(source, transition, targets, problems)
+    domain = chart.domain(source, targets, transition.internal)
+    if domain == ROOT and targets:
+        label = f"`{targets[0].path}` is in another region of the root"
+        hint = "regions of the root are never left"
+        problems.error("target", transition.span, label, hint)
+    return Way(source.index, tuple(target.index for target in targets), domain)
+
+
+def _check_together(
+    chart: Chart, transition: Transition, targets: Sequence[Node], problems: Problems
+) -> None:
+    """Several targets lie in different regions of one mode."""
+    for number, target in enumerate(targets):
+        for other in targets[:number]:
+            shared = [node for node in chart.outer(target) if node.holds(other.index)]
+            apart = bool(shared) and shared[0].kind == "parallel"
+            if not apart or chart.nested(target.index, other.index):
+                label = f"`{other.path}` and `{target.path}` are never active together"
+                hint = "several targets lie in different regions of one mode"
+                problems.error("target", transition.span, label, hint)
+
+
+def _check_internal(
+    source: Node, transition: Transition, targets: Sequence[Node], problems: Problems
+) -> None:
+    outside = [t for t in targets if not source.holds(t.index) or t.index == source.index]
+    if transition.internal and (outside or source.kind != "compound"):
+        label = f"an internal transition leads to what is inside `{source.path}`"
+        problems.error("target", transition.span, label, "`to: []` where nothing is entered")

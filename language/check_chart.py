@@ -1,0 +1,133 @@
+"""Check of a chart: what its regions may write, what can be entered, what can come to its end."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from language.activity import may_complete
+from language.chart import ROOT, Chart, Node
+from language.model import Automaton, Mode, Transition
+from language.problem import Problems, Span
+from language.wiring import INACTIVE
+
+
+def check_chart(automaton: Automaton, problems: Problems) -> None:
+    """Report what a chart cannot do."""
+    chart = automaton.tree
+    if chart is None:
+        return
+    if not automaton.is_sampled:
+        label = "modes inside modes, events and micro-steps belong to a sampled automaton"
+        problems.error("form", automaton.span, label, "give it a `period`")
+    _check_writers(automaton, chart, problems)
+    for node in chart.nodes[ROOT + 1 :]:
+        mode = automaton.by_key.get(node.mode)
+        if mode:
+            _check_inner(chart, node, mode, problems)
+            for transition in mode.transitions:
+                _check_way(chart, node, transition, problems)
+
+
+def never_entered(automaton: Automaton, chart: Chart) -> list[Mode]:
+    """Return the modes that nothing leads to: entering over-estimates what a history may enter."""
+    seen = {node.index for node in chart.started()}
+    if automaton.fault_mode:
+        seen.update(
+            _entered(chart, [n.index for n in chart.nodes if n.path == automaton.fault_mode])
+        )
+    while True:
+        targets: list[int] = []
+        for node in chart.nodes[ROOT + 1 :]:
+            mode = automaton.by_key.get(node.mode)
+            if node.index in seen and mode:
+                targets += [t for way in mode.transitions for t in chart.ways[way.key].targets]
+        more = seen | _entered(chart, targets)
+        if more == seen:
+            break
+        seen = more
+    nodes = (node for node in chart.nodes if node.mode and node.index not in seen)
+    return [automaton.by_key[node.mode] for node in nodes]
+
+
+def _entered(chart: Chart, targets: list[int]) -> set[int]:
+    """Return what entering some nodes enters: those around them and what they start with."""
+    found: set[int] = set()
+    for target in targets:
+        node = chart.nodes[target]
+        found.update(inner.index for inner in chart.first(node, ()))
+        for outer in chart.outer(node):
+            found.add(outer.index)
+            if outer.kind == "parallel":
+                found.update(inner.index for inner in chart.first(outer, [target]))
+    return found
+
+
+def _check_inner(chart: Chart, node: Node, mode: Mode, problems: Problems) -> None:
+    if node.final and mode.transitions:
+        label = f"`{node.path}` is final: no transition leaves it"
+        problems.error("form", mode.transitions[0].span, label)
+    if node.name == INACTIVE and node.region != node.path:
+        label = f"`{INACTIVE}` is what a region is in while its mode is left"
+        problems.error("name", mode.span, label)
+    root = list(chart.outer(node))[-1]
+    if node.region == root.region:
+        return
+    for what, written in (("equations", mode.equations), ("flow", mode.flow)):
+        for name in written:
+            label = f"`{name}`: a region inside a mode has no `{what}`, for it is not always active"
+            hint = "give a discrete variable its value in `update`, `entry` or `reset`"
+            problems.error("form", mode.span, label, hint)
+
+
+def _check_way(chart: Chart, node: Node, transition: Transition, problems: Problems) -> None:
+    if transition.rewind:
+        label = "a transition of a chart does not rewind"
+        problems.error("form", transition.span, label)
+    if transition.completes and not may_complete(chart, node):
+        label = f"`{node.path}` never comes to its end: there is no final mode in it"
+        hint = "`when: true` for a transition that is always enabled, else a guard"
+        problems.error("missing", transition.span, label, hint)
+    if transition.history:
+        for index in chart.ways[transition.key].targets:
+            target = chart.nodes[index]
+            if target.kind not in ("compound", "parallel"):
+                label = f"`{target.path}` has no modes inside: there is no history of it"
+                problems.error("form", transition.span, label)
+
+
+def _check_writers(automaton: Automaton, chart: Chart, problems: Problems) -> None:
+    """Regions side by side write disjoint variables (rule 14).
+
+    A region inside a mode may write what that mode's own region does, but not in the same stage.
+    """
+    writers: dict[str, list[tuple[str, bool]]] = {}
+    for mode in automaton.all_modes:
+        for name, span, stays in _written(chart, mode):
+            known = writers.setdefault(name, [])
+            for region, stayed in known:
+                if _apart(chart, region, mode.region) or (
+                    region != mode.region and stays and stayed
+                ):
+                    here = f"in region `{region}` and in region `{mode.region}`"
+                    label = f"`{name}` has an assignment {here}"
+                    hint = "parallel regions write disjoint variables"
+                    problems.error("writer", span, label, hint)
+                    break
+            if (mode.region, stays) not in known:
+                known.append((mode.region, stays))
+
+
+def _written(chart: Chart, mode: Mode) -> Iterator[tuple[str, Span, bool]]:
+    """Yield what a mode writes, and whether it does while it stays active."""
+    for formulas in (mode.entry, mode.exit):
+        yield from ((name, formula.span, False) for name, formula in formulas.items())
+    yield from ((name, formula.span, True) for name, formula in mode.update.items())
+    for way in mode.transitions:
+        stays = chart.ways[way.key].domain is None
+        yield from ((name, formula.span, stays) for name, formula in way.reset.items())
+
+
+def _apart(chart: Chart, left: str, right: str) -> bool:
+    """Tell whether two regions stand side by side, none inside the other."""
+    a, b = chart.region_node(left), chart.region_node(right)
+    return not chart.nested(a.index, b.index)
