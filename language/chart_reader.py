@@ -5,22 +5,19 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 from language.chart import ROOT, Chart, Keeping, Kind, Node, Order, Signal
 from language.chart_target import inside
 from language.chart_way import ways_of
 from language.document import Entry, Items, Node as YamlNode, Scalar, Table
+from language.mode import INNER_KEYS, REGION_KEYS, ModeReader
 from language.model import CHART, Mode, Region
 from language.problem import Span, nearest
-
-if TYPE_CHECKING:
-    from language.mode import ModeReader
+from language.reader import TEXT_KEYS
 
 CHART_KEYS = ("events", "order", "micro_steps")
 """Keys at the root that make the modes a chart."""
-INNER_KEYS = ("modes", "regions", "initial", "final", "history", "priority")
-MODE_MARKS = ("modes", "regions", "final", "history")
 WAY_MARKS = ("event", "raise", "history", "internal")
 MOST_MICRO_STEPS = 255
 NOWHERE = -1
@@ -45,7 +42,7 @@ def _modes(owner: Table) -> Iterator[Table]:
 
 def _is_nested(mode: Table) -> bool:
     ways = _tables(mode.get("transitions"))
-    return any(key in mode.entries for key in MODE_MARKS) or any(
+    return any(key in mode.entries for key in INNER_KEYS) or any(
         any(key in way.entries for key in WAY_MARKS) or isinstance(way.get("to"), Items)
         for way in ways
     )
@@ -147,7 +144,7 @@ class ChartReader:
             outer = self.raw[parent]
             base = outer.mode.key if outer.mode else ""
             key = f"{base}.regions.{entry.key}"
-        what = INNER_KEYS if is_root else None
+        what = REGION_KEYS if is_root else None
         table = self.modes.table(entry.node, key or "regions", what)
         self._enter(entry, table, parent, path, path, True, key, None)
 
@@ -172,7 +169,7 @@ class ChartReader:
         self.raw[parent].children.append(index)
         is_root = is_region and parent == ROOT
         if kind == "history":
-            self.modes.table(table, key, ("history", "initial"))
+            self._check_history(entry, table)
         elif not is_root:
             raw.mode = self._mode(entry, raw, key, above)
         elif kind != "compound":
@@ -182,6 +179,13 @@ class ChartReader:
         raw.last = len(self.raw) - 1
         if kind in ("atomic", "parallel") and raw.mode:
             raw.number = raw.mode.number
+
+    def _check_history(self, entry: Entry, table: Table) -> None:
+        for key, own in table.entries.items():
+            if key not in ("history", "initial", *TEXT_KEYS):
+                label = f"`{entry.key}` is a history: it has no `{key}`"
+                hint = "it only says what is entered in the mode around it"
+                self.problems.error("form", own.span, label, hint)
 
     def _inside(self, raw: _Raw, index: int, key: str, path: str, above: Mode | None) -> None:
         prefix = "" if path == CHART else f"{path}."
@@ -215,8 +219,10 @@ class ChartReader:
         if raw.kind == "compound" and "number" in raw.table.entries:
             span = raw.table.entries["number"].span
             self.problems.error("form", span, "a superstate has no number: its innermost modes do")
-        kept = {k: e for k, e in raw.table.entries.items() if k not in INNER_KEYS}
-        body = Table(kept, raw.table.span)
+        if "priority" in raw.table.entries and not raw.is_region:
+            span = raw.table.entries["priority"].span
+            self.problems.error("form", span, "a mode has no priority: regions inside a mode do")
+        body = raw.table
         position = sum(1 for r in self.raw if r.region == raw.region and r.number is not None)
         self.modes.completing = raw.kind != "atomic"
         named = Entry(name, entry.span, body)

@@ -17,6 +17,8 @@ from language.problem import Problems, Span, nearest
 from language.reader import Reader
 from language.syntax import Arithmetic, Broken, Tree, Truth
 
+INNER_KEYS = ("modes", "regions", "initial", "final", "history", "priority")
+"""Keys of a mode in a chart."""
 MODE_KEYS = ("number", "equations", "flow", "terms", "update", "observer", "runs", "transitions")
 REGION_KEYS = ("initial", "modes", "transition_table")
 ALWAYS = "always"
@@ -115,7 +117,7 @@ class ModeReader(Reader):
         above: Mode | None,
     ) -> Mode:
         """Return a mode that has what the mode `above` hands down, else what the root says."""
-        table = self.table(body, key, (*MODE_KEYS, *ACTION_KEYS))
+        table = self.table(body, key, (*MODE_KEYS, *ACTION_KEYS, *INNER_KEYS))
         shared = root if region == CHART and above is None else Table({}, root.span)
         handed = above.equations if above else {}
         equations = {**handed, **self._formulas(shared.get("equations"), "equations")}
