@@ -24,7 +24,7 @@ done
 endef
 
 .PHONY: help setup demo test verify verify-part bench check format generate lock clean
-.PHONY: check-lock check-format check-lint check-types check-floors check-specs check-generated
+.PHONY: check-lock check-format check-lint check-types check-floors check-specs check-tests check-generated
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-11s %s\n", $$1, $$2 }' Makefile
@@ -77,7 +77,7 @@ bench: setup ## measure speed against rivals; with ARGS="--peers diffrax,pathsim
 	$(BIN)/python tests/bench/run.py $(ARGS)
 
 check: check-lock check-format check-lint check-types ## run all checks
-check: check-floors check-specs check-generated
+check: check-floors check-specs check-tests check-generated
 
 check-lock: setup
 	@$(UV_LOCK) --check --quiet --offline --no-cache --python $(BIN)/python 2>/dev/null || \
@@ -97,6 +97,9 @@ check-floors: setup
 
 check-specs: setup
 	$(BIN)/modewright check --all
+
+check-tests: setup
+	$(BIN)/modewright test
 
 check-generated: setup
 	$(BIN)/modewright generate --all --check

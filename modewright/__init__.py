@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from modewright.recordings import CheckedRecordings, check_recordings
     from modewright.runs import compare, plot, read, save
     from modewright.studies import study_pictures, study_summary, sweep
+    from modewright.tests import run_tests
+    from modewright.traces import trace
 
 __all__ = [
     "CheckedRecordings",
@@ -52,12 +54,14 @@ __all__ = [
     "read",
     "render_all",
     "replay",
+    "run_tests",
     "save",
     "save_diagnosis",
     "simulate",
     "study_pictures",
     "study_summary",
     "sweep",
+    "trace",
 ]
 
 PLACES = {
@@ -83,9 +87,11 @@ PLACES = {
     "render_all": "language.problem",
     "save": "modewright.runs",
     "save_diagnosis": "modewright.diagnoses",
+    "run_tests": "modewright.tests",
     "study_pictures": "modewright.studies",
     "study_summary": "modewright.studies",
     "sweep": "modewright.studies",
+    "trace": "modewright.traces",
 }
 """Where a name of the public API is defined, if not in `modewright.api`."""
 

@@ -11,12 +11,13 @@ from pathlib import Path
 from modewright.files import OutputError
 
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,30}", re.ASCII)
-TAKEN = frozenset({"room", "thermostat", "cold_day", "ev_driveline"})
+TAKEN = frozenset({"room", "thermostat", "cold_day", "stays_warm", "ev_driveline"})
 PLACES = {
     "room.yaml": "spec/room.yaml",
     "thermostat.yaml": "spec/thermostat.yaml",
     "system.yaml": "spec/system.yaml",
     "cold_day.yaml": "spec/cold_day.yaml",
+    "stays_warm.yaml": "spec/stays_warm.yaml",
     "test_project.py.txt": "tests/test_project.py",
     "README.md.txt": "README.md",
 }
