@@ -156,7 +156,7 @@ class Chart:
             return source.index
         for node in self.outer(source):
             is_around = node.index != source.index and node.kind == "compound"
-            if is_around and all(node.holds(target) for target in wanted):
+            if is_around and all(node.holds(t) and t != node.index for t in wanted):
                 return node.index
         return ROOT
 

@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from random import Random
 
 import pytest
 
+from tests.conformance.oracle import Oracle
+from tests.conformance.random_chart import random_case
 from tests.conformance.running import Active, Made, compiled, interpreted, made
 
 FILE = Path(__file__).resolve().parents[1] / "data" / "conformance" / "statechart_cases.json"
 RAW = json.loads(FILE.read_text("utf-8"))
 NAMES = [raw["name"] for raw in RAW]
+
+RANDOM = 24
+"""Random charts beside them: the larger part of the time of a case is its check."""
 
 
 @pytest.fixture(scope="module")
@@ -35,3 +41,22 @@ def test_the_c_has_the_active_modes_of_the_case(
     cases: list[Made], from_c: list[list[Active]], number: int
 ) -> None:
     assert from_c[number] == list(cases[number].wanted)
+
+
+def test_the_oracle_has_the_active_modes_of_the_cases() -> None:
+    """What random charts are compared with is right where others agree."""
+    for raw in RAW:
+        oracle = Oracle(raw["chart"])
+        assert sorted(oracle.atomic) == sorted(raw["initial"])
+        for step in raw["steps"]:
+            oracle.send(step["event"])
+            assert sorted(oracle.atomic) == sorted(step["expect"])
+
+
+def test_random_charts_do_what_the_algorithm_of_scxml_says(tmp_path: Path) -> None:
+    charts = [
+        made(random_case(Random(f"chart {k}")), f"chart_{k}", tmp_path) for k in range(RANDOM)
+    ]
+    for one in charts:
+        assert interpreted(one) == list(one.wanted), one.case.text
+    assert compiled(charts[:8], tmp_path) == [list(one.wanted) for one in charts[:8]]
