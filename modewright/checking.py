@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ from language.effect import read_effect
 from language.examine import examine
 from language.load import automaton_of, lowered
 from language.map import read_map
+from language.model import Automaton
 from language.numbers_text import motion_lines
 from language.problem import Problem, Problems, SpecError, ordered
 from language.project import Project, expanded, with_calibrations
@@ -42,7 +43,18 @@ def checked(
 
     `texts` are those of an editor, by resolved path: they stand for what is on the disk.
     """
-    project = Project(root or Path(), texts or {})
+    return _checked(reference, Project(root or Path(), texts or {}), examine)
+
+
+def errors_first(reference: str, root: Path, texts: Mapping[Path, str]) -> Checked:
+    """Return what `checked` does without what has to be proven of a spec without errors."""
+    return _checked(reference, Project(root, texts), lambda automaton, problems: None)
+
+
+def _checked(
+    reference: str, project: Project, further: Callable[[Automaton, Problems], None]
+) -> Checked:
+    """Return what is found of a spec; `further` looks at an automaton without errors."""
     problems = Problems()
     limits: tuple[str, ...] = ()
     try:
@@ -54,7 +66,7 @@ def checked(
         if base.kind == "automaton":
             automaton = automaton_of(document, project, problems=problems)
             motion = lowered(automaton).motion
-            examine(automaton, problems)
+            further(automaton, problems)
             if motion and motion.limits and not is_calibration:
                 first, *others = motion_lines(motion)
                 limits = (f"{document.name}: {first}", *others)

@@ -7,7 +7,7 @@ from pathlib import Path
 from lsprotocol import types
 
 from language.problem import Problem
-from modewright.checking import checked
+from modewright.checking import Checked, errors_first
 from modewright.lsp.positions import range_of, uri_of
 from modewright.lsp.world import World
 
@@ -20,9 +20,16 @@ START = types.Range(types.Position(0, 0), types.Position(0, 0))
 
 
 def diagnostics(world: World, path: Path) -> list[types.Diagnostic]:
-    """Return the problems of a file; one that lies in another file is told at the start of this."""
-    told = checked(str(path), world.root, dict(world.texts)).problems
-    return [_diagnostic(problem, path.resolve(), world.encoding) for problem in told]
+    """Return the problems of a file without what takes long to prove.
+
+    One that lies in another file is told at the start of this.
+    """
+    return told(errors_first(str(path), world.root, dict(world.texts)), path, world.encoding)
+
+
+def told(found: Checked, path: Path, encoding: str) -> list[types.Diagnostic]:
+    """Return what was found in a file as diagnostics."""
+    return [_diagnostic(problem, path.resolve(), encoding) for problem in found.problems]
 
 
 def _diagnostic(problem: Problem, path: Path, encoding: str) -> types.Diagnostic:

@@ -5,11 +5,14 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
+LONGEST_SECONDS = 240.0
+"""After which a server that says nothing more is ended."""
 Message = dict[str, Any]
 
 
@@ -22,6 +25,9 @@ class Talk:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
         )
+        self.watchdog = threading.Timer(LONGEST_SECONDS, self.process.kill)
+        self.watchdog.daemon = True
+        self.watchdog.start()
         self.number = 0
         self.versions: dict[str, int] = {}
         self.told: dict[str, tuple[int | None, list[Message]]] = {}
@@ -44,6 +50,7 @@ class Talk:
             self.ask("shutdown", None)
             self.say("exit", None)
             assert self.process.wait(10) == 0
+        self.watchdog.cancel()
         self.process.kill()
         self.process.communicate()
 
@@ -88,6 +95,14 @@ class Talk:
         while self.told.get(uri, (None, []))[0] != self.versions[uri]:
             self._receive()
         return self.told[uri][1]
+
+    def problem(self, path: Path, code: str) -> Message:
+        """Wait for a problem of a code."""
+        while True:
+            for each in self.told[path.as_uri()][1]:
+                if each["code"] == code:
+                    return each
+            self._receive()
 
     def at(self, path: Path, line: int, character: int) -> Message:
         """Return the parameters of a question about a position; lines count from 1."""

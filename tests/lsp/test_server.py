@@ -102,6 +102,17 @@ def test_a_text_that_is_no_yaml_is_told_of(talk: Talk, heater: Path) -> None:
     assert "this is not YAML" in told["message"]
 
 
+def test_what_has_to_be_proven_follows_and_stays_while_its_line_stays(
+    talk: Talk, heater: Path
+) -> None:
+    dead = HEATER.replace("when: T_room > T_on", "when: T_room > 100 degC")
+    assert talk.change(heater, dead) == []
+    told = talk.problem(heater, "MW211")
+    assert "T_room > 100 degC" in dead.splitlines()[told["range"]["start"]["line"]]
+    assert told in talk.change(heater, dead + "\n")
+    assert talk.change(heater, HEATER) == []
+
+
 def test_a_mistake_in_a_base_is_told_in_the_variant(
     talk: Talk, heater: Path, tmp_path: Path
 ) -> None:

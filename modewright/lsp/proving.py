@@ -1,0 +1,56 @@
+"""Proving: what takes seconds to find of a text, in a process that ends when the text changes.
+
+Read from stdin is which file, with the texts of the editor; written are its diagnostics.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import sys
+from pathlib import Path
+
+from lsprotocol import converters, types
+
+from modewright.checking import checked
+from modewright.lsp.problems import told
+from modewright.lsp.world import World
+
+
+async def proven(world: World, path: Path) -> list[types.Diagnostic] | None:
+    """Return all problems of a file, None where they were not found; cancelled, nothing runs on."""
+    asked = {
+        "path": str(path),
+        "root": str(world.root),
+        "encoding": world.encoding,
+        "texts": {str(file): text for file, text in world.texts.items()},
+    }
+    process = await asyncio.create_subprocess_exec(
+        *(sys.executable, "-m", "modewright.lsp.proving"),
+        stdin=asyncio.subprocess.PIPE,
+        stdout=asyncio.subprocess.PIPE,
+        stderr=asyncio.subprocess.DEVNULL,
+    )
+    try:
+        answer, _ = await process.communicate(json.dumps(asked).encode())
+    finally:
+        if process.returncode is None:
+            process.kill()
+    if process.returncode:
+        return None
+    converter = converters.get_converter()
+    return [converter.structure(each, types.Diagnostic) for each in json.loads(answer)]
+
+
+def main() -> None:
+    """Answer one question."""
+    asked = json.loads(sys.stdin.read())
+    texts = {Path(file): text for file, text in asked["texts"].items()}
+    path = Path(asked["path"])
+    found = told(checked(str(path), Path(asked["root"]), texts), path, asked["encoding"])
+    converter = converters.get_converter()
+    print(json.dumps([converter.unstructure(each) for each in found]))
+
+
+if __name__ == "__main__":
+    main()
