@@ -57,6 +57,7 @@ verify: setup ## measure every acceptance figure; with recordings: ARGS="--recor
 	$(BIN)/python tests/verify/random_specs.py
 	$(BIN)/python tests/verify/command_line.py
 	$(BIN)/python tests/verify/editor.py
+	$(BIN)/python tests/verify/static_checks.py
 	$(BIN)/python tests/verify/studies.py
 	$(BIN)/python tests/verify/fast.py
 	$(BIN)/python tests/verify/open_cases.py
@@ -72,6 +73,7 @@ verify-part: setup ## measure a fixed part of the figures, as CI does
 	$(BIN)/python tests/verify/random_specs.py --specs 20
 	$(BIN)/python tests/verify/command_line.py
 	$(BIN)/python tests/verify/editor.py
+	$(BIN)/python tests/verify/static_checks.py
 
 bench: setup ## measure speed against rivals; with ARGS="--peers diffrax,pathsim" those too
 	$(BIN)/python tests/bench/run.py $(ARGS)

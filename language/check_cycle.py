@@ -11,6 +11,7 @@ from itertools import islice
 
 from language.constants import exact_value
 from language.graph import components
+from language.halfspace import disproved
 from language.inquiry import Inquiry, Witness
 from language.model import Automaton, Mode, Transition
 from language.moment import Moment, Story
@@ -66,10 +67,22 @@ def ways_round(automaton: Automaton) -> tuple[Way, ...]:
     ways = {way.key: way for way in instant_ways(automaton)}
     after: dict[str, list[str]] = {key: [] for key in ways}
     for first, second in _possible_pairs(automaton, list(ways.values())):
-        if _follows(automaton, first, second, inquiry):
+        if not _is_disproved(automaton, first, second, inquiry):
             after[first.key].append(second.key)
-    found = islice(simple_cycles(after), MOST_WAYS_ROUND)
-    return tuple(tuple(ways[key] for key in members) for members in found)
+    follows: dict[tuple[str, str], bool] = {}
+    found: list[Way] = []
+    for members in islice(simple_cycles(after), MOST_WAYS_ROUND):
+        way = tuple(ways[key] for key in members)
+        pairs = [(first, second) for first, second in zip(way, (*way[1:], way[0]), strict=True)]
+        for first, second in pairs:
+            key = first.key, second.key
+            if key not in follows:
+                follows[key] = _follows(automaton, first, second, inquiry)
+            if not follows[key]:
+                break
+        else:
+            found.append(way)
+    return tuple(found)
 
 
 def instant_ways(automaton: Automaton) -> list[Transition]:
@@ -112,13 +125,26 @@ def _possible_pairs(
                     yield way, second
 
 
+def _is_disproved(
+    automaton: Automaton, first: Transition, second: Transition, inquiry: Inquiry
+) -> bool:
+    """Tell whether linear bounds say that one does not follow the other at the same instant."""
+    moment = Moment(automaton, automaton.source(first))
+    try:
+        guard = moment.expression(first.when.tree)
+        there = moment.after(first).expression(second.when.tree)
+    except (KeyError, SpecError):
+        return True
+    return disproved(inquiry.question(moment.story, (guard, there)))
+
+
 def _follows(automaton: Automaton, first: Transition, second: Transition, inquiry: Inquiry) -> bool:
     """Tell whether a transition can be followed by another one at the same instant."""
     try:
         story, guards = taken(automaton, (first, second))
     except (KeyError, SpecError):
         return False
-    return inquiry.answer(inquiry.question(story, guards)) != "never"
+    return not inquiry.never(inquiry.question(story, guards))
 
 
 def taken(automaton: Automaton, way: Way) -> tuple[Story, list[Expr]]:

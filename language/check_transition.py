@@ -24,6 +24,8 @@ def check_transitions(automaton: Automaton, inquiry: Inquiry, problems: Problems
     for mode in automaton.all_modes:
         guards = _Guards(automaton, mode, inquiry)
         for position, (_, transition) in enumerate(by_priority(mode)):
+            if not guards.is_silent(transition, position):
+                continue
             if guards.never(transition):
                 label = "this never holds"
                 hint = "the declared ranges and the equations of the mode exclude it"
@@ -71,6 +73,8 @@ class _Guards:
         self.inquiry = inquiry
         self.moment = Moment(automaton, mode)
         self.known: dict[str, Expr | None] = {}
+        for transition in mode.transitions:
+            self.of(transition)
 
     def of(self, transition: Transition) -> Expr | None:
         """Return a guard, None if it has no form that questions can be asked of."""
@@ -87,8 +91,18 @@ class _Guards:
         found = [condition for condition in conditions if condition is not None]
         if len(found) < len(conditions):
             return False
-        question = self.inquiry.question(self.moment.story, found)
-        return self.inquiry.freely(question) == "never"
+        return self.inquiry.never(self.inquiry.question(self.moment.story, found))
+
+    def is_silent(self, transition: Transition, position: int) -> bool:
+        """Tell whether a guard never holds where none does that comes first.
+
+        Where that is not so it is neither dead nor shadowed: one question for most transitions.
+        """
+        before = [way for _, way in by_priority(self.mode)[:position]]
+        held = _held(self.automaton, transition)
+        first = [way for way in self.mode.transitions if self._comes_first(way, before, held)]
+        others = (_not(self.of(way)) for way in first)
+        return self.together_never(self.of(transition), *self._lasted(held), *others)
 
     def never(self, transition: Transition) -> bool:
         """Tell whether a guard never holds."""

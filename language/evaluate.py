@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from functools import lru_cache
 
 from language.functions import FUNCTIONS_OF
 from language.interpolation import Interpolation
@@ -161,6 +162,12 @@ def apply(function: str, arguments: list[Scalar], number: NumberType = "float64"
     """Return the value of an elementary operation or function."""
     if function in ELEMENTARY:
         return in_type(EXACT[number][function](*arguments), number)
+    return _function(function, tuple(arguments), number)
+
+
+@lru_cache(maxsize=4096)
+def _function(function: str, arguments: tuple[Scalar, ...], number: NumberType) -> Scalar:
+    """Return the value of a function that is an operation list; samples come again and again."""
     known = FUNCTIONS_OF[number][function]
     names = [f"work.{name}" for name in known.parameters]
     values: dict[str, Scalar] = dict(zip(names, arguments, strict=True))

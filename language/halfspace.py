@@ -8,11 +8,12 @@ that they leave something proves nothing.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from fractions import Fraction
 
 from language.operation import Binary, Call, Compare, Expr, Ref, Unary, Value
-from language.question import Question
+from language.question import Extent, Question
 
 Direction = tuple[tuple[str, Fraction], ...]
 Form = tuple[dict[str, Fraction], Fraction]
@@ -23,6 +24,11 @@ MIRRORED = {"<": ">", "<=": ">=", ">": "<", ">=": "<=", "==": "=="}
 
 def disproved(question: Question) -> bool:
     """Tell whether bounds of linear forms prove that the conditions never hold together."""
+    return narrowed(question) is None
+
+
+def narrowed(question: Question) -> dict[str, Extent] | None:
+    """Return what single variables can be where the conditions hold; None if they never do."""
     forms = _Forms(question)
     bounds: dict[Direction, _Bounds] = {}
     truths: dict[str, bool] = {}
@@ -30,15 +36,34 @@ def disproved(question: Question) -> bool:
         for part, is_true in _together(condition, True, forms):
             match part:
                 case Value(value) if isinstance(value, bool) and value != is_true:
-                    return True
+                    return None
                 case Ref(name) if truths.setdefault(name, is_true) != is_true:
-                    return True
+                    return None
                 case Compare(operator, left, right):
                     found = forms.difference(left, right)
                     relation = str(operator) if is_true else OPPOSITE[operator]
                     if found is not None and _contradicts(found, relation, bounds, question):
-                        return True
-    return False
+                        return None
+    return {**_narrower(bounds, question), **_certain(truths, question)}
+
+
+def _narrower(bounds: Mapping[Direction, _Bounds], question: Question) -> dict[str, Extent]:
+    found: dict[str, Extent] = {}
+    for direction, held in bounds.items():
+        if len(direction) == 1:
+            name = direction[0][0]
+            extent = question.extents[name]
+            found[name] = replace(extent, low=held.low, high=held.high, default=None)
+    return found
+
+
+def _certain(truths: Mapping[str, bool], question: Question) -> dict[str, Extent]:
+    extents = question.extents
+    return {
+        name: replace(extents[name], default=value)
+        for name, value in truths.items()
+        if name in extents
+    }
 
 
 class _Bounds:

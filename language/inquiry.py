@@ -6,35 +6,29 @@ witnesses too are told only where our own arithmetic says the same.
 
 from __future__ import annotations
 
-import math
-from collections import ChainMap
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from functools import cache, lru_cache
 
 from language.action import place_of
 from language.constants import derive_block, parameter_constants, values_of
 from language.declaration import Input, Parameter, State
-from language.evaluate import Scalar, evaluate
-from language.halfspace import disproved
+from language.evaluate import Scalar
+from language.halfspace import narrowed
 from language.model import Automaton
 from language.moment import Story
 from language.number import NumberType, rounded
-from language.operation import Assign, Compare, Expr, Ref
+from language.operation import Assign, Expr
 from language.parameter import parameter_kinds
 from language.problem import Problems
 from language.program import value_type
 from language.question import Extent, Point, Question, Step, shown
+from language.sample import few_points, many_points, near
 from language.solver import Solver, Verdict
-from language.traversal import parts
 
-SAMPLES = 8
-"""Points that are tried before z3 is asked: most guards hold at one of them."""
-MOST_SAMPLES = 64
-"""Points that are tried where z3 knows nothing."""
-DEFAULT_RANGE = (-10.0, 10.0)
-"""Sampled where a state or input gives no range, in SI."""
-PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37)
+MOST_TRIED = 20_000
+"""Points tried of all questions that z3 leaves open: a second or two."""
 MOST_ASKED = 4000
 """Questions for z3 of one check; beyond they stay open."""
 
@@ -50,11 +44,10 @@ class Witness:
 class Inquiry:
     """Asks about one automaton; parameters have their present values unless they are free."""
 
-    def __init__(self, automaton: Automaton, solver: Solver | None = None) -> None:
-        """Find what every variable can be; a solver may be shared."""
+    def __init__(self, automaton: Automaton) -> None:
+        """Find what every variable can be."""
         self.automaton = automaton
-        self.solver = solver or Solver()
-        self.asked = 0
+        self.asked = self.tried = 0
         self.values = values_of(parameter_constants(automaton, Problems()))
         self.extents = dict(_extents(automaton))
         self.tunables = {
@@ -83,28 +76,16 @@ class Inquiry:
 
     def answer(self, question: Question) -> Witness | Verdict:
         """Return a witness, "never", or "open"."""
-        if disproved(question):
+        narrower = narrowed(question)
+        if narrower is None:
             return "never"
-        found = self._sampled(question, range(1, SAMPLES))
+        found = next(filter(question.holds_at, few_points(question, narrower)), None)
         if found is None:
             decided = self._decided(question)
-            if decided != "open":
+            if isinstance(decided, str) and decided == "never":
                 return decided
-            found = self._sampled(question, range(SAMPLES, MOST_SAMPLES))
-        return found or "open"
-
-    def _decided(self, question: Question) -> Witness | Verdict:
-        """Return what z3 answers."""
-        self.asked += 1
-        if self.asked > MOST_ASKED:
-            return "open"
-        found = self.solver.ask(question)
-        if isinstance(found, str):
-            return found
-        for point in _near(found, question):
-            if question.holds_at(point):
-                return self._witness(question, point)
-        return "open"
+            found = self._searched(question) if isinstance(decided, str) else decided
+        return _witness(question, found) if found else "open"
 
     def freely(self, question: Question) -> Witness | Verdict:
         """Return the answer for all values that tunables can have, the present ones first."""
@@ -112,72 +93,63 @@ class Inquiry:
         wider = self.freed(question) if found == "never" else None
         return self.answer(wider) if wider else found
 
-    def _witness(self, question: Question, point: Point) -> Witness:
-        shorter = question.shortened(point)
-        told = {name: value for name, value in shorter.items() if not name.startswith("memory.")}
-        return Witness(shorter, shown(told, question.extents))
+    def never(self, question: Question) -> bool:
+        """Tell whether it is proven that conditions never hold together, tunables being any."""
+        self.asked += 1
+        if self.asked > MOST_ASKED or not _proven(Asked(question.key, question)):
+            return False
+        wider = self.freed(question)
+        return wider is None or _proven(Asked(wider.key, wider))
 
-    def _sampled(self, question: Question, indices: range) -> Witness | None:
-        """Try sample points, each also moved onto the boundaries that conditions name."""
-        variables = question.variables
-        relations = [part for condition in question.conditions for part in _relations(condition)]
-        for index in indices:
-            point: Point = {
-                name: _sample(question.extents[name], index, position)
-                for position, name in enumerate(variables)
-            }
-            moved = (p for relation in relations for p in _on_boundary(relation, point, question))
-            for tried in (point, *moved):
-                if question.holds_at(tried):
-                    return self._witness(question, tried)
+    def _decided(self, question: Question) -> Point | Verdict:
+        """Return a witness that z3 finds and our own arithmetic confirms, or what z3 says."""
+        self.asked += 1
+        found = solver().ask(question) if self.asked <= MOST_ASKED else "open"
+        if isinstance(found, str):
+            return found
+        return next((point for point in near(found, question) if question.holds_at(point)), "open")
+
+    def _searched(self, question: Question) -> Point | None:
+        """Return a witness among many points, as long as not too many were tried in all."""
+        for point in many_points(question):
+            self.tried += 1
+            if self.tried > MOST_TRIED:
+                return None
+            if question.holds_at(point):
+                return point
         return None
 
 
-def _relations(condition: Expr) -> Iterator[Compare]:
-    return (part for part in parts(condition) if isinstance(part, Compare))
+@dataclass(frozen=True)
+class Asked:
+    """A question by what it says: the same one, asked again, has its answer already."""
+
+    key: object
+    question: Question = field(compare=False)
 
 
-def _on_boundary(relation: Compare, point: Point, question: Question) -> Iterator[Point]:
-    for side, other in ((relation.left, relation.right), (relation.right, relation.left)):
-        if isinstance(side, Ref) and side.name in point and not side.whole:
-            try:
-                value = evaluate(other, ChainMap(point, dict(question.values)))
-            except (KeyError, OverflowError):
-                continue
-            yield {**point, side.name: value}
+@lru_cache(maxsize=2048)
+def _proven(asked: Asked) -> bool:
+    """Tell whether conditions are proven never to hold together."""
+    question = asked.question
+    narrower = narrowed(question)
+    if narrower is None:
+        return True
+    if any(question.holds_at(point) for point in few_points(question, narrower)):
+        return False
+    return solver().ask(question) == "never"
 
 
-def _near(point: Point, question: Question) -> Iterator[Point]:
-    """Yield a point of z3 and, since it is rounded, neighbours of it along each variable."""
-    default = {
-        name: extent.default
-        for name in point
-        if (extent := question.extents[name]).default is not None
-    }
-    yield {**point, **default}
-    yield point
-    for name, value in point.items():
-        if isinstance(value, float):
-            for towards in (-math.inf, math.inf):
-                yield {**point, name: math.nextafter(value, towards)}
-    for index in range(1, SAMPLES):
-        for position, name in enumerate(point):
-            yield {**point, name: _sample(question.extents[name], index, position)}
+@cache
+def solver() -> Solver:
+    """Return the one solver: what it has made of names and numbers is of use again."""
+    return Solver()
 
 
-def _sample(extent: Extent, index: int, position: int) -> Scalar:
-    if extent.default is not None:
-        return extent.default
-    if extent.type == "truth":
-        return bool(index >> position % 6 & 1)
-    if extent.numbers:
-        return extent.numbers[index % len(extent.numbers)]
-    low = DEFAULT_RANGE[0] if extent.low is None else float(extent.low)
-    high = DEFAULT_RANGE[1] if extent.high is None else float(extent.high)
-    low, high = min(low, high), max(low, high)
-    fraction = _radical_inverse(index, PRIMES[position % len(PRIMES)])
-    value = low + fraction * (high - low)
-    return math.floor(value) if extent.type == "whole" else value
+def _witness(question: Question, point: Point) -> Witness:
+    shorter = question.shortened(point)
+    told = {name: value for name, value in shorter.items() if not name.startswith("memory.")}
+    return Witness(shorter, shown(told, question.extents))
 
 
 def _extents(automaton: Automaton) -> Iterator[tuple[str, Extent]]:
@@ -205,13 +177,3 @@ def _bounded(thing: Input | State | Parameter, numbers: NumberType) -> Extent:
     bounds = [Fraction(rounded(bound, numbers)) for bound in thing.range or ()]
     low, high = bounds or (None, None)
     return Extent(value_type(thing.type), low, high)
-
-
-def _radical_inverse(index: int, base: int) -> float:
-    """Return the van der Corput number of an index in a base, in [0, 1)."""
-    result, scale = 0.0, 1.0 / base
-    while index > 0:
-        index, digit = divmod(index, base)
-        result += digit * scale
-        scale /= base
-    return result

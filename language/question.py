@@ -6,9 +6,11 @@ there by our own arithmetic, are true; so a witness is true whatever found it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, MutableMapping
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import cached_property
 
 from language.evaluate import Scalar, evaluate
 from language.operation import Expr
@@ -38,9 +40,13 @@ class Extent:
 
     def holds(self, value: Scalar) -> bool:
         """Tell whether a value is one that the variable can have."""
-        above = self.low is None or value >= self.low
-        below = self.high is None or value <= self.high
-        return above and below and (not self.numbers or value in self.numbers)
+        low, high = self._bounds
+        return low <= value <= high and (not self.numbers or value in self.numbers)
+
+    @cached_property
+    def _bounds(self) -> tuple[float, float]:
+        low = -math.inf if self.low is None else float(self.low)
+        return low, math.inf if self.high is None else float(self.high)
 
 
 @dataclass(frozen=True)
@@ -55,13 +61,13 @@ class Question:
     extents: Mapping[str, Extent]
     values: Mapping[str, Scalar] = field(repr=False)
 
-    @property
+    @cached_property
     def variables(self) -> list[str]:
         """The variables that the conditions read, directly or through the steps, in order."""
         read = self.read
         return [name for name in self.extents if name in read]
 
-    @property
+    @cached_property
     def read(self) -> set[str]:
         """Every name that the conditions need."""
         found = {name for condition in self.conditions for name in expr_names(condition)}
@@ -70,16 +76,28 @@ class Question:
                 found.update(expr_names(value))
         return found
 
+    @cached_property
+    def key(self) -> object:
+        """What the question says: two with equal keys have one answer."""
+        extents = tuple((name, self.extents[name]) for name in self.variables)
+        return self.conditions, tuple(self._needed), extents, tuple(self._constants.items())
+
+    @cached_property
+    def _needed(self) -> list[Step]:
+        return [(target, value) for target, value in self.steps if target in self.read]
+
+    @cached_property
+    def _constants(self) -> dict[str, Scalar]:
+        return {name: value for name, value in self.values.items() if name in self.read}
+
     def holds_at(self, point: Mapping[str, Scalar]) -> bool:
         """Tell whether a point lies within the extents and makes all conditions true."""
         try:
             if not all(self.extents[name].holds(value) for name, value in point.items()):
                 return False
-            values = {**self.values, **point}
-            wanted = self.read
-            for target, value in self.steps:
-                if target in wanted:
-                    values[target] = evaluate(value, values)
+            values = {**self._constants, **point}
+            for target, value in self._needed:
+                values[target] = evaluate(value, values)
             return all(evaluate(condition, values) is True for condition in self.conditions)
         except (KeyError, OverflowError, ValueError):
             return False

@@ -47,12 +47,17 @@ class Solver:
 
         return z3
 
+    @cached_property
+    def made(self) -> dict[object, Any]:
+        """Literals and variables that are made already: these are what takes longest."""
+        return {}
+
     def ask(self, question: Question) -> Point | Verdict:
         """Return values that z3 takes for a witness, "never", or "open" where it does not know."""
         solver = self.z3.Solver()
         solver.set("rlimit", EFFORT)
         try:
-            terms = _Terms(self.z3, question)
+            terms = _Terms(self.z3, question, self.made)
             wanted = [terms.of(condition) for condition in question.conditions]
         except (Unknown, self.z3.Z3Exception):
             return "open"
@@ -80,8 +85,9 @@ def _value(model: Any, variable: Any) -> Scalar:
 class _Terms:
     """The expressions of one question as terms of z3; `facts` is what holds of them anyway."""
 
-    def __init__(self, z3: Any, question: Question) -> None:
+    def __init__(self, z3: Any, question: Question, made: dict[object, Any]) -> None:
         self.z3 = z3
+        self.made = made
         self.question = question
         self.variables: dict[str, Any] = {}
         self.facts: list[Any] = []
@@ -125,8 +131,12 @@ class _Terms:
             return self.z3.IntVal(value)
         if not math.isfinite(value):
             raise Unknown
-        exact = Fraction(value)
-        return self.z3.RatVal(exact.numerator, exact.denominator)
+        return self._exact(Fraction(value))
+
+    def _exact(self, value: Fraction) -> Any:
+        if value not in self.made:
+            self.made[value] = self.z3.RealVal(f"{value.numerator}/{value.denominator}")
+        return self.made[value]
 
     def _named(self, name: str) -> Any:
         if name not in self.known:
@@ -139,16 +149,25 @@ class _Terms:
         return self.known[name]
 
     def _variable(self, name: str, extent: Extent) -> Any:
+        key = name, extent
+        if key not in self.made:
+            self.made[key] = self._made(name, extent)
+        self.variables[name], facts = self.made[key]
+        self.facts += facts
+        return self.variables[name]
+
+    def _made(self, name: str, extent: Extent) -> tuple[Any, list[Any]]:
+        """Return a variable and what its extent says of it."""
         z3 = self.z3
-        make = {"real": z3.Real, "whole": z3.Int, "truth": z3.Bool}[extent.type]
-        term = self.variables[name] = make(name)
-        for bound, is_low in ((extent.low, True), (extent.high, False)):
-            if bound is not None:
-                limit = z3.RatVal(bound.numerator, bound.denominator)
-                self.facts.append(term >= limit if is_low else term <= limit)
+        term = {"real": z3.Real, "whole": z3.Int, "truth": z3.Bool}[extent.type](name)
+        facts = []
+        if extent.low is not None:
+            facts.append(term >= self._exact(extent.low))
+        if extent.high is not None:
+            facts.append(term <= self._exact(extent.high))
         if extent.numbers:
-            self.facts.append(z3.Or(*(term == number for number in extent.numbers)))
-        return term
+            facts.append(z3.Or(*(term == number for number in extent.numbers)))
+        return term, facts
 
     def _arithmetic(self, operator: str, left: Any, right: Any) -> Any:
         match operator:
