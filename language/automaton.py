@@ -12,6 +12,7 @@ from language.declaration import Fitting, Formula, Kind, Parameter, Range
 from language.document import Document, Entry, Node, Scalar, Table
 from language.element import ElementReader
 from language.event import event_inputs
+from language.instance import with_instances
 from language.mode import ModeReader
 from language.model import Automaton
 from language.names import check_file_name
@@ -31,7 +32,7 @@ from language.variable import VariableReader
 
 COMMON_KEYS = ("language", "automaton", "parameters", "inputs", "states", "discrete", "equations")
 LOGIC_KEYS = ("flow", "terms", "initial", "modes", "regions", "templates", "outputs")
-DECISION_KEYS = ("tables", "transition_table")
+DECISION_KEYS = ("tables", "transition_table", "instances")
 LAID_KEYS = ("elements", "places")
 RECORDING_KEYS = ("recording_map",)
 FAULT_KEYS = ("faults", "fault_mode")
@@ -62,7 +63,8 @@ def read_automaton(
         label = f"`{document.name}` is a {document.kind}, not an automaton"
         problems.error("form", document.name_span, label)
     problems.stop_if_any()
-    tree, model = _with_model(document.root, project, values or {}, problems)
+    tree = with_instances(document.root, project, problems)
+    tree, model = _with_model(tree, project, values or {}, problems)
     _find_recording_map(tree, project, problems)
     return _AutomatonReader(problems).read(document, tree, model)
 

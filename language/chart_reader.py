@@ -13,6 +13,7 @@ from language.chart_way import ways_of
 from language.document import Entry, Items, Node as YamlNode, Scalar, Table
 from language.mode import INNER_KEYS, REGION_KEYS, ModeReader
 from language.model import CHART, Mode, Region
+from language.names import check_region_name
 from language.problem import Span, nearest
 from language.reader import TEXT_KEYS
 
@@ -99,7 +100,9 @@ class ChartReader:
         self.modes.events = tuple(signals)
         top = Table({}, at)
         self.raw.append(_Raw("", "", "parallel", NOWHERE, "", False, at, top))
-        entries = list(self.modes.named(self.root.get("regions"), "regions"))
+        entries = list(self.modes.table(self.root.get("regions"), "regions"))
+        for entry in entries:
+            check_region_name(entry.key, entry.span, self.problems)
         if "modes" in self.root.entries:
             kept = {k: e for k, e in self.root.entries.items() if k in ("modes", "initial")}
             self._region(Entry(CHART, at, Table(kept, at)), ROOT, "", None)

@@ -64,6 +64,8 @@ def check_outputs(automaton: Automaton, problems: Problems) -> None:
             continue
         if name == "faults" and automaton.is_sampled:
             continue
+        if name in (region.name for region in automaton.all_regions):
+            continue
         if name not in equations:
             hint = nearest(name, [*equations, *automaton.carried, "mode"])
             label = f"output `{name}` is not a state, an equation or `mode`"

@@ -10,6 +10,7 @@ from language.chart import Keeping
 from language.declaration import Formula
 from language.document import Entry, Items, Node, Scalar, Table
 from language.model import CHART, Automaton, Balance, Invariant, Mode, Region, Rewind, Transition
+from language.names import check_region_name
 from language.observer import read_observer, read_run
 from language.overlay import lay, without
 from language.parse import parse_balance
@@ -17,7 +18,7 @@ from language.problem import Problems, Span, nearest
 from language.reader import Reader
 from language.syntax import Arithmetic, Broken, Tree, Truth
 
-INNER_KEYS = ("modes", "regions", "initial", "final", "history", "priority")
+INNER_KEYS = ("modes", "regions", "initial", "final", "history", "priority", "transition_table")
 """Keys of a mode in a chart."""
 MODE_KEYS = ("number", "equations", "flow", "terms", "update", "observer", "runs", "transitions")
 REGION_KEYS = ("initial", "modes", "transition_table")
@@ -41,7 +42,9 @@ class ModeReader(Reader):
 
     def regions(self, tree: Table, at: Span) -> tuple[Region, ...]:
         """Return the chart and the regions beside it; one mode `always` where none is written."""
-        entries = list(self.named(tree.get("regions"), "regions"))
+        entries = list(self.table(tree.get("regions"), "regions"))
+        for entry in entries:
+            check_region_name(entry.key, entry.span, self.problems)
         chart = next((entry for entry in entries if entry.key == CHART), None)
         beside = tuple(self._region(entry, tree) for entry in entries if entry is not chart)
         if chart is not None:

@@ -35,6 +35,12 @@ def check_name(name: str, span: Span, problems: Problems) -> None:
                 return
 
 
+def check_region_name(name: str, span: Span, problems: Problems) -> None:
+    """Report a name of a region or instance: in C it is a part of names, or a member."""
+    if name != "main":
+        check_name(name, span, problems)
+
+
 def check_file_name(name: str, span: Span, problems: Problems) -> None:
     """Report a name of an automaton that cannot be the name of its files."""
     check_name(name, span, problems)

@@ -16,12 +16,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from language.document import Entry, Node, Scalar, Table
-from language.mode import TRANSITION_KEYS
+from language.mode import CHART_WAY_KEYS, TRANSITION_KEYS
 from language.problem import Problems, nearest
 from language.reader import Reader
 
 KEY = "transition_table"
-COLUMN_KEYS = tuple(key for key in TRANSITION_KEYS if key != "to")
+COLUMN_KEYS = tuple(key for key in (*TRANSITION_KEYS, *CHART_WAY_KEYS) if key != "to")
 STAY = "stay"
 
 
@@ -45,7 +45,11 @@ class _TableReader(Reader):
         return Table(found, tree.span)
 
     def _below(self, node: Node) -> Node:
-        return self.written(self.inside(node, ("modes",))) if isinstance(node, Table) else node
+        return (
+            self.written(self.inside(node, ("modes", "regions")))
+            if isinstance(node, Table)
+            else node
+        )
 
     def written(self, tree: Table) -> Table:
         """Return a tree whose own table, if it has one, is written out in the modes beside it."""

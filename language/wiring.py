@@ -117,6 +117,9 @@ def output_wires(automaton: Automaton) -> tuple[Wire, ...]:
                 wire = output if region.name == CHART else region.name.replace(".", "_")
                 found.append(Wire(wire, variable, "whole", "1"))
             continue
+        if name in (region.name for region in automaton.all_regions):
+            found.append(Wire(output, mode_variable("memory.mode", name), "whole", "1"))
+            continue
         thing = automaton.carried.get(name)
         if thing:
             group = "discrete" if name in automaton.discrete else "state"
