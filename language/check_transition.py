@@ -27,8 +27,8 @@ def check_transitions(automaton: Automaton, inquiry: Inquiry, problems: Problems
             if not guards.is_silent(transition, position):
                 continue
             if guards.never(transition):
-                label = "this never holds"
-                hint = "the declared ranges and the equations of the mode exclude it"
+                label = "this never holds within the declared ranges"
+                hint = "they exclude it, with the equations of the mode: correct one of them"
                 problems.warning("dead", transition.when.span, label, hint)
             elif not guards.report_shadow(transition, position, problems):
                 continue
@@ -57,11 +57,23 @@ def check_waits(automaton: Automaton, inquiry: Inquiry, problems: Problems) -> N
 
 
 def check_stuck(automaton: Automaton, silent: set[str], problems: Problems) -> None:
-    """Warn of modes that only transitions which never fire leave."""
+    """Warn of modes that only transitions which never fire leave; those of superstates count."""
+    superstates = {mode.key for mode in automaton.superstates}
     for mode in automaton.all_modes:
-        if mode.transitions and all(way.key in silent for way in mode.transitions):
+        ways = [way for each in _around(automaton, mode) for way in each.transitions]
+        if mode.key not in superstates and ways and all(way.key in silent for way in ways):
             label = f"mode `{mode.name}` cannot be left: none of its transitions ever fires"
             problems.warning("stuck", mode.span, label)
+
+
+def _around(automaton: Automaton, mode: Mode) -> Iterator[Mode]:
+    """Yield a mode and those that it stands in."""
+    yield mode
+    chart = automaton.tree
+    own = next(node for node in chart.nodes if node.mode == mode.key) if chart else None
+    for node in chart.outer(own) if chart and own else ():
+        if node.mode != mode.key and node.mode in automaton.by_key:
+            yield automaton.by_key[node.mode]
 
 
 class _Guards:
@@ -135,7 +147,8 @@ class _Guards:
     def _comes_first(self, way: Transition, before: list[Transition], wait: Fraction) -> bool:
         """Tell whether a transition fires first wherever both guards hold from one time on."""
         own = _held(self.automaton, way)
-        return own < wait or (own == wait and way in before)
+        leaves = not way.internal
+        return (leaves and own < wait) or (own == wait and way in before)
 
     def _lasted(self, wait: Fraction) -> tuple[Expr, ...]:
         """Return that the mode has been active for a wait, where its age matters."""

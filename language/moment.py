@@ -12,6 +12,9 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
 from language.action import place_of
+from language.activity import is_active
+from language.chart import Chart
+from language.chart_target import mode_paths
 from language.constants import exact_value
 from language.declaration import Formula
 from language.graph import post_order
@@ -21,6 +24,7 @@ from language.model import Automaton, Mode, Transition
 from language.number import rounded
 from language.operation import Binary, Compare, Expr, Ref, Select, Unary, Value, whole
 from language.parameter import constant_names
+from language.program import mode_variable
 from language.question import Extent, Step
 from language.syntax import EDGES, MEMORY, Application, Tree, memory_key, walk
 
@@ -96,31 +100,39 @@ class Moment:
 
     def _modes(self) -> dict[str, Expr]:
         """Return what `in(...)` is: of our own region it is certain, of others any mode."""
-        found: dict[str, Expr] = {}
+        model = self.automaton.model
+        found = _modes_of_run(model, self.story.extents) if model else {}
+        if self.automaton.tree:
+            return {**found, **self._modes_of_chart(self.automaton.tree)}
         for region in self.automaton.all_regions:
             own = region.name == self.mode.region
             selector = Ref(f"mode.{region.name}", True)
             if not own:
-                numbers = tuple(mode.number for mode in region.modes.values())
-                self.story.extents[selector.name] = Extent("whole", numbers=numbers)
+                self.story.extents[selector.name] = _any_mode(region.modes.values())
             for name, mode in region.modes.items():
                 is_in: Expr = Compare("==", selector, whole(mode.number))
                 found[f"in {region.name}.{name}"] = Value(name == self.mode.name) if own else is_in
-        return {**found, **self._modes_of_run()}
+        return found
 
-    def _modes_of_run(self) -> dict[str, Expr]:
-        model = self.automaton.model
+    def _modes_of_chart(self, chart: Chart) -> dict[str, Expr]:
+        """Return what `in(...)` is inside a chart: around our own mode only what holds it."""
+        own = next(node for node in chart.nodes if node.mode == self.mode.key)
+        for region in self.automaton.all_regions:
+            leaves = chart.leaves(region.name)
+            around = chart.region_node(region.name).holds(own.index)
+            here = [leaf for leaf in leaves if leaf.holds(own.index) or own.holds(leaf.index)]
+            numbers = [
+                leaf.number for leaf in (here if around else leaves) if leaf.number is not None
+            ]
+            if not around and region.inactive is not None:
+                numbers.append(region.inactive)
+            name = mode_variable("mode", region.name)
+            self.story.extents[name] = Extent("whole", numbers=tuple(numbers))
         found: dict[str, Expr] = {}
-        for region in model.all_regions if model else ():
-            assert model
-            selector = Ref(f"run.{region.name}", True)
-            numbers = tuple(mode.number for mode in region.modes.values())
-            self.story.extents[selector.name] = Extent("whole", numbers=numbers)
-            for name, mode in region.modes.items():
-                is_in = Compare("==", selector, whole(mode.number))
-                found[f"in {model.name}.{region.name}.{name}"] = is_in
-                if region.name == model.chart.name:
-                    found[f"in {model.name}.{name}"] = is_in
+        for path, node in mode_paths(chart).items():
+            found[f"in {path}"] = (
+                Value(True) if node.holds(own.index) else is_active(chart, node, "mode")
+            )
         return found
 
     def _define(self, trees: Iterable[Tree]) -> None:
@@ -220,3 +232,26 @@ def _time_of(automaton: Automaton, part: Application) -> Fraction:
 
 def _reads(tree: Tree) -> list[str]:
     return list(Formula(tree, "").reads)
+
+
+def _modes_of_run(model: Automaton, extents: dict[str, Extent]) -> dict[str, Expr]:
+    """Return what `in(model.mode)` is: a run may be in any mode of the model."""
+    found: dict[str, Expr] = {}
+    for region in model.all_regions:
+        selector = Ref(f"run.{region.name}", True)
+        extents[selector.name] = _any_mode(region.modes.values())
+        for name, mode in region.modes.items():
+            is_in = Compare("==", selector, whole(mode.number))
+            found[f"in {model.name}.{region.name}.{name}"] = is_in
+            if region.name == model.chart.name:
+                found[f"in {model.name}.{name}"] = is_in
+    return found
+
+
+def _any_mode(modes: Iterable[Mode]) -> Extent:
+    """Return the numbers of some modes, with the names that a witness shows."""
+    by_number = {mode.number: mode.name for mode in modes}
+    names: tuple[str, ...] = ()
+    if min(by_number) >= 0:
+        names = tuple(by_number.get(number, "") for number in range(max(by_number) + 1))
+    return Extent("whole", numbers=tuple(by_number), names=names)

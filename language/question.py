@@ -117,7 +117,8 @@ class Question:
 def shown(point: Mapping[str, Scalar], extents: Mapping[str, Extent]) -> str:
     """Return a point as text: `x = 0.5, ready = true, key = parked`."""
     return ", ".join(
-        f"{name.partition('.')[2]} = {_text(value, extents[name])}" for name, value in point.items()
+        f"{name.partition('.')[2] or name} = {_text(value, extents[name])}"
+        for name, value in point.items()
     )
 
 

@@ -116,3 +116,46 @@ def test_a_region_beside_may_end_a_way_round(tmp_path: Path) -> None:
     assert kinds(tmp_path, alone) == ["cycle"]
     still = alone.replace("b: {when: x > 0 m}", "b: {when: x > 0 m and in(r.still)}")
     assert kinds(tmp_path, still + beside) == []
+
+
+CHART = """language: 1
+automaton: nested
+period: 10 ms
+numbers: float64
+inputs: {{x: {{unit: m, range: [-9, 9]}}}}
+regions:
+  chart:
+    initial: drive
+    modes:
+      drive:
+        initial: slow
+        transitions: {{rest: {{when: {out}}}}}
+        modes:
+          slow:
+            transitions:
+              fast: {{when: {up}, priority: 1}}
+              rest: {{when: x < -5 m, priority: 2}}
+          fast: {{transitions: {{slow: {{when: x < 1 m}}}}}}
+      rest: {{transitions: {{drive: {{when: x > 0 m}}}}}}
+  lamp:
+    initial: dark
+    modes:
+      dark: {{transitions: {{lit: {{when: in(drive.fast) and x > 3 m}}}}}}
+      lit: {{transitions: {{dark: {{when: in(rest)}}}}}}
+outputs: [mode]
+"""
+
+
+@pytest.mark.parametrize(
+    ("out", "up", "expected"),
+    [
+        ("x < -2 m", "x > 2 m", []),
+        ("x < -20 m", "x > 2 m", ["dead"]),
+        ("x < -2 m", "x < -4 m", ["shadowed"]),
+        ("x < -2 m and in(lamp.lit)", "x > 2 m and in(drive)", []),
+        ("x < -2 m", "x > 2 m and not in(drive)", ["dead"]),
+        ("x < -2 m and not in(chart.drive)", "x > 20 m", ["dead", "dead"]),
+    ],
+)
+def test_superstates_and_regions(out: str, up: str, expected: list[str], tmp_path: Path) -> None:
+    assert kinds(tmp_path, CHART.format(out=out, up=up)) == expected
