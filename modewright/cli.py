@@ -17,6 +17,7 @@ from modewright.commands.check import check
 from modewright.commands.compare import compare
 from modewright.commands.demo import demo
 from modewright.commands.diagnose import diagnose
+from modewright.commands.diff import diff
 from modewright.commands.doctor import doctor
 from modewright.commands.effects import effects
 from modewright.commands.explain import explain
@@ -43,7 +44,7 @@ YOUNG_OBJECTS = 100_000
 """New objects after which garbage is looked for: trees of expressions have no circles."""
 COMMANDS = (
     new, check, test, trace, diagnose, fit, effects, simulate, sweep, lockstep, replay, plot,
-    compare, graph, generate, explain, format, schema, lsp, demo, doctor,
+    compare, graph, generate, explain, diff, format, schema, lsp, demo, doctor,
 )  # fmt: skip
 
 app = typer.Typer(

@@ -1,0 +1,48 @@
+"""Command diff: what distinguishes two specs, in their own terms."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from modewright.commands.options import Json
+from modewright.console import announce
+from modewright.exits import PROBLEMS
+from modewright.files import require_writable, write_files
+
+
+def diff(
+    before: Annotated[str, typer.Argument(help="a spec: name or file; also REVISION:name or file")],
+    after: Annotated[str, typer.Argument(help="another one of its kind")],
+    html: Annotated[Path | None, typer.Option(help="write a page")] = None,
+    as_json: Json = False,
+    exit_code: Annotated[
+        bool, typer.Option("--exit-code", help="exit code 1 if something differs")
+    ] = False,
+) -> None:
+    """Tell what differs between two specs: values, guards, waits, modes, equations.
+
+    \b
+    modewright diff driveline driveline_load
+    modewright diff HEAD~1:spec/ev_driveline/plant.yaml driveline --html diff.html
+    """
+    from modewright.editing.difference import difference
+    from modewright.editing.revision import documents
+    from modewright.editing.show_difference import json_of, page_of, text_of
+
+    require_writable(html)
+    with documents(before, after) as (old, new):
+        changes = difference(old, new)
+    if as_json:
+        print(json.dumps(json_of(changes), indent=2))
+    else:
+        print(text_of(changes), end="")
+    if html:
+        write_files({html: page_of(changes, before, after).encode()})
+        if not as_json:
+            announce([html])
+    if exit_code and changes:
+        raise typer.Exit(PROBLEMS)
