@@ -34,7 +34,7 @@ def event(
 def mode_names(program: Program, prefix: str = "") -> dict[str, dict[int, str]]:
     """Return the names of the modes by signal: `mode` for the chart, else the region."""
     return {
-        f"{prefix}{'mode' if region == CHART else region}": {
+        f"{prefix}{'mode' if region == CHART else region.replace('.', '_')}": {
             mode.number: mode.name for mode in program.modes_of(region)
         }
         for region in program.mode_variables()

@@ -8,13 +8,18 @@ from fractions import Fraction
 from typing import Any
 
 from expectation.expected import Condition, Place, Running, Stay
+from expectation.places import (
+    mode_signals,
+    modes_inside,
+    path_of,
+    require_mode_output,
+    stays,
+)
 from language.declaration import Formula
 from language.dimension import DimensionCheck, Scope
 from language.document import Scalar
-from language.event_name import modes_of
 from language.experiment import System
 from language.kind import Enumeration, Kind, Whole
-from language.model import CHART
 from language.problem import Problems, nearest
 from language.signal_kind import signal_kinds
 from language.syntax import Application, Broken, Name, Not, Number, Relation, Tree
@@ -34,8 +39,10 @@ class ConditionReader:
         self.problems = problems
         self.system = system
         self.kinds = signal_kinds(system)
-        self.modes = modes_of(system)
-        self.regions = _regions(system)
+        self.modes = stays(system)
+        self.regions = {
+            s: p for name in system.instances for s, p in mode_signals(system, name).items()
+        }
         self.literals = _literals(self.kinds)
 
     def condition(self, scalar: Scalar, formula: Formula) -> Condition | None:
@@ -113,29 +120,39 @@ class _Found:
         return self.reader.regions.get(self.reader.full(tree.path))
 
     def _compared(self, place: Place, tree: Tree) -> Tree:
-        region = self.reader.system.instances[place[0]].automaton.region(place[1])
-        if isinstance(tree, Name) and tree.path in region.modes:
-            return self._stay(place, tree.path, tree)
+        instance, region = place
+        if isinstance(tree, Name):
+            stay = self.reader.modes.get(f"{instance}.{path_of(region, tree.path)}")
+            if stay and stay.place == place:
+                return self._stay(stay, tree.path, tree)
         said = tree.path if isinstance(tree, Name) else "this"
-        label = f"`{said}` is not a mode of `{place[0]}`"
-        self._error("name", tree, label, nearest(said, region.modes))
+        automaton = self.reader.system.instances[instance].automaton
+        known = [path for owner, path in modes_inside(automaton) if owner == region]
+        hint = nearest(path_of(region, said), known) or nearest(
+            said, automaton.region(region).modes
+        )
+        self._error("name", tree, f"`{said}` is not a mode of `{instance}`", hint)
         return Broken(tree.span)
 
     def _in(self, tree: Application, arguments: tuple[Tree, ...]) -> Tree:
         path = arguments[0].path if len(arguments) == 1 and isinstance(arguments[0], Name) else ""
-        place = self.reader.modes.get(path)
-        if place is None:
+        stay = self.reader.modes.get(path)
+        if stay is None:
             label = f"`{path}` is not a mode of an instance of `{self.reader.system.name}`"
             self._error("name", arguments[0] if arguments else tree, label,
                         nearest(path, self.reader.modes))  # fmt: skip
             return Broken(tree.span)
-        return self._stay(place[:2], place[2], tree)
+        return self._stay(stay, path, tree)
 
-    def _stay(self, place: Place, mode: str, at: Tree) -> Tree:
-        name = f"in {place[0]}.{place[1]}.{mode}"
-        self.stays[name] = Stay(place, frozenset([mode]))
+    def _stay(self, stay: Stay, mode: str, at: Tree) -> Tree:
+        self._require_modes(stay.place, at)
+        name = f"in {'.'.join(stay.place)} {mode}"
+        self.stays[name] = stay
         self.kinds[name] = "truth"
         return Name(name, at.span)
+
+    def _require_modes(self, place: Place, at: Tree) -> None:
+        require_mode_output(self.reader.system, place[0], at.span, self.problems)
 
     def _running(self, tree: Application) -> Tree:
         function, arguments = tree.function, tree.arguments
@@ -145,8 +162,11 @@ class _Found:
             self._error("arguments", tree, label)
             return Broken(tree.span)
         since = self._since(arguments[1]) if len(arguments) == 2 else Fraction(0)
-        of: Condition | Place | None = self._region(arguments[0])
-        if of is None or function != "count":
+        place = self._region(arguments[0])
+        of: Condition | Place | None = place
+        if place is not None:
+            self._require_modes(place, tree)
+        if place is None or function != "count":
             of = self.reader.inner(function, arguments[0], truth=function != "rms")
         if of is None:
             return Broken(tree.span)
@@ -192,16 +212,6 @@ def _rebuilt(tree: Tree, change: Callable[[Tree], Tree]) -> Tree:
         elif field.name == "arguments":
             parts[field.name] = tuple(change(part) for part in value)
     return dataclasses.replace(tree, **parts) if parts else tree
-
-
-def _regions(system: System) -> dict[str, Place]:
-    """Return the regions by the signal of their mode: `est.mode`, `est.gap`."""
-    found = {}
-    for name, instance in system.instances.items():
-        for region in instance.automaton.all_regions:
-            signal = "mode" if region.name == CHART else region.name
-            found[f"{name}.{signal}"] = (name, region.name)
-    return found
 
 
 def _literals(kinds: dict[str, Kind]) -> dict[str, tuple[Kind, int]]:

@@ -3,33 +3,33 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 
+from engine.firing import fired
 from engine.interpreter import Interpreter
 from engine.simulate import simulate
 from engine.starting import automata_of
 from engine.stimulus import resolved
 from expectation.decision import MOST_CONDITIONS, SHOWN, Decision, Shown, decision_of
 from expectation.expected import Test
-from expectation.observed import observed
 from expectation.probe import LOOK, probed
 from language.hoist import hoisted
 from language.load import lowered
-from language.model import CHART, Automaton
+from language.model import Automaton
 from language.program import Program
 
-Modes = frozenset[tuple[str, str]]
-"""Modes by region and name."""
+STRUCTURE = ("modes", "regions", "transitions")
+"""Words of a key path that are no names."""
 
 
 @dataclass(frozen=True)
 class Coverage:
-    """What has been reached of an automaton: modes, transitions by key path, combinations."""
+    """What has been reached of an automaton: modes and transitions by key path, combinations."""
 
     automaton: Automaton
     decisions: tuple[Decision, ...]
-    modes: Modes = frozenset()
+    modes: frozenset[str] = frozenset()
     transitions: frozenset[str] = frozenset()
     seen: Mapping[str, frozenset[int]] = dataclasses.field(default_factory=dict)
 
@@ -39,9 +39,9 @@ class Coverage:
         return self.automaton.name
 
     @property
-    def all_modes(self) -> tuple[tuple[str, str], ...]:
-        """All modes by region and name, in the order of the file."""
-        return tuple((mode.region, mode.name) for mode in self.automaton.all_modes)
+    def all_modes(self) -> tuple[str, ...]:
+        """All modes by key path, innermost ones first; superstates too."""
+        return tuple(mode.key for mode in self.automaton.all_modes if is_mode(mode.key))
 
     def shown(self, decision: Decision) -> tuple[Shown, ...]:
         """Return of each condition of a guard whether it was shown to matter."""
@@ -61,9 +61,9 @@ class Coverage:
     def missed(self) -> list[str]:
         """Return what was not reached, one line each."""
         lines = [
-            f"mode `{name if region == CHART else f'{region}.{name}'}` was not entered"
-            for region, name in self.all_modes
-            if (region, name) not in self.modes
+            f"mode `{'.'.join(names_of(key))}` was not entered"
+            for key in self.all_modes
+            if key not in self.modes
         ]
         for decision in self.decisions:
             if decision.key not in self.transitions:
@@ -93,25 +93,42 @@ def coverage(test: Test) -> list[Coverage]:
     def build(program: Program) -> _Looking:
         return steppers.setdefault(id(program), _Looking(program))
 
-    run = observed(test.system, simulate(test.system, scenario, build, programs=programs))
+    simulate(test.system, scenario, build, programs=programs)
     made = []
     for name, program in programs.items():
-        stepper = steppers[id(program)]
+        stepper, automaton = steppers[id(program)], test.system.instances[name].automaton
         seen = {
             key: frozenset(k for k, was in enumerate(stepper.get(array)) if was)
             for key, array in arrays[name].items()
         }
-        places = [place for place in run.modes if place[0] == name]
         made.append(
             Coverage(
-                test.system.instances[name].automaton,
+                automaton,
                 decisions[name],
-                frozenset((place[1], mode) for place in places for mode in run.modes[place]),
+                _entered(automaton, stepper.active),
                 frozenset(stepper.taken),
                 {key: combinations for key, combinations in seen.items() if combinations},
             )
         )
     return made
+
+
+def _entered(automaton: Automaton, active: Collection[tuple[str, int]]) -> frozenset[str]:
+    """Return the key paths of the modes that were active, and of all that hold them."""
+    modes = [mode for region in automaton.all_regions for mode in region.modes.values()]
+    inner = {mode.key for mode in modes if (mode.region, mode.number) in active}
+    outer = (mode.key for mode in automaton.superstates if is_mode(mode.key))
+    return frozenset(inner.union(o for o in outer if any(i.startswith(f"{o}.") for i in inner)))
+
+
+def is_mode(key: str) -> bool:
+    """Tell whether a key path is that of a mode, and not of a region."""
+    return key.split(".")[-2:-1] == ["modes"]
+
+
+def names_of(key: str) -> tuple[str, ...]:
+    """Return the names of a key path: `modes.a.transitions.b` is (a, b)."""
+    return tuple(part for part in key.split(".") if part not in STRUCTURE)
 
 
 def probed_programs(
@@ -153,7 +170,8 @@ class _Looking(Interpreter):
     def __init__(self, program: Program) -> None:
         super().__init__(program)
         self.taken: set[str] = set()
-        self._fired = program.fired_variables()
+        self.active: set[tuple[str, int]] = set()
+        self._modes = program.mode_variables()
         self._looks = LOOK in program.blocks
 
     def run(self, block: str) -> None:
@@ -161,11 +179,10 @@ class _Looking(Interpreter):
             super().run(LOOK)
         super().run(block)
         if block in ("step", "jump"):
-            for name in self._fired:
-                number = self.get(name)
-                if number:
-                    key = self.program.transitions[number - 1].key
-                    self.taken.add(key.partition(" ")[2])
+            for info in fired(self.program, self):
+                self.taken.add(info.key.partition(" ")[2])
+        if block in ("step", "jump", "equations"):
+            self.active.update((region, self.get(name)) for region, name in self._modes.items())
 
 
 def _possible(decision: Decision) -> int:

@@ -29,12 +29,17 @@ MOST_CONDITIONS = 10
 
 @dataclass(frozen=True)
 class Decision:
-    """The guard of a transition, by its key path; conditions in the order of the text."""
+    """The guard of a transition, by its key path; conditions in the order of the text.
+
+    Events that it waits for come first; that a superstate has come to its end is one condition
+    (`is_whole`), however it is found out. `places` are those of the lowered guard's conditions.
+    """
 
     key: str
     conditions: tuple[str, ...]
     joined: Joined
     places: tuple[int | None, ...]
+    is_whole: bool = False
 
     def outcome(self, combination: int) -> bool:
         """Return what the guard is; bit k of a combination is condition k."""
@@ -66,9 +71,11 @@ class Decision:
 
 
 def decision_of(transition: Transition) -> Decision:
-    """Return the guard of a transition as a decision."""
+    """Return what a transition asks for as a decision: its events, and its guard."""
+    if transition.completes:
+        return Decision(transition.key, ("completion",), 0, (0,), is_whole=True)
     found: list[Tree] = []
-    places: list[int | None] = []
+    places: list[int | None] = list(range(len(transition.events)))
 
     def joined(tree: Tree) -> Joined:
         match tree:
@@ -82,12 +89,24 @@ def decision_of(transition: Transition) -> Decision:
         place = next((k for k, known in enumerate(found) if alike(known, tree)), len(found))
         if place == len(found):
             found.append(tree)
-        places.append(place)
-        return place
+        places.append(place + len(transition.events))
+        return places[-1]  # type: ignore[return-value]
 
-    made = joined(transition.when.tree)
-    texts = tuple(_text(tree) for tree in found)
-    return Decision(transition.key, texts, made, tuple(places))
+    made: Joined = any_of(len(transition.events))
+    guard = transition.when.tree
+    if not (transition.events and isinstance(guard, Truth) and guard.value):
+        own = joined(guard)
+        made = ("and", made, own) if transition.events else own
+    events = (f"event {name}" for name in transition.events)
+    return Decision(transition.key, (*events, *map(_text, found)), made, tuple(places))
+
+
+def any_of(count: int) -> Joined:
+    """Return whether one of the first conditions holds."""
+    made: Joined = 0
+    for place in range(1, count):
+        made = ("or", made, place)
+    return made
 
 
 def leaves(expr: Expr) -> Iterator[Expr]:

@@ -202,11 +202,11 @@ class _Judge:
         place, wanted = self.expectation.place, self.expectation.subject
         assert place is not None and isinstance(wanted, tuple)
         low, high = self._window(when)
-        modes, start = self.seen.modes[place], at_or_before(self.seen, low)
-        found = [(max(low, 0.0), modes[start])]
-        for k, point in enumerate(self.seen.points[start + 1 :], start + 1):
-            if point.moved == place and point.time <= high + slack(high):
-                found.append((point.time, modes[k]))
+        start = at_or_before(self.seen, low)
+        found = [(max(low, 0.0), self.seen.modes[place][start])]
+        for k, mode in self.seen.entered(place, start):
+            if self.seen.points[k].time <= high + slack(high):
+                found.append((self.seen.points[k].time, mode))
         for (time, mode), expected in zip(found, wanted, strict=False):
             if mode != expected:
                 text = f"was `{mode}` from {_s(time)} on, not `{expected}`"

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from engine.trajectory import Event, Trajectory
-from expectation.expected import Condition, Place, Running
+from expectation.expected import Condition, Place, Running, Stay
+from expectation.places import inside, is_chart, mode_signals, path_of
 from language.evaluate import evaluate
 from language.event_name import EventName
 from language.experiment import System
@@ -46,19 +47,50 @@ class Observed:
     units: Mapping[str, str]
     events: tuple[Event, ...]
     end: float
+    system: System
 
     def modes_at(self, point: int) -> dict[str, str]:
         """Return the active modes at a point by `instance` or `instance.region`."""
         return {_shown(place): found[point] for place, found in self.modes.items()}
 
     def times_of(self, event: EventName) -> list[float]:
-        """Return when an event happened [s]."""
-        return [
+        """Return when an event happened [s].
+
+        In a chart a mode is entered by what enters it, and by whatever makes it active.
+        """
+        is_tree = is_chart(self.system, event.instance)
+        names = (event.source, event.target)
+        if is_tree:
+            names = (event.source and path_of(event.region, event.source),
+                     path_of(event.region, event.target))  # fmt: skip
+        exact = [
             one.time
             for one in self.events
-            if (one.instance, one.region, one.target)
-            == (event.instance, event.region, event.target)
-            and event.source in ("", one.source)
+            if (one.instance, one.target) == (event.instance, names[1])
+            and (is_tree or one.region == event.region)
+            and names[0] in ("", one.source)
+        ]
+        if not is_tree or event.source:
+            return exact
+        stay = Stay((event.instance, event.region), inside(self.system, event))
+        return sorted({*exact, *self._rises(stay)})
+
+    def _rises(self, stay: Stay) -> list[float]:
+        found, before = [], self.modes[stay.place][0] in stay.modes
+        for point, mode in zip(self.points, self.modes[stay.place], strict=True):
+            if mode in stay.modes and not before:
+                found.append(point.time)
+            before = mode in stay.modes
+        return found
+
+    def entered(self, place: Place, since: int) -> list[tuple[int, str]]:
+        """Return the points after one at which a region entered a mode, and that mode."""
+        modes = self.modes[place]
+        is_tree = is_chart(self.system, place[0])
+        return [
+            (k, modes[k])
+            for k in range(since + 1, len(modes))
+            if modes[k] != modes[k - 1] or (self.points[k].moved == place and not is_tree)
         ]
 
 
@@ -71,34 +103,53 @@ class Series:
 
 
 def observed(system: System, trajectory: Trajectory) -> Observed:
-    """Return what a test sees of a run."""
+    """Return what a test sees of a run; the modes of charts are those of the rows."""
     moves = [event for event in trajectory.events if event.kind == "transition"]
     moves.sort(key=lambda event: event.time)
+    told = _told(system, trajectory)
     active: dict[Place, str] = {
         (name, region.name): region.initial
         for name, instance in system.instances.items()
         for region in instance.automaton.all_regions
+        if not is_chart(system, name) or (name, region.name) in told
     }
     points: list[Point] = []
     modes: dict[Place, list[str]] = {place: [] for place in active}
 
     def add(point: Point) -> None:
+        if point.row != BETWEEN:
+            active.update((place, line[point.row]) for place, line in told.items())
         points.append(point)
         for place, mode in active.items():
             modes[place].append(mode)
 
     rows = [(time, 1, row) for row, time in enumerate(trajectory.times.tolist())]
+    active.update((place, line[0]) for place, line in told.items() if line)
     add(Point(0.0, BETWEEN))
     for time, is_row, number in heapq.merge(((m.time, 0, k) for k, m in enumerate(moves)), rows):
         if is_row:
             add(Point(time, number))
             continue
         move = moves[number]
-        active[move.instance, move.region] = move.target
-        add(Point(time, BETWEEN, (move.instance, move.region)))
+        place = (move.instance, move.region)
+        if place in active and not is_chart(system, move.instance):
+            active[place] = move.target
+        add(Point(time, BETWEEN, place))
     signals = {name: values.tolist() for name, values in trajectory.signals.items()}
     end = points[-1].time
-    return Observed(tuple(points), modes, signals, trajectory.units, tuple(moves), end)
+    return Observed(tuple(points), modes, signals, trajectory.units, tuple(moves), end, system)
+
+
+def _told(system: System, trajectory: Trajectory) -> dict[Place, list[str]]:
+    """Return the modes of charts at each row, where they are recorded."""
+    found = {}
+    for name in system.instances:
+        if is_chart(system, name):
+            for signal, place in mode_signals(system, name).items():
+                if signal in trajectory.signals:
+                    names = trajectory.modes[signal]
+                    found[place] = [names[k] for k in trajectory.signals[signal].tolist()]
+    return found
 
 
 def series(condition: Condition, seen: Observed) -> Series:

@@ -33,6 +33,10 @@ LOOK = "look"
 """The block that reads the guards of the active modes and does nothing else."""
 GUARDS = "guards_"
 PROBED = "probed_"
+CHOOSING = ("jump", "count_", "choose_")
+"""How the blocks of a sampled Program begin that read guards."""
+TAKEN = ("memory.fired", "work.wish_")
+"""How the variables begin that hold the transition that is taken, or wished for in a chart."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -56,7 +60,7 @@ def probed(program: Program, decisions: Iterable[Decision]) -> Probed:
         blocks[LOOK] = tuple(_looked(program.blocks["watch"]))
     else:
         for name, block in program.blocks.items():
-            if name.startswith("jump"):
+            if name.startswith(CHOOSING):
                 blocks[name] = _everywhere(block, found.before_fired)
     sizes = {found.arrays[d.key]: 1 << len(d.conditions) for d in found.decisions}
     arrays = [Variable(name, "truth", size=size) for name, size in sizes.items()]
@@ -85,7 +89,7 @@ class _Probes:
                 yield from self._store(key.removesuffix(".when"), condition)
             case Branch(condition, then, _) if not _is_waiting(condition):
                 for inner in then:
-                    if isinstance(inner, Assign) and inner.target.startswith("memory.fired"):
+                    if isinstance(inner, Assign) and inner.target.startswith(TAKEN):
                         yield from self._store(inner.key, condition)
         yield op
 
@@ -93,7 +97,7 @@ class _Probes:
         decision = self._by_key.get(key)
         if decision is None:
             return
-        parts = list(leaves(guard))
+        parts = [guard] if decision.is_whole else list(leaves(guard))
         if len(parts) != len(decision.places):
             raise ValueError(f"the guard of {key} has {len(parts)} conditions in its Program")
         index: Expr = whole(0)

@@ -16,9 +16,11 @@ from expectation.expected import (
     Trigger,
     When,
 )
+from expectation.places import require_mode_output
+from expectation.recording import recording
 from language.declaration import Formula
 from language.document import Document, Entry, Node, Scalar, Table
-from language.event_name import read_event
+from language.event_name import EventName, read_event
 from language.experiment import Scenario, System
 from language.model import CHART
 from language.problem import Problems, Span, nearest
@@ -29,6 +31,7 @@ from language.scenario import SCENARIO_KEYS, read_scenario
 from language.syntax import Broken
 from language.system import read_system
 from language.units import SECOND, fits
+from language.wiring import INACTIVE
 
 TEST_KEYS = ("language", "test", "scenario", "of", "values", "every", "expect")
 INNER_KEYS = tuple(key for key in SCENARIO_KEYS if key not in ("language", "scenario"))
@@ -87,7 +90,7 @@ class _TestReader(Reader):
         return Test(
             name=document.name,
             system=self.system,
-            scenario=self._recording(expectations),
+            scenario=recording(self.scenario, self.system, expectations, self.problems),
             expectations=expectations,
             span=at,
             source=document.source,
@@ -121,12 +124,6 @@ class _TestReader(Reader):
         document = read_document(self.project.path_of(named.text, named.span))
         self.system = read_system(document, self.project, overrides)  # type: ignore[arg-type]
         self.scenario = read_scenario(written, self.project, self.system)
-
-    def _recording(self, expectations: tuple[Expectation, ...]) -> Scenario:
-        """The scenario with what has to be recorded: the signals that are read, at least one."""
-        read = [n for e in expectations for c in e.conditions for n in c.all_signals]
-        signals = tuple(dict.fromkeys(read)) or self.system.signals[:1]
-        return dataclasses.replace(self.scenario, signals=signals)
 
     def _expectation(self, entry: Entry) -> Expectation | None:
         told = len(self.problems.found)
@@ -169,7 +166,7 @@ class _TestReader(Reader):
         if scalar is None:
             return None
         if kind == "event":
-            return read_event(scalar, self.system, self.problems)
+            return self._event(scalar)
         return self._condition(scalar, kind)
 
     def _condition(self, scalar: Scalar, key: str) -> Condition | None:
@@ -184,8 +181,14 @@ class _TestReader(Reader):
         if scalar is None:
             return None
         if "->" in scalar.text or scalar.text in self.conditions.modes:
-            return read_event(scalar, self.system, self.problems)
+            return self._event(scalar)
         return self._condition(scalar, "after")
+
+    def _event(self, scalar: Scalar) -> EventName | None:
+        event = read_event(scalar, self.system, self.problems)
+        if event:
+            require_mode_output(self.system, event.instance, scalar.span, self.problems)
+        return event
 
     def _place(self, own: Table, at: Span) -> Place | None:
         """The region whose modes are expected: `est`, `est.gap`."""
@@ -196,6 +199,7 @@ class _TestReader(Reader):
         }
         alone = self.system.alone
         if own.get("of") is None and alone:
+            require_mode_output(self.system, alone, at, self.problems)
             return alone, CHART
         scalar = self.scalar(own.get("of"), "of", at)
         if scalar is None:
@@ -206,13 +210,15 @@ class _TestReader(Reader):
             )
             self.problems.error("name", scalar.span, label, nearest(scalar.text, known))
             return None
+        require_mode_output(self.system, known[scalar.text][0], scalar.span, self.problems)
         return known[scalar.text]
 
     def _modes(self, node: Node, place: Place | None) -> tuple[str, ...] | None:
         items = self.items(node, "modes")
         if place is None or not items:
             return None
-        modes = self.system.instances[place[0]].automaton.region(place[1]).modes
+        region = self.system.instances[place[0]].automaton.region(place[1])
+        modes = [*region.modes, *([INACTIVE] if region.inactive is not None else [])]
         for item in items:
             if item.text not in modes:
                 label = f"`{item.text}` is not a mode of `{place[0]}`"

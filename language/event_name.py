@@ -35,7 +35,14 @@ def read_event(scalar: Scalar, system: System, problems: Problems) -> EventName 
     instance, region, mode = place
     automaton = system.instances[instance].automaton
     source = ""
-    if arrow:
+    if arrow and automaton.tree is not None:
+        source, other = mode, known.get(tail) or known.get(f"{instance}.{tail}")
+        if other is None or other[:2] != (instance, region):
+            label = f"`{tail}` is not a mode beside `{source}`"
+            problems.error("name", scalar.span, label, nearest(tail, known))
+            return None
+        mode = other[2]
+    elif arrow:
         source, mode = mode, tail.rpartition(".")[2]
         if mode not in automaton.region(region).modes:
             label = f"`{tail}` is not a mode beside `{source}`"
@@ -43,6 +50,8 @@ def read_event(scalar: Scalar, system: System, problems: Problems) -> EventName 
                 "name", scalar.span, label, nearest(mode, automaton.region(region).modes)
             )
             return None
+    if automaton.tree is not None:
+        return EventName(instance, region, mode, source)
     taken = [
         (transition.source, transition.target)
         for each in automaton.region(region).modes.values()
@@ -67,4 +76,11 @@ def modes_of(system: System) -> dict[str, tuple[str, str, str]]:
                 found[f"{name}.{inner}"] = place
                 if system.alone:
                     found[inner] = place
+        for outer in instance.automaton.superstates:
+            if outer.key.split(".")[-2:-1] == ["modes"]:
+                path = outer.name if outer.region == CHART else f"{outer.region}.{outer.name}"
+                place = (name, outer.region, outer.name)
+                found[f"{name}.{path}"] = place
+                if system.alone:
+                    found[path] = place
     return found

@@ -7,13 +7,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from expectation.coverage import Coverage
+from expectation.coverage import Coverage, names_of
 from expectation.decision import SHOWN, Decision
-from language.model import CHART
 from modewright.diagram import Arrow, Diagram, Key, ModeBox, RegionBox, Shade, graph
-
-STRUCTURE = ("modes", "regions", "transitions")
-"""Words of a key path that are no names."""
 
 
 def lines_of(coverage: Coverage) -> Iterator[str]:
@@ -32,10 +28,7 @@ def coverage_json(coverage: Coverage) -> dict[str, Any]:
         "counts": {
             what: {"reached": done, "of": total} for what, (done, total) in coverage.count().items()
         },
-        "modes": [
-            {"region": region, "mode": mode, "entered": (region, mode) in coverage.modes}
-            for region, mode in coverage.all_modes
-        ],
+        "modes": [{"key": key, "entered": key in coverage.modes} for key in coverage.all_modes],
         "transitions": [_transition_json(coverage, decision) for decision in coverage.decisions],
     }
 
@@ -47,9 +40,8 @@ def covered_graph(coverage: Coverage, root: Path | None = None) -> Diagram:
 
 def shaded(diagram: Diagram, coverage: Coverage) -> Diagram:
     """Return a diagram whose modes and transitions are shaded by what tests reached."""
-    modes = {mode.key: (mode.region, mode.name) for mode in coverage.automaton.all_modes}
-    entered = {_names(key) for key, place in modes.items() if place in coverage.modes}
-    decisions = {_names(decision.key): decision for decision in coverage.decisions}
+    entered = {names_of(key) for key in coverage.modes}
+    decisions = {names_of(decision.key): decision for decision in coverage.decisions}
     return dataclasses.replace(
         diagram,
         regions=tuple(_region(region, entered) for region in diagram.regions),
@@ -62,10 +54,7 @@ def _region(region: RegionBox, entered: set[Key]) -> RegionBox:
 
 
 def _mode(mode: ModeBox, entered: set[Key]) -> ModeBox:
-    """A mode was entered if one inside it was."""
-    path = mode.path[1:] if mode.path[0] == CHART and len(mode.path) > 1 else mode.path
-    paths = (mode.path, path)
-    was = any(one[: len(each)] == each for one in entered for each in paths)
+    was = mode.path in entered
     inner = tuple(_region(region, entered) for region in mode.regions)
     return dataclasses.replace(mode, shade="covered" if was else "missed", regions=inner)
 
@@ -82,11 +71,6 @@ def _arrow(arrow: Arrow, coverage: Coverage, decisions: dict[Key, Decision]) -> 
         shade = "part" if still else "covered"
         lines = (*lines, *(f"? {text}" for text in still))
     return dataclasses.replace(arrow, shade=shade, lines=lines)
-
-
-def _names(key: str) -> Key:
-    """Return the names of a key path: `modes.a.transitions.b` is (a, b)."""
-    return tuple(part for part in key.split(".") if part not in STRUCTURE)
 
 
 def _transition_json(coverage: Coverage, decision: Decision) -> dict[str, Any]:
