@@ -24,7 +24,7 @@ from language.assembly import RANGE_SLACK, Assembly, Course, Feed, ranged, short
 from language.continuous import PARTS
 from language.history import AGE
 from language.number import NumberType
-from language.program import Program, short
+from language.program import LOG, LOGGED, Program, short
 from language.signal import Sensor
 from language.stepping import BETWEEN, EVENTS_PER_STEP
 from language.traversal import block_names
@@ -92,6 +92,7 @@ def _module(
         "has_record": "record" in program.blocks,
         "age": place(AGE.name),
         "fired": [place(v) for v in program.fired_variables()],
+        "log": [place(v.name) for v in program.variables if v.name in (LOG, LOGGED)],
         "bound": sum(len(program.modes_of(region)) for region in program.mode_variables()),
         "number": number,
         "looks": [(k, place(wires_of(program)[wire])) for k, wire in slots],

@@ -13,6 +13,7 @@ from engine.starting import automata_of
 from engine.stimulus import resolved
 from expectation.decision import MOST_CONDITIONS, SHOWN, Decision, Shown, decision_of
 from expectation.expected import Test
+from expectation.places import path_of
 from expectation.probe import LOOK, probed
 from language.hoist import hoisted
 from language.load import lowered
@@ -105,7 +106,7 @@ def coverage(test: Test) -> list[Coverage]:
             Coverage(
                 automaton,
                 decisions[name],
-                _entered(automaton, stepper.active),
+                _entered(automaton, stepper.active, stepper.reached),
                 frozenset(stepper.taken),
                 {key: combinations for key, combinations in seen.items() if combinations},
             )
@@ -113,10 +114,19 @@ def coverage(test: Test) -> list[Coverage]:
     return made
 
 
-def _entered(automaton: Automaton, active: Collection[tuple[str, int]]) -> frozenset[str]:
-    """Return the key paths of the modes that were active, and of all that hold them."""
+def _entered(
+    automaton: Automaton, active: Collection[tuple[str, int]], reached: Collection[str]
+) -> frozenset[str]:
+    """Return the key paths of the modes that were active, and of all that hold them.
+
+    `active` are regions with numbers of modes, `reached` paths that a transition named.
+    """
     modes = [mode for region in automaton.all_regions for mode in region.modes.values()]
-    inner = {mode.key for mode in modes if (mode.region, mode.number) in active}
+    inner = {
+        mode.key
+        for mode in modes
+        if (mode.region, mode.number) in active or path_of(mode.region, mode.name) in reached
+    }
     outer = (mode.key for mode in automaton.superstates if is_mode(mode.key))
     return frozenset(inner.union(o for o in outer if any(i.startswith(f"{o}.") for i in inner)))
 
@@ -171,6 +181,7 @@ class _Looking(Interpreter):
         super().__init__(program)
         self.taken: set[str] = set()
         self.active: set[tuple[str, int]] = set()
+        self.reached: set[str] = set()
         self._modes = program.mode_variables()
         self._looks = LOOK in program.blocks
 
@@ -181,6 +192,7 @@ class _Looking(Interpreter):
         if block in ("step", "jump"):
             for info in fired(self.program, self):
                 self.taken.add(info.key.partition(" ")[2])
+                self.reached.update(info.between[1:] if info.between else ())
         if block in ("step", "jump", "equations"):
             self.active.update((region, self.get(name)) for region, name in self._modes.items())
 

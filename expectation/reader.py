@@ -7,15 +7,7 @@ from collections.abc import Mapping
 from fractions import Fraction
 
 from expectation.condition import ConditionReader
-from expectation.expected import (
-    Condition,
-    Expectation,
-    Place,
-    Subject,
-    Test,
-    Trigger,
-    When,
-)
+from expectation.expected import Condition, Expectation, Place, Subject, Test, Trigger, When
 from expectation.places import require_mode_output
 from expectation.recording import recording
 from language.declaration import Formula

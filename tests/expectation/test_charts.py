@@ -1,0 +1,137 @@
+"""Charts: modes inside modes, events and micro-steps, as tests see them; derived by hand.
+
+`go` comes at 50 ms: drive. `hot` at 80 ms: pull, which raises trip: fault, all in one tick. `clear`
+at 250 ms: operation, and as `go` holds drive. `go` ends at 400 ms: ready. `ok` ends at 440 ms:
+30 ms later fault, where all is over in the same tick.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from expectation.coverage import coverage, probed_programs
+from language.operation import Store
+from language.traversal import walk
+from modewright import tests
+from modewright.covered import covered_graph
+from modewright.diagram import ModeBox
+
+CHART = """\
+language: 1
+automaton: supervisor
+period: 10 ms
+numbers: float64
+events: {clear: {from: input}, trip: {}, warn: {}}
+inputs: {clear: {type: bool}, go: {type: bool}, ok: {type: bool}, hot: {type: bool}}
+initial: operation
+modes:
+  operation:
+    initial: ready
+    transitions:
+      fault: {when: not ok, wait: 30 ms, priority: 1}
+      tripped: {to: fault, event: [trip, warn], when: go, priority: 2}
+    modes:
+      ready: {transitions: {drive: {when: go}}}
+      drive:
+        transitions: {ready: {when: not go}}
+        regions:
+          torque:
+            initial: creep
+            modes: {creep: {transitions: {pull: {when: go and hot, raise: trip}}}, pull: {}}
+          derating:
+            initial: cool
+            modes:
+              cool: {transitions: {warm: {when: hot}}}
+              warm: {transitions: {cool: {when: not hot}}}
+  fault:
+    initial: hurt
+    transitions: {operation: {event: clear, when: ok, priority: 1}, over: {to: ended, priority: 2}}
+    modes: {hurt: {transitions: {given_up: {when: not ok and not hot}}}, given_up: {final: true}}
+  ended: {}
+outputs: [mode]
+"""
+TEST = """\
+language: 1
+test: supervised
+scenario:
+  of: supervisor
+  horizon: 500 ms
+  inputs:
+    go: {start: false, steps: {50 ms: true, 400 ms: false}}
+    ok: {start: true, steps: {110 ms: false, 200 ms: true, 440 ms: false}}
+    hot: {start: false, steps: {80 ms: true, 240 ms: false}}
+    clear: {start: false, steps: {250 ms: true, 260 ms: false}}
+  record: {every: 15 ms}
+expect:
+  ready:  {that: mode == operation.ready, at: 40 ms}
+  inside: {that: in(operation) and in(operation.drive.torque.creep), at: 50 ms}
+  trips:  {event: fault, at: 80 ms}
+  pulls:  {event: operation.drive.torque.pull, at: 80 ms}
+  direct: {event: operation -> fault, count: 2}
+  back:   {event: operation, at: 250 ms}
+  drives: {event: operation.drive, count: 2}
+  never:  {never: in(operation), from: 80 ms, until: 240 ms}
+  super:  {that: mode == operation, at: 300 ms}
+  order:
+    modes: [operation.ready, operation.drive, fault.hurt, operation.drive, operation.ready, ended]
+  inner:
+    of: supervisor.operation.drive.torque
+    modes: [inactive, creep, inactive, creep, inactive]
+"""
+WRONG = """\
+  order:  {modes: [operation.ready, operation.drive, ended]}
+  early:  {event: operation.drive, at: 60 ms}
+  twice:  {event: operation.drive.torque.pull, count: 2}
+  still:  {always: in(operation)}
+"""
+
+
+def written(folder: Path, text: str = TEST) -> str:
+    (folder / "spec").mkdir()
+    (folder / "spec" / "supervisor.yaml").write_text(CHART)
+    path = folder / "spec" / "test_supervised.yaml"
+    path.write_text(text)
+    return str(path)
+
+
+def test_modes_inside_modes_are_expected_on_engine_and_c(tmp_path: Path) -> None:
+    (run,) = tests.run_tests([written(tmp_path)], tmp_path)
+    assert [(each.name, each.message) for each in run.outcomes if not each.passed] == []
+    assert (run.difference, len(run.outcomes)) == ("", 11) and run.means.startswith("compiled")
+
+
+def test_what_is_wrong_is_told(tmp_path: Path) -> None:
+    path = written(tmp_path, TEST[: TEST.index("expect:\n")] + "expect:\n" + WRONG)
+    (run,) = tests.run_tests([path], tmp_path, compiled=False)
+    assert [each.message for each in run.outcomes] == [
+        "was `fault.hurt` from 0.08 s on, not `ended`",
+        "happened at 0.05 s, expected at 0.06 s",
+        "happened once, not 2",
+        "is false at 0.08 s",
+    ]
+    assert run.outcomes[3].modes["supervisor"] == "fault.hurt"
+
+
+def test_coverage_knows_superstates_events_and_completion(tmp_path: Path) -> None:
+    test = tests.load_test(written(tmp_path), tmp_path)
+    (found,) = coverage(test)
+    assert found.count()["modes"] == (11, 11)  # some are left in the tick of their entry
+    assert found.count()["transitions"] == (9, 10)
+    tripped = next(d for d in found.decisions if d.key.endswith("tripped"))
+    assert tripped.conditions == ("event trip", "event warn", "go")
+    assert found.shown(tripped) == ("unique cause", "always false", "not shown")
+    over = next(d for d in found.decisions if d.key.endswith("over"))
+    assert (over.conditions, found.shown(over)) == (("completion",), ("unique cause",))
+    (chart,) = covered_graph(found, tmp_path).regions
+    boxes = {box.name: box for box in chart.modes}
+    assert boxes["operation"].shade == "covered" and isinstance(boxes["ended"], ModeBox)
+
+
+def test_each_guard_of_a_chart_has_a_probe(tmp_path: Path) -> None:
+    automaton = (
+        tests.load_test(written(tmp_path), tmp_path).system.instances["supervisor"].automaton
+    )
+    decisions, programs, arrays = probed_programs({"one": (automaton, [])})
+    ops = [op for block in programs["one"].blocks.values() for op in walk(block)]
+    stored = {op.array for op in ops if isinstance(op, Store) and op.array.startswith("probe.")}
+    assert stored == set(arrays["one"].values()) and len(stored) == len(decisions["one"]) == 10
