@@ -38,6 +38,7 @@ CODES: Mapping[str, tuple[str, str]] = {
     "timer": ("MW213", "A wait never elapses."),
     "near": ("MW214", "Two waits are nearer to each other than a period."),
     "stuck": ("MW215", "No transition out of a mode ever fires."),
+    "zeno": ("MW216", "Modes can change infinitely often in a finite time."),
     "overlap": ("MW220", "Two rows of a truth table hold together."),
     "incomplete": ("MW221", "A table says nothing of some case."),
     "target": ("MW230", "A transition of a chart cannot have these targets."),

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from language.check_cycle import check_cycles
 from language.check_transition import check_stuck, check_transitions, check_waits
+from language.check_zeno import check_zeno
 from language.inquiry import Inquiry
 from language.model import Automaton
 from language.problem import Problems
@@ -19,3 +20,4 @@ def examine(automaton: Automaton, problems: Problems) -> None:
     check_stuck(automaton, silent, problems)
     check_waits(automaton, inquiry, problems)
     check_cycles(automaton, problems)
+    check_zeno(automaton, inquiry, problems)

@@ -25,7 +25,7 @@ from language.problem import Problems
 from language.program import value_type
 from language.question import Extent, Point, Question, Step, shown
 from language.sample import few_points, many_points, near
-from language.solver import Solver, Verdict
+from language.solver import SMALL_EFFORT, Solver, Verdict
 
 MOST_TRIED = 20_000
 """Points tried of all questions that z3 leaves open: a second or two."""
@@ -101,6 +101,16 @@ class Inquiry:
         wider = self.freed(question)
         return wider is None or _proven(Asked(wider.key, wider))
 
+    def confirmed(self, exact: Question, near: Question) -> Witness | None:
+        """Return a witness that z3 finds for a question, and that holds for one near to it."""
+        self.asked += 1
+        if self.asked > MOST_ASKED or narrowed(exact) is None:
+            return None
+        found = solver().ask(exact, SMALL_EFFORT)
+        return (
+            _witness(near, found) if not isinstance(found, str) and near.holds_at(found) else None
+        )
+
     def _decided(self, question: Question) -> Point | Verdict:
         """Return a witness that z3 finds and our own arithmetic confirms, or what z3 says."""
         self.asked += 1
@@ -137,7 +147,7 @@ def _proven(asked: Asked) -> bool:
         return True
     if any(question.holds_at(point) for point in few_points(question, narrower)):
         return False
-    return solver().ask(question) == "never"
+    return solver().ask(question, SMALL_EFFORT) == "never"
 
 
 @cache

@@ -151,7 +151,7 @@ class Moment:
             if needed[name]:
                 self._equation(name, needed[name])
         for tree in trees:
-            self._remember(tree)
+            self.remember(tree)
 
     def _alternatives(self, name: str) -> Iterator[tuple[int | None, str, Formula]]:
         """Yield the formulas that an equation can have: our mode's, else by another region's."""
@@ -167,7 +167,7 @@ class Moment:
         is_whole = found[0][2].whole
         value: Expr | None = None
         for number, region, formula in reversed(found):
-            self._remember(formula.tree)
+            self.remember(formula.tree)
             own = assigned(formula.tree, self.known, formula.whole)
             if value is None or number is None:
                 value = own
@@ -179,7 +179,7 @@ class Moment:
         self.story.steps.append((target, value))
         self.known[name] = Ref(target, is_whole)
 
-    def _remember(self, tree: Tree) -> None:
+    def remember(self, tree: Tree) -> None:
         """Make the functions with memory known; what is inside of one comes first."""
         for part in reversed(walk(tree)):
             if isinstance(part, Application) and part.function in MEMORY:

@@ -17,8 +17,10 @@ from language.evaluate import Scalar
 from language.operation import Binary, Call, Compare, Expr, Ref, Select, Unary, Value
 from language.question import Extent, Point, Question
 
-EFFORT = 400_000
-"""Units of z3's own count for one question: some tenths of a second at most."""
+EFFORT = 200_000
+"""Units of z3's own count for a proof without which a spec is refused: seconds at most."""
+SMALL_EFFORT = 10_000
+"""For a warning: a tenth of a second at most; what is linear takes a tenth of that."""
 DIGITS = 20
 """Decimal digits of an irrational number: more than a double has."""
 BOUNDS: Mapping[str, tuple[float, float]] = {
@@ -52,10 +54,10 @@ class Solver:
         """Literals and variables that are made already: these are what takes longest."""
         return {}
 
-    def ask(self, question: Question) -> Point | Verdict:
+    def ask(self, question: Question, effort: int = EFFORT) -> Point | Verdict:
         """Return values that z3 takes for a witness, "never", or "open" where it does not know."""
         solver = self.z3.Solver()
-        solver.set("rlimit", EFFORT)
+        solver.set("rlimit", effort)
         try:
             terms = _Terms(self.z3, question, self.made)
             wanted = [terms.of(condition) for condition in question.conditions]

@@ -159,3 +159,44 @@ outputs: [mode]
 )
 def test_superstates_and_regions(out: str, up: str, expected: list[str], tmp_path: Path) -> None:
     assert kinds(tmp_path, CHART.format(out=out, up=up)) == expected
+
+
+ZENO = """language: 1
+automaton: mass
+parameters: {{k: {{value: 2 N/m, range: [1, 3], tunable: true}}, m: {{value: 2 kg}}}}
+inputs: {{F: {{unit: N, range: [-9, 9]}}}}
+states:
+  x: {{unit: m, initial: 0 m, range: [-1, 1]}}
+  v: {{unit: m/s, initial: 0 m/s, range: [-2, 2]}}
+initial: a
+modes:
+  a:
+    flow: {{x: der(x) = v, v: m * der(v) = {force_a}}}
+    transitions: {{b: {{{first}}}}}
+  b:
+    flow: {{x: der(x) = v, v: m * der(v) = {force_b}}}
+    transitions: {{a: {{{second}}}}}
+outputs: [x, v]
+"""
+
+
+@pytest.mark.parametrize(
+    ("force_a", "force_b", "first", "second", "expected"),
+    [
+        ("1 N", "-1 N", "when: v > 0 m/s", "when: v < 0 m/s", ["zeno"]),  # a relay
+        ("-1 N", "1 N", "when: v > 0 m/s", "when: v < 0 m/s", []),  # each flow leads away
+        ("F", "F", "when: v > 0 m/s", "when: v < 0 m/s", []),  # one flow goes one way
+        ("1 N", "-1 N", "when: v > 0 m/s, wait: 1 ms", "when: v < 0 m/s", []),
+        ("1 N", "-1 N", "when: v > 0.1 m/s", "when: v < 0 m/s", []),
+        ("1 N", "-1 N", "when: x > 0 m", "when: x < 0 m", ["zeno"]),  # with no speed, at once
+        ("-k * x", "-k * x", "when: x > 0 m", "when: x < 0 m", []),
+        ("F - k * x", "-F - k * x", "when: v > 0 m/s", "when: v < 0 m/s", ["zeno"]),
+        ("1 N", "-1 N", "when: v > 0 m/s, reset: {v: 0.1 m/s}", "when: v < 0 m/s", []),
+        ("exp(v * 1 s/m) * 1 N", "-1 N", "when: v > 0 m/s", "when: v < 0 m/s", ["zeno"]),
+    ],
+)
+def test_flows_that_lead_back_at_once(
+    force_a: str, force_b: str, first: str, second: str, expected: list[str], tmp_path: Path
+) -> None:
+    text = ZENO.format(force_a=force_a, force_b=force_b, first=first, second=second)
+    assert kinds(tmp_path, text) == expected
