@@ -10,12 +10,16 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Collection, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Literal
 
+from language.document import Scalar
 from language.model import Transition
 from language.model_text import tree_text
 from language.operation import Binary, Expr, Unary
+from language.parse import parse_expression
+from language.problem import SpecError
 from language.syntax import Logic, Not, Tree, Truth, alike
 
 Joined = int | bool | tuple[str, "Joined"] | tuple[str, "Joined", "Joined"]
@@ -139,7 +143,10 @@ def _value(joined: Joined, combination: int) -> bool:
 def _text(tree: Tree) -> str:
     """Return a condition as its author wrote it, where that is one text of the file."""
     span = tree.span
-    if span.whole or not 1 <= span.line <= len(span.source.lines):
-        return tree_text(tree).removeprefix("(").removesuffix(")")
-    line = span.source.lines[span.line - 1]
-    return line[span.column - 1 : span.column - 1 + span.width]
+    if not span.whole and 1 <= span.line <= len(span.source.lines):
+        line = span.source.lines[span.line - 1]
+        text = line[span.column - 1 : span.column - 1 + span.width]
+        with suppress(SpecError):
+            if alike(parse_expression(Scalar(text, span)), tree):
+                return text
+    return tree_text(tree).removeprefix("(").removesuffix(")")

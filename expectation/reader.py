@@ -16,7 +16,7 @@ from language.event_name import EventName, read_event
 from language.experiment import Scenario, System
 from language.model import CHART
 from language.problem import Problems, Span, nearest
-from language.project import Project, expanded, read_document
+from language.project import Project, expanded
 from language.reader import Reader, about_of
 from language.requirement import requirements_of
 from language.scenario import SCENARIO_KEYS, read_scenario
@@ -100,7 +100,7 @@ class _TestReader(Reader):
             named = self.scalar(node, "scenario", at)
             self.problems.stop_if_any()
             assert named is not None
-            written = read_document(self.project.path_of(named.text, named.span))
+            written = self.project.read(self.project.path_of(named.text, named.span))
         of = tree.get("of")
         if of is None:
             of = expanded(written, self.project).root.get("of")
@@ -113,7 +113,7 @@ class _TestReader(Reader):
         }
         self.problems.stop_if_any()
         assert named is not None
-        document = read_document(self.project.path_of(named.text, named.span))
+        document = self.project.read(self.project.path_of(named.text, named.span))
         self.system = read_system(document, self.project, overrides)  # type: ignore[arg-type]
         self.scenario = read_scenario(written, self.project, self.system)
 

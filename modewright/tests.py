@@ -16,7 +16,7 @@ from expectation.judging import Outcome, judged
 from expectation.reader import read_test
 from language.finding import HEAD
 from language.problem import Problems, Source, Span, SpecError
-from language.project import Project, read_document
+from language.project import Project
 from modewright.checking import spec_files
 from modewright.compiled import run_in_c
 
@@ -54,7 +54,7 @@ def tests_of(root: Path | None = None) -> list[str]:
 def load_test(reference: str, root: Path | None = None) -> Test:
     """Return a test by its name or path. Raises SpecError with all problems."""
     project = Project(root or Path())
-    return read_test(read_document(project.path_of(reference)), project)
+    return read_test(project.read(project.path_of(reference)), project)
 
 
 def load_tests(references: Sequence[str], root: Path | None = None) -> list[Test]:

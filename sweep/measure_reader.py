@@ -162,7 +162,15 @@ class MeasureReader(Reader):
 
     def _named_event(self, scalar: Scalar) -> EventName | None:
         found = [read_event(scalar, system, self.problems) for system in self.systems]
-        return found[0] if all(found) else None
+        event = found[0] if all(found) else None
+        for system in self.systems if event else ():
+            assert event is not None
+            if system.instances[event.instance].automaton.tree is not None:
+                label = f"`{event.instance}` is a chart: its transitions do not tell all entries"
+                hint = "a test of the spec does: docs/testing.md"
+                self.problems.error("event", scalar.span, label, hint)
+                return None
+        return event
 
     def _signal(
         self, entry: Entry, kind: SignalKind, scalar: Scalar, own: Table, since: Bound, until: Bound

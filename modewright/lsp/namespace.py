@@ -91,7 +91,7 @@ def namespace_of(world: World, path: Path, document: Document, depth: int = 0) -
         for each in model.group("value"):
             if each.kind in shared:
                 made.names[each.group, each.name] = each
-    target = _other(world, made, "of", depth)
+    target = _other(world, made, "of", depth) or _tested(world, made, depth)
     if target:
         made.of = target
         made.names.update(target.names)
@@ -105,6 +105,19 @@ def namespace_of(world: World, path: Path, document: Document, depth: int = 0) -
         made.names.setdefault((declared.group, declared.name), declared)
     _add_instances(world, made, depth)
     return made
+
+
+def _tested(world: World, space: Namespace, depth: int) -> Namespace | None:
+    """Return what the scenario of a test is of: one that is named, or written in the test."""
+    if space.document.kind != "test":
+        return None
+    written = space.document.root.get("scenario")
+    if isinstance(written, Table):
+        of = written.get("of")
+        path = world.find(of.text, space.file) if isinstance(of, Scalar) else None
+        return namespace(world, path, depth + 1) if path else None
+    scenario = _other(world, space, "scenario", depth)
+    return scenario.of if scenario else None
 
 
 def _other(world: World, space: Namespace, key: str, depth: int) -> Namespace | None:

@@ -266,3 +266,20 @@ def test_a_text_is_laid_out(talk: Talk, heater: Path) -> None:
     assert edit["newText"] == HEATER
     talk.change(heater, HEATER)
     assert talk.ask("textDocument/formatting", asked) == []
+
+
+def test_a_test_is_helped_with_the_names_of_what_it_tests(
+    talk: Talk, heater: Path, tmp_path: Path
+) -> None:
+    path = tmp_path / "spec" / "test_warm.yaml"
+    scenario = "{of: heater, horizon: 1 s, inputs: {T_room: 15 degC}}"
+    text = f"language: 1\ntest: warm\nscenario: {scenario}\nexpect:\n  so: {{always: P < 3 kW}}\n"
+    path.write_text(text)
+    assert talk.open(path, text) == []
+    (told,) = talk.change(path, text.replace("3 kW", "3 kg"))
+    assert "`<` joins" in told["message"] and told["range"]["start"]["line"] == 4
+    talk.change(path, text)
+    assert "W" in hover(talk, path, where(text, "P < 3"))
+    offered = labels(talk, path, text.replace("P < 3", "| < 3"))
+    assert {"P", "T_room"} <= set(offered)
+    assert {"every", "values"} <= set(labels(talk, path, text + "|"))
