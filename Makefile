@@ -55,6 +55,7 @@ verify: setup ## measure every acceptance figure; with recordings: ARGS="--recor
 	$(BIN)/python tests/verify/complete.py
 	$(BIN)/python tests/verify/lockstep_bits.py
 	$(BIN)/python tests/verify/random_specs.py
+	$(BIN)/python tests/verify/random_charts.py
 	$(BIN)/python tests/verify/command_line.py
 	$(BIN)/python tests/verify/editor.py
 	$(BIN)/python tests/verify/static_checks.py
@@ -71,6 +72,7 @@ verify-part: setup ## measure a fixed part of the figures, as CI does
 	$(BIN)/python tests/verify/complete.py --part
 	$(BIN)/python tests/verify/lockstep_bits.py --ticks 50000
 	$(BIN)/python tests/verify/random_specs.py --specs 20
+	$(BIN)/python tests/verify/random_charts.py --charts 20
 	$(BIN)/python tests/verify/command_line.py
 	$(BIN)/python tests/verify/editor.py
 	$(BIN)/python tests/verify/static_checks.py

@@ -13,7 +13,7 @@ def fired(program: Program, stepper: Stepper) -> list[TransitionInfo]:
 
     Of a chart with several micro-steps in a tick those of all of them, in their order.
     """
-    if any(variable.name == LOG for variable in program.variables):
+    if program.has_log:
         log = stepper.get(LOG)
         return [program.transitions[log[k] - 1] for k in range(stepper.get(LOGGED))]
     numbers = [stepper.get(name) for name in program.fired_variables()]
@@ -24,10 +24,7 @@ def event(
     name: str, program: Program, info: TransitionInfo, time: float, micro_step: int = 0
 ) -> Event:
     """Return a transition of an instance at a time [s] as an event."""
-    source, target = info.between or (
-        program.mode_name(info.source, info.region),
-        program.mode_name(info.target, info.region),
-    )
+    source, target = program.ends(info)
     return Event(time, micro_step, name, info.name, source, target, info.region)
 
 

@@ -251,8 +251,7 @@ def _kind_places(assembly: Assembly, kinds: Sequence[EventKind]) -> NDArray[np.i
     found = []
     for name, program in assembly.programs.items():
         for info in program.transitions:
-            source = program.mode_name(info.source, info.region)
-            target = program.mode_name(info.target, info.region)
+            source, target = program.ends(info)
             found.append(EventKind(name, info.name, source, target, info.region))
         for variable in ranged(program):
             found.append(EventKind(name, f"range {short(variable.name)}", kind="range"))

@@ -63,8 +63,7 @@ def event_kinds(programs: Mapping[str, Program]) -> tuple[EventKind, ...]:
     found: list[EventKind] = []
     for name, program in programs.items():
         for info in program.transitions:
-            source = program.mode_name(info.source, info.region)
-            target = program.mode_name(info.target, info.region)
+            source, target = program.ends(info)
             found.append(EventKind(name, info.name, source, target, info.region))
         for signal in _ranged(program):
             found.append(EventKind(name, f"range {signal}", kind="range"))

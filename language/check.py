@@ -298,7 +298,7 @@ class _Check:
                 constant.quantity(transition.rewind.within.tree, SECOND, "within")
                 self._fixed_wait(transition.rewind.within)
                 check_rewind(automaton, transition, self.problems)
-            if transition.memory == "continue":
+            if transition.memory == "continue" and automaton.tree is None:
                 check_continued(automaton, transition, self.problems)
         for invariant in mode.invariants.values():
             check.truth(invariant.that.tree, "that")

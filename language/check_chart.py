@@ -26,6 +26,7 @@ def check_chart(automaton: Automaton, problems: Problems) -> None:
             _check_inner(chart, node, mode, problems)
             for transition in mode.transitions:
                 _check_way(chart, node, transition, problems)
+                _check_memory(automaton, chart, transition, problems)
 
 
 def never_entered(automaton: Automaton, chart: Chart) -> list[Mode]:
@@ -93,6 +94,20 @@ def _check_way(chart: Chart, node: Node, transition: Transition, problems: Probl
             if target.kind not in ("compound", "parallel"):
                 label = f"`{target.path}` has no modes inside: there is no history of it"
                 problems.error("form", transition.span, label)
+
+
+def _check_memory(
+    automaton: Automaton, chart: Chart, transition: Transition, problems: Problems
+) -> None:
+    """`memory: continue` keeps the wait counters of what may be entered: there have to be some."""
+    targets = chart.ways[transition.key].targets
+    reached = [n for n in chart.nodes if any(chart.nested(n.index, t) for t in targets)]
+    modes = [automaton.by_key[node.mode] for node in reached if node.mode]
+    kept = any(way.wait for mode in modes for way in mode.transitions)
+    if transition.memory == "continue" and not kept:
+        label = "`memory: continue` keeps wait counters: nothing that is entered has one"
+        hint = "states belong to the automaton and keep their values anyway"
+        problems.error("form", transition.span, label, hint)
 
 
 def _check_writers(automaton: Automaton, chart: Chart, problems: Problems) -> None:

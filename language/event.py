@@ -61,23 +61,23 @@ def capacity(chart: Chart, transitions: Iterable[Transition]) -> int:
     return inputs + (chart.micro_steps if raised else 0)
 
 
-def arrived(chart: Chart, size: int) -> Block:
+def arrived(chart: Chart) -> Block:
     """Return what puts the events of a tick into the queue, and takes the first."""
     ops: list[Op] = [Assign(HEAD.name, whole(0)), Assign(TAIL.name, whole(0))]
     for signal in chart.signals.values():
         if signal.is_input:
-            ops.append(Branch(Ref(f"input.{signal.name}"), put(chart, signal.name, size)))
+            ops.append(Branch(Ref(f"input.{signal.name}"), _queued(signal.number)))
     return (*ops, Assign(EVENT.name, whole(0)), Branch(WAITING, taken()))
 
 
 def put(chart: Chart, name: str, size: int) -> Block:
     """Return what appends an event to the queue; where that is full it is lost, with a fault."""
-    number = chart.signals[name].number
-    fits: Block = (
-        Store(QUEUE, TAIL, whole(number)),
-        Assign(TAIL.name, add(TAIL, whole(1))),
-    )
-    return (Branch(Compare("<", TAIL, whole(size)), fits, (FaultBit(MICRO_STEP_LIMIT),)),)
+    fits = Compare("<", TAIL, whole(size))
+    return (Branch(fits, _queued(chart.signals[name].number), (FaultBit(MICRO_STEP_LIMIT),)),)
+
+
+def _queued(number: int) -> Block:
+    return (Store(QUEUE, TAIL, whole(number)), Assign(TAIL.name, add(TAIL, whole(1))))
 
 
 def taken() -> Block:

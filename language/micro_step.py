@@ -105,7 +105,7 @@ def _one_step(charting: Charting) -> Block:
     """The only micro-step of a tick; an event that it does not take is a fault if one waits."""
     ops: list[Op] = []
     if charting.size:
-        ops += arrived(charting.chart, charting.size)
+        ops += arrived(charting.chart)
     ops += [
         Run("select"),
         *_heard(charting),
@@ -120,7 +120,7 @@ def _several(charting: Charting) -> Block:
     """Micro-steps until nothing is enabled and no event waits, or the bound is reached."""
     ops: list[Op] = [Assign(LOGGED, whole(0)), Assign(STEPS.name, whole(0))]
     if charting.size:
-        ops += arrived(charting.chart, charting.size)
+        ops += arrived(charting.chart)
     ops += [
         Assign(flag.name, Value(value))
         for flag, value in ((BUSY, True), (FIRST, True), (OVER, False))

@@ -237,6 +237,18 @@ class Program:
         """Return the name of the mode of a region with a number."""
         return next(mode.name for mode in self.modes_of(region) if mode.number == number)
 
+    @property
+    def has_log(self) -> bool:
+        """Tell whether a tick may have several micro-steps, so that it keeps their transitions."""
+        return any(variable.name == LOG for variable in self.variables)
+
+    def ends(self, info: TransitionInfo) -> tuple[str, str]:
+        """Return the names of source and target of a transition: paths in a chart."""
+        return info.between or (
+            self.mode_name(info.source, info.region),
+            self.mode_name(info.target, info.region),
+        )
+
     def mode_variables(self) -> dict[str, str]:
         """Return the variable that holds the mode of each region, the chart first."""
         names = (CHART, *(region.name for region in self.regions))
