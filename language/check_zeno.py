@@ -7,7 +7,7 @@ bouncing ball has one where it rests, a thermostat with one limit at that limit.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from language.along import Along, NoRate
 from language.check_cycle import Way, instant_ways
@@ -27,12 +27,15 @@ from language.operation import (
     subtract,
 )
 from language.problem import Problems, SpecError
+from language.question import Question
 from language.syntax import Application, walk
 
 TIMED = ("after", "every", "rising", "falling", "changed", "delay")
 """Functions by which a guard needs time, or an earlier instant."""
 NEAR = 1.0e-9
 """Relative; a witness lies on a boundary up to rounding, which z3 finds exactly."""
+ASIDE = 1.0e-3
+"""Relative; how far beside the point resets are tried: the step of a secant."""
 OPPOSITE = {"<": ">=", "<=": ">", ">": "<=", ">=": "<", "==": "!=", "!=": "=="}
 
 
@@ -76,6 +79,7 @@ def _equilibrium(automaton: Automaton, way: Way, inquiry: Inquiry) -> Witness | 
     start = moment = Moment(automaton, automaton.source(way[0]), story)
     exact: list[Expr] = []
     near: list[Expr] = []
+    assigned: dict[str, Expr] = {}
     for transition in way:
         guard = moment.expression(transition.when.tree)
         becoming = _Becoming(moment)
@@ -84,11 +88,26 @@ def _equilibrium(automaton: Automaton, way: Way, inquiry: Inquiry) -> Witness | 
         after = moment.after(transition)
         for state in automaton.states:
             if after.known[state] != start.known[state]:
+                known = start.known[state]
+                assigned.update({known.name: after.known[state]} if isinstance(known, Ref) else {})
                 same = Compare("==", after.known[state], start.known[state])
                 exact.append(same)
                 near.append(_loosened(same))
         moment = after
-    return inquiry.confirmed(inquiry.question(story, exact), inquiry.question(story, near))
+    found = inquiry.confirmed(inquiry.question(story, exact), inquiry.question(story, near))
+    return found if found and _is_drawn_in(assigned, inquiry.question(story, near), found) else None
+
+
+def _is_drawn_in(assigned: Mapping[str, Expr], question: Question, witness: Witness) -> bool:
+    """Tell whether resets bring a state nearer to the point: a bounce without loss does not."""
+    for name, value in assigned.items():
+        place = float(witness.point.get(name, 0.0))
+        moved = place + ASIDE * (1.0 + abs(place))
+        beside = question.value_at({**witness.point, name: moved}, value)
+        here = question.value_at(witness.point, value)
+        if abs(beside - here) >= (1.0 - NEAR) * abs(moved - place):
+            return False
+    return True
 
 
 class _Becoming:
@@ -115,9 +134,9 @@ class _Becoming:
         return condition if is_true else Unary("not", condition)
 
     def _relation(self, operator: str, left: Expr, right: Expr) -> Expr:
-        """True now; or both sides are equal and move apart, or begin to."""
+        """Sides are apart; or they are equal and move apart, or begin to."""
         larger, smaller = (left, right) if operator in (">", ">=") else (right, left)
-        now = Compare(">=" if "=" in operator else ">", larger, smaller)
+        now = Compare(">", larger, smaller)
         first = self.along.of(subtract(larger, smaller))
         zero = real(0.0)
         if isinstance(first, Value):

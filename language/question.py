@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, MutableMapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
@@ -101,6 +102,14 @@ class Question:
             return all(evaluate(condition, values) is True for condition in self.conditions)
         except (KeyError, OverflowError, ValueError):
             return False
+
+    def value_at(self, point: Mapping[str, Scalar], expr: Expr) -> float:
+        """Return the value of an expression at a point, after all steps."""
+        values = {**self.values, **point}
+        for target, value in self.steps:
+            with suppress(KeyError):  # what the conditions do not need may lack a value
+                values[target] = evaluate(value, values)
+        return float(evaluate(expr, values))
 
     def shortened(self, point: Point) -> Point:
         """Return a point with as few digits as still show what it shows."""

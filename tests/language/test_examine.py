@@ -190,6 +190,7 @@ outputs: [x, v]
         ("1 N", "-1 N", "when: v > 0.1 m/s", "when: v < 0 m/s", []),
         ("1 N", "-1 N", "when: x > 0 m", "when: x < 0 m", ["zeno"]),  # with no speed, at once
         ("-k * x", "-k * x", "when: x > 0 m", "when: x < 0 m", []),
+        ("-k * x", "-k * x", "when: x >= 0.5 m", "when: x < 0.5 m", []),  # a graze is none
         ("F - k * x", "-F - k * x", "when: v > 0 m/s", "when: v < 0 m/s", ["zeno"]),
         ("1 N", "-1 N", "when: v > 0 m/s, reset: {v: 0.1 m/s}", "when: v < 0 m/s", []),
         ("exp(v * 1 s/m) * 1 N", "-1 N", "when: v > 0 m/s", "when: v < 0 m/s", ["zeno"]),
