@@ -328,7 +328,7 @@ class ChartReader:
         )
         if node is not None and raised and given < 2:
             label = "an event that is raised is taken in the next micro-step: one is too few"
-            self.problems.error("event", node.span, label)
+            self.problems.error("form", node.span, label)
         return given
 
     def _as_region(self, chart: Chart, node: Node) -> Region:

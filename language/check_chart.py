@@ -20,6 +20,7 @@ def check_chart(automaton: Automaton, problems: Problems) -> None:
         label = "modes inside modes, events and micro-steps belong to a sampled automaton"
         problems.error("form", automaton.span, label, "give it a `period`")
     _check_writers(automaton, chart, problems)
+    _check_ranks(automaton, chart, problems)
     for node in chart.nodes[ROOT + 1 :]:
         mode = automaton.by_key.get(node.mode)
         if mode:
@@ -94,6 +95,31 @@ def _check_way(chart: Chart, node: Node, transition: Transition, problems: Probl
             if target.kind not in ("compound", "parallel"):
                 label = f"`{target.path}` has no modes inside: there is no history of it"
                 problems.error("form", transition.span, label)
+
+
+def _check_ranks(automaton: Automaton, chart: Chart, problems: Problems) -> None:
+    """Regions side by side of which one leaves the other have different priorities (rule 3)."""
+    for parallel in chart.nodes[ROOT + 1 :]:
+        regions = chart.inner_regions(parallel)
+        for position, later in enumerate(regions):
+            for earlier in regions[:position]:
+                if later.rank == earlier.rank and _leave(chart, earlier, later):
+                    label = f"a transition in `{earlier.path}` or `{later.path}` leaves both"
+                    hint = "give them different priorities, like `priority: 1`: the smallest goes "
+                    hint += "first where each has a transition"
+                    place = automaton.region(later.region).span
+                    problems.error("priority", place, label, hint)
+
+
+def _leave(chart: Chart, left: Node, right: Node) -> bool:
+    """Tell whether in two regions transitions may be enabled together of which one leaves both."""
+    ways = [way for way in chart.ways.values() if way.domain is not None]
+    from_left = [way.domain for way in ways if left.holds(way.source)]
+    from_right = [way.domain for way in ways if right.holds(way.source)]
+    if not from_left or not from_right:
+        return False
+    outer = left.parent
+    return any(domain is not None and domain < outer for domain in (*from_left, *from_right))
 
 
 def _check_memory(
