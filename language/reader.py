@@ -43,9 +43,18 @@ class Reader:
         for entry in node:
             if known is None or entry.key in known:
                 kept[entry.key] = entry
+                if entry.key == "req" and known is not None:
+                    self._require_names(entry)
             else:
                 self._unknown_key(entry, what, known)
         return Table(kept, node.span)
+
+    def _require_names(self, entry: Entry) -> None:
+        """Requirements are a name, or a list of names."""
+        nodes = entry.node.nodes if isinstance(entry.node, Items) else (entry.node,)
+        if not all(isinstance(node, Scalar) and node.text for node in nodes):
+            label = "`req` is the name of a requirement, or a list of names"
+            self.problems.error("form", entry.span, label, "like `req: [BL-3]`")
 
     def _unknown_key(self, entry: Entry, what: str, known: set[str]) -> None:
         hint = nearest(entry.key, known)

@@ -7,9 +7,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from expectation.coverage import Coverage, names_of
+from expectation.coverage import Coverage, coverage as reached_by, names_of, together
 from expectation.decision import SHOWN, Decision
+from language.problem import Problems, Source, Span, SpecError
 from modewright.diagram import Arrow, Diagram, Key, ModeBox, RegionBox, Shade, graph
+from modewright.tests import load_tests, tests_of
 
 
 def lines_of(coverage: Coverage) -> Iterator[str]:
@@ -36,6 +38,24 @@ def coverage_json(coverage: Coverage) -> dict[str, Any]:
 def covered_graph(coverage: Coverage, root: Path | None = None) -> Diagram:
     """Return the diagram of an automaton, shaded by what tests reached. Raises SpecError."""
     return shaded(graph(coverage.automaton.span.source.name, root), coverage)
+
+
+def tested_graph(reference: str, root: Path | None = None) -> Diagram:
+    """Return the diagram of an automaton, shaded by what the tests of the project reach of it.
+
+    Raises SpecError.
+    """
+    diagram = graph(reference, root)
+    tests = load_tests(tests_of(root), root)
+    names = [{each.automaton.name for each in t.system.instances.values()} for t in tests]
+    used = [test for test, own in zip(tests, names, strict=True) if diagram.name in own]
+    parts = [part for test in used for part in reached_by(test) if part.name == diagram.name]
+    if not parts:
+        problems = Problems()
+        label = f"no test of the project runs `{diagram.name}`"
+        problems.error("missing", Span(Source("spec"), 1, 1), label, "see docs/testing.md")
+        raise SpecError(problems.found)
+    return shaded(diagram, together(parts)[0])
 
 
 def shaded(diagram: Diagram, coverage: Coverage) -> Diagram:

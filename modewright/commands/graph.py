@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from modewright.console import announce
 from modewright.files import OutputError, require_writable, write_files
+
+if TYPE_CHECKING:
+    from modewright.diagram import Diagram
 
 FORMATS = (".svg", ".mmd", ".md")
 
@@ -19,23 +22,37 @@ def graph(
         Path | None,
         typer.Option("--out", "-o", help="write .svg, .mmd or .md; else Mermaid is printed"),
     ] = None,
+    tests: Annotated[
+        bool, typer.Option("--tests", help="an .svg, coloured by what tests of the project reach")
+    ] = False,
 ) -> None:
     """Draw modes, guards, waits, priorities and resets.
 
     \b
     modewright graph estimator
     modewright graph estimator --out estimator.svg
+    modewright graph estimator --tests --out covered.svg
     """
-    from modewright.diagram import graph as diagram
-
     form = out.suffix.lower() if out else ""
     if out and form not in FORMATS:
         raise OutputError(f"{out}: a diagram ends with {', '.join(FORMATS)}")
     require_writable(out)
-    drawn = diagram(automaton)
+    if tests and form != ".svg":
+        raise typer.BadParameter("colours are for --out with .svg", param_hint="--tests")
+    drawn = _drawn(automaton, tests)
     text = drawn.svg() if form == ".svg" else drawn.mermaid()
     if out is None:
         print(text, end="")
         return
     write_files({out: (f"```mermaid\n{text}```\n" if form == ".md" else text).encode()})
     announce([out])
+
+
+def _drawn(automaton: str, tests: bool) -> Diagram:
+    if tests:
+        from modewright.covered import tested_graph
+
+        return tested_graph(automaton)
+    from modewright.diagram import graph as diagram
+
+    return diagram(automaton)

@@ -74,7 +74,7 @@ def test_what_tests_reach_is_summed(tmp_path: Path) -> None:
 
 
 def test_probes_change_no_bit_of_a_run_and_each_guard_has_one() -> None:
-    test = tests.load_test("tip_out_is_detected", ROOT)
+    test = tests.load_test("tip_in_crosses_the_gap", ROOT)
     scenario = resolved(test.system, test.scenario)
     decisions, programs, arrays = probed_programs(automata_of(test.system, scenario))
     plain = simulate(test.system, scenario)
@@ -122,6 +122,9 @@ def test_coverage_colours_the_graph_and_is_told(
     assert re.search(arrow.format(SHADES["missed"]), found)
     assert not re.search(arrow.format(SHADES["part"]), found) and SHADES["part"] in found
     assert "? level &lt; 9 V" in found
+    drawn = CliRunner().invoke(app, ["graph", "latch", "--tests", "--out", "same.svg"])
+    assert drawn.exit_code == 0 and Path("same.svg").read_text() == found
+    assert CliRunner().invoke(app, ["graph", "latch", "--tests"]).exit_code == 2
     found = json.loads(CliRunner().invoke(app, [*command, "--json"]).stdout)["coverage"][0]
     assert [way["taken"] for way in found["transitions"]] == [True, False]
     assert [each["shown"] for each in found["transitions"][0]["conditions"]] == [
