@@ -15,6 +15,7 @@ from modewright.lsp.desk import Desk
 from modewright.lsp.hover import hover, mention_at
 from modewright.lsp.positions import range_of
 from modewright.lsp.rename import RenameRefused, definition, references, rename
+from modewright.lsp.repair import repairs
 
 TRIGGERS = [" ", ".", "{", ","]
 """Characters after which an editor asks for completions by itself."""
@@ -76,6 +77,13 @@ def _answer_questions(server: LanguageServer, desk: Desk) -> None:
         world, path = desk.world(params.text_document.uri)
         items = complete(world, path, world.texts.get(path, ""), params.position)
         return types.CompletionList(is_incomplete=False, items=items)
+
+    @server.feature(
+        types.TEXT_DOCUMENT_CODE_ACTION,
+        types.CodeActionOptions(code_action_kinds=[types.CodeActionKind.QuickFix]),
+    )
+    def repaired(params: types.CodeActionParams) -> list[types.CodeAction]:
+        return list(repairs(params.text_document.uri, params.context.diagnostics))
 
     @server.feature(types.TEXT_DOCUMENT_FORMATTING)
     def laid_out(params: types.DocumentFormattingParams) -> list[types.TextEdit]:

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import random
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+from lsprotocol import types
 
 import modewright as mw
 from language.problem import Source, Span
+from modewright.lsp.completion import complete
+from modewright.lsp.hover import hover as hover_at
 from modewright.lsp.positions import column_of, range_of
+from modewright.lsp.rename import definition
+from modewright.lsp.world import World
 from tests.lsp.talk import Message, Talk
 
 ROOT = Path(__file__).parent.parent.parent
@@ -95,6 +101,17 @@ def test_problems_are_those_of_the_editors_text(talk: Talk, heater: Path) -> Non
     assert "did you mean `T_room`?" in told["message"]
     assert (told["code"], told["severity"], told["source"]) == ("MW115", 1, "modewright")
     assert talk.change(heater, HEATER) == []
+
+
+def test_what_a_help_names_is_written_at_a_key_press(talk: Talk, heater: Path) -> None:
+    wrong = HEATER.replace("when: T_room > T_on", "when: T_rom > T_on")
+    told = talk.change(heater, wrong)
+    uri = heater.as_uri()
+    asked = {"range": told[0]["range"], "context": {"diagnostics": told}}
+    found = talk.ask("textDocument/codeAction", {"textDocument": {"uri": uri}, **asked})
+    (action,) = found
+    assert action["title"] == "Write `T_room`"
+    assert applied(wrong, action["edit"]["changes"][uri]) == HEATER
 
 
 def test_a_text_that_is_no_yaml_is_told_of(talk: Talk, heater: Path) -> None:
@@ -283,3 +300,60 @@ def test_a_test_is_helped_with_the_names_of_what_it_tests(
     offered = labels(talk, path, text.replace("P < 3", "| < 3"))
     assert {"P", "T_room"} <= set(offered)
     assert {"every", "values"} <= set(labels(talk, path, text + "|"))
+
+
+NESTED = """\
+language: 1
+automaton: nested
+period: 1 ms
+numbers: float64
+inputs: {u: {unit: 1, range: [0, 9]}}
+discrete: {n: {initial: 0, range: [0, 9]}}
+initial: on
+modes:
+  on:
+    initial: slow
+    transitions: {off: {when: u < 1, priority: 1}}
+    modes:
+      slow: {update: {n: u}, transitions: {fast: {when: u > 5}}}
+      fast: {transitions: {slow: {when: u < 5}, off: {when: u > 8}}}
+  off: {transitions: {fast: {to: on.fast, when: u > 2}, slow: {to: on.slow, when: u > 1, priority: 1}}}
+outputs: [n, mode]
+"""
+
+
+def test_a_mode_inside_a_mode_is_found_and_renamed(talk: Talk, tmp_path: Path) -> None:
+    path = tmp_path / "spec" / "nested.yaml"
+    path.parent.mkdir()
+    talk.open(path, NESTED)
+    place = where(NESTED, "      slow:", 7)
+    found = talk.ask(
+        "textDocument/references",
+        {**talk.at(path, *place), "context": {"includeDeclaration": True}},
+    )
+    assert [each["range"]["start"]["line"] + 1 for each in found] == [10, 13, 14, 15]
+    asked = {**talk.at(path, *place), "newName": "low"}
+    (edits,) = talk.ask("textDocument/rename", asked)["changes"].values()
+    renamed = applied(NESTED, edits)
+    assert renamed == NESTED.replace("slow", "low").replace("low: {to: on", "slow: {to: on")
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_no_text_makes_the_server_fail(seed: int) -> None:
+    chance = random.Random(seed)
+    files = sorted((ROOT / "spec").rglob("*.yaml"))
+    world = World(ROOT)
+    for _ in range(12):
+        path = chance.choice(files)
+        text = path.read_text("utf-8")
+        if chance.random() < 0.8:
+            k = chance.randrange(len(text))
+            text = text[:k] + chance.choice(("", "{", ": ", "'", "\n- ", "\u00e9")) + text[k + 2 :]
+        world.open(path, text)
+        lines = text.split("\n")
+        line = chance.randrange(len(lines))
+        position = types.Position(line, chance.randint(0, len(lines[line])))
+        assert len(complete(world, path, text, position)) >= 0
+        hover_at(world, path, position)
+        definition(world, path, position)
+        world.open(path, None)
