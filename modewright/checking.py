@@ -17,6 +17,7 @@ from language.map import read_map
 from language.model import Automaton
 from language.numbers_text import motion_lines
 from language.problem import Problem, Problems, SpecError, ordered
+from language.program import Program
 from language.project import Project, expanded, with_calibrations
 from language.scenario import read_scenario
 from language.system import read_system
@@ -43,18 +44,25 @@ def checked(
 
     `texts` are those of an editor, by resolved path: they stand for what is on the disk.
     """
-    return _checked(reference, Project(root or Path(), texts or {}), examine)
+    return _checked(reference, Project(root or Path(), texts or {}), _Further(lowered, examine))
 
 
 def errors_first(reference: str, root: Path, texts: Mapping[Path, str]) -> Checked:
-    """Return what `checked` does without what has to be proven of a spec without errors."""
-    return _checked(reference, Project(root, texts), lambda automaton, problems: None)
+    """Return what `checked` does without what takes long: solved numbers, and proofs."""
+    nothing = _Further(lambda automaton: None, lambda automaton, problems: None)
+    return _checked(reference, Project(root, texts), nothing)
 
 
-def _checked(
-    reference: str, project: Project, further: Callable[[Automaton, Problems], None]
-) -> Checked:
-    """Return what is found of a spec; `further` looks at an automaton without errors."""
+@dataclass(frozen=True)
+class _Further:
+    """What is done with an automaton without errors: its Program is made, it is looked at."""
+
+    lower: Callable[[Automaton], Program | None]
+    examine: Callable[[Automaton, Problems], None]
+
+
+def _checked(reference: str, project: Project, further: _Further) -> Checked:
+    """Return what is found of a spec."""
     problems = Problems()
     limits: tuple[str, ...] = ()
     try:
@@ -65,15 +73,16 @@ def _checked(
         base = expanded(document, project, problems)
         if base.kind == "automaton":
             automaton = automaton_of(document, project, problems=problems)
-            motion = lowered(automaton).motion
-            further(automaton, problems)
+            program = further.lower(automaton)
+            motion = program.motion if program else None
+            further.examine(automaton, problems)
             if motion and motion.limits and not is_calibration:
                 first, *others = motion_lines(motion)
                 limits = (f"{document.name}: {first}", *others)
         elif base.kind == "system":
             instances = read_system(document, project).instances.values()
             for part in {id(each.automaton): each.automaton for each in instances}.values():
-                lowered(part)
+                further.lower(part)
         elif base.kind == "map":
             read_map(document, project)
         elif base.kind == "effect":

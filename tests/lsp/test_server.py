@@ -317,7 +317,8 @@ modes:
     modes:
       slow: {update: {n: u}, transitions: {fast: {when: u > 5}}}
       fast: {transitions: {slow: {when: u < 5}, off: {when: u > 8}}}
-  off: {transitions: {fast: {to: on.fast, when: u > 2}, slow: {to: on.slow, when: u > 1, priority: 1}}}
+  off:
+    transitions: {fast: {to: on.fast, when: u > 2}, slow: {to: on.slow, when: u > 1, priority: 1}}
 outputs: [n, mode]
 """
 
@@ -331,7 +332,7 @@ def test_a_mode_inside_a_mode_is_found_and_renamed(talk: Talk, tmp_path: Path) -
         "textDocument/references",
         {**talk.at(path, *place), "context": {"includeDeclaration": True}},
     )
-    assert [each["range"]["start"]["line"] + 1 for each in found] == [10, 13, 14, 15]
+    assert [each["range"]["start"]["line"] + 1 for each in found] == [10, 13, 14, 16]
     asked = {**talk.at(path, *place), "newName": "low"}
     (edits,) = talk.ask("textDocument/rename", asked)["changes"].values()
     renamed = applied(NESTED, edits)
