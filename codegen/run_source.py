@@ -13,20 +13,18 @@ from fractions import Fraction
 from typing import Any
 
 from codegen.expression import literal
-from codegen.marks import LEFT, marked, ranged_signals
+from codegen.marks import marked
 from codegen.mathematics import math_files
-from codegen.names import REAL, CNames, c_member, c_type
+from codegen.names import REAL, c_member, c_type
 from codegen.rendering import render, version
+from codegen.run_module import module_of, varying
 from codegen.run_places import INSTANCE, Clock, Places, formula_of, row_width
-from codegen.source import module_context
-from codegen.usage import locals_of, usages
-from language.assembly import RANGE_SLACK, Assembly, Course, Feed, ranged, short_input, wires_of
+from language.assembly import Assembly, Course, Feed, ranged, short_input
 from language.continuous import PARTS
-from language.history import AGE
 from language.number import NumberType
-from language.program import LOG, LOGGED, Program, short
+from language.program import Program, short
 from language.signal import Sensor
-from language.stepping import BETWEEN, EVENTS_PER_STEP
+from language.stepping import BETWEEN
 from language.traversal import block_names
 from language.wiring import finished
 
@@ -42,7 +40,7 @@ def run_files(assembly: Assembly) -> dict[str, str]:
     }
     numbers: dict[NumberType, None] = {"float64": None} if context["uses_math"] else {}
     for flow, (name, program) in enumerate(programs.items()):
-        inside = _module(assembly, name, program, places, flow)
+        inside = module_of(assembly, name, program, places, flow)
         files[f"{program.name}.h"] = render("module.h.jinja", inside)
         files[f"{program.name}_run.c"] = render("run_module.c.jinja", inside)
         if inside["uses_math"]:
@@ -60,103 +58,13 @@ def _part(name: str, program: Program) -> Program:
     return finished(own, ("init", "derive", *PARTS), keep=(*BETWEEN, "work.s"))
 
 
-def _module(
-    assembly: Assembly, name: str, program: Program, places: Places, flow: int
-) -> dict[str, Any]:
-    used = usages(program, locals_of(program))
-    place = CNames(program)
-    is_flow = program.period is None
-    flows = list(assembly.flows)
-    slots = [
-        (k, s.partition(".")[2]) for k, s in enumerate(assembly.slots) if s.startswith(f"{name}.")
-    ]
-    number = assembly.numbers()[name]
-    return {
-        **module_context(program),
-        "digest": "",
-        "title": f"Instance {name}",
-        "is_flow": is_flow,
-        "flow": flows.index(name) if is_flow else -1,
-        "calls": {block: f"{block}({', '.join(used[block].parameters)})" for block in used},
-        "defaults": _defaults(program),
-        "ranges": _ranges(program, number) if is_flow else [],
-        "invariants": [
-            {
-                "mode": place(program.mode_variables()[info.region]),
-                "number": info.mode,
-                "holds": place(info.variable),
-                "event": number + len(program.transitions) + len(ranged(program)) + k,
-            }
-            for k, info in enumerate(program.invariants)
-        ],
-        "has_record": "record" in program.blocks,
-        "age": place(AGE.name),
-        "fired": [place(v) for v in program.fired_variables()],
-        "log": [place(v.name) for v in program.variables if v.name in (LOG, LOGGED)],
-        "bound": sum(len(program.modes_of(region)) for region in program.mode_variables()),
-        "number": number,
-        "looks": [(k, place(wires_of(program)[wire])) for k, wire in slots],
-        "is_looked_at": any(not _is_carried(wires_of(program)[wire]) for _, wire in slots),
-        "width": row_width(assembly),
-        "lagging": [
-            INSTANCE.format(s.name)
-            for s in assembly.sensors.values()
-            if s.lag and s.source.partition(".")[0] == name
-        ],
-        "most_pieces": EVENTS_PER_STEP,
-        "varying": _varying(assembly, name, program, places),
-        "zero": literal(0.0, program.number),
-        "states": [place(v.name) for v in program.variables if v.name.startswith("state.")],
-        "has_faults": any(v.name == "memory.faults" for v in program.variables),
-        "left": [
-            place(LEFT.format(k)) for k, _ in enumerate(ranged_signals(program)) if not is_flow
-        ],
-        "finite": [place(wire.source) for wire in program.outputs if wire.type == "real"],
-    }
-
-
-def _is_carried(variable: str) -> bool:
-    """Tell whether a variable is as it is without its equation."""
-    return variable.startswith(("state.", "discrete.", "memory."))
-
-
-def _defaults(program: Program) -> list[str]:
-    found = [
-        f"{c_member(f'input.{key}')} = {literal(value, program.number)}"
-        for key, value in program.defaults.items()
-    ]
-    flags = [v.name for v in program.variables if v.name.startswith("is_new.")]
-    return [*found, *(f"is_new.{c_member(name)} = true" for name in flags)]
-
-
-def _ranges(program: Program, number: int) -> list[dict[str, object]]:
-    found = []
-    for k, variable in enumerate(ranged(program)):
-        assert variable.range is not None
-        low, high = variable.range
-        slack = RANGE_SLACK * (high - low)
-        found.append(
-            {
-                "place": CNames(program)(variable.name),
-                "low": repr(low - slack),
-                "high": repr(high + slack),
-                "number": number + len(program.transitions) + k,
-            }
-        )
-    return found
-
-
 def _driver(assembly: Assembly, programs: Mapping[str, Program], places: Places) -> dict[str, Any]:
     instances = [_instance(assembly, name, program, places) for name, program in programs.items()]
     rows = dataclasses.replace(places, is_row=True)
     formulas = [c for c in assembly.columns if c.block]
     sensors = [_sensor(sensor, places) for sensor in assembly.sensors.values()]
-    called = {
-        name
-        for block in assembly.wires.blocks.values()
-        for name in block_names(block)
-        if name.startswith("call ")
-    }
+    wired = {name for block in assembly.wires.blocks.values() for name in block_names(block)}
+    called = {name for name in wired if name.startswith("call ")}
     has_lag = any(sensor.lag for sensor in assembly.sensors.values())
     return {
         "version": version(),
@@ -169,13 +77,7 @@ def _driver(assembly: Assembly, programs: Mapping[str, Program], places: Places)
         "has_lag": has_lag,
         "uses_math": has_lag or bool(called),
         "courses": [_course(assembly, course) for course in assembly.courses],
-        "slots": [
-            {
-                "value": _slot(assembly, s, places),
-                "is_flow": s.partition(".")[0] in assembly.flows,
-            }
-            for s in assembly.slots
-        ],
+        "slots": [_slot(assembly, signal, places) for signal in assembly.slots],
         "formulas": [
             (len(assembly.slots) + k, rows.formula(column.block or ""))
             for k, column in enumerate(formulas)
@@ -193,13 +95,13 @@ def _driver(assembly: Assembly, programs: Mapping[str, Program], places: Places)
     }
 
 
-def _slot(assembly: Assembly, signal: str, places: Places) -> str:
+def _slot(assembly: Assembly, signal: str, places: Places) -> dict[str, object]:
     """Return what fills a slot of a row; an input may change between the instants."""
     courses = [course.name for course in assembly.courses]
     value = places.signal(signal)
     if signal in courses:
-        return f"is_instant ? {value} : course_{courses.index(signal)}(run, at)"
-    return value
+        value = f"is_instant ? {value} : course_{courses.index(signal)}(run, at)"
+    return {"value": value, "is_flow": signal.partition(".")[0] in assembly.flows}
 
 
 def _course(assembly: Assembly, course: Course) -> dict[str, object]:
@@ -250,27 +152,13 @@ def _instance(assembly: Assembly, name: str, program: Program, places: Places) -
         "invariants": len(program.invariants),
         "feeds": [_fed(feed, program, places) for feed in assembly.feeds[name]],
         "flags": flags,
-        "varying": _varying(assembly, name, program, places),
+        "varying": varying(assembly, name, program, places),
         "fixed_tunables": [
             f"{c_member(c.name)} = {literal(c.value, program.number)}"
             for c in program.constants
             if c.kind == "tunable" and c.name not in varied and not c.items
         ],
     }
-
-
-def _varying(
-    assembly: Assembly, name: str, program: Program, places: Places
-) -> list[dict[str, str]]:
-    """Return the inputs of an instance that change inside its steps, and what they are then."""
-    timed = dataclasses.replace(places, is_timed=True)
-    known = {variable.name for variable in program.variables}
-    found = []
-    for feed in assembly.feeds[name]:
-        if f"work.rise_{short_input(feed)}" in known:
-            signal = timed.formula(feed.block) if feed.block else timed.signal(str(feed.source))
-            found.append({"name": short_input(feed), "at": signal})
-    return found
 
 
 def _fed(feed: Feed, program: Program, places: Places) -> dict[str, object]:

@@ -82,13 +82,28 @@ def stepped(program: Program) -> Program:
 
 def module_context(program: Program) -> dict[str, Any]:
     """Return what the templates of a Program's files read."""
-    number, constants, variables = program.number, program.constants, program.variables
+    number = program.number
     local = locals_of(program)
     used = usages(program, local)
     kinds = {variable.name: c_type(variable, program.number) for variable in program.variables}
     called = {name.removeprefix("call ") for name in reads(program.blocks.values()) if " " in name}
     shared = _work(program, local)
     blocks = [_block(program, name, local[name], used, kinds) for name in _callees_first(program)]
+    return {
+        **_names(program),
+        **_members(program),
+        "work": [_field(variable, number) for variable in shared],
+        "begun": _begun(program, shared, kinds),
+        "blocks": [block for block in blocks if block["name"] not in ENTRIES],
+        "entries": {block["name"]: block for block in blocks if block["name"] in ENTRIES},
+        "has_stamps": "compare_stamps" in program.blocks,
+        "uses_math": bool(called & {*FUNCTIONS_OF[number], *INLINE}),
+        "uses_libm": bool(called & {"abs", "sqrt", "floor"}),
+    }
+
+
+def _names(program: Program) -> dict[str, Any]:
+    """What the files are called, and the numbers that have names."""
     return {
         "name": program.name,
         "guard": f"{program.name.upper()}_H",
@@ -110,8 +125,15 @@ def module_context(program: Program) -> dict[str, Any]:
         ],
         "faults": list(enumerate(program.faults)),
         "transitions": program.transitions,
-        "real": REAL[number],
-        "suffix": SUFFIX[number],
+        "real": REAL[program.number],
+        "suffix": SUFFIX[program.number],
+    }
+
+
+def _members(program: Program) -> dict[str, Any]:
+    """The members of the structures."""
+    number, constants, variables = program.number, program.constants, program.variables
+    return {
         "calibration": [_constant(c, number) for c in constants if c.kind == "tunable"],
         "derived": [_constant(c, number) for c in constants if c.kind == "derived"],
         "constants": [_constant(c, number) for c in constants if c.name.startswith("constant.")],
@@ -122,13 +144,6 @@ def module_context(program: Program) -> dict[str, Any]:
         "groups": _groups(program),
         "memory": [_field(v, number) for v in variables if v.name.startswith("memory.")],
         "outputs": _outputs(program),
-        "work": [_field(variable, number) for variable in shared],
-        "begun": _begun(program, shared, kinds),
-        "blocks": [block for block in blocks if block["name"] not in ENTRIES],
-        "entries": {block["name"]: block for block in blocks if block["name"] in ENTRIES},
-        "has_stamps": "compare_stamps" in program.blocks,
-        "uses_math": bool(called & {*FUNCTIONS_OF[number], *INLINE}),
-        "uses_libm": bool(called & {"abs", "sqrt", "floor"}),
     }
 
 

@@ -15,7 +15,6 @@ from engine.trajectory import Values as Column, column_array
 from language.declaration import Formula
 from language.experiment import Scenario, System
 from language.program import Program, ValueType
-from language.syntax import names
 from language.wires import output_block
 
 Values = tuple[Any, ...]
@@ -60,18 +59,6 @@ def recorded(
             part = known[output]
             known[name] = Recorded(name, part.type, part.unit, None, part.source)
     return tuple(known[name] for name in scenario.signals or everything)
-
-
-def sources_of(found: tuple[Recorded, ...], system: System) -> frozenset[str]:
-    """Return the signals that must be seen to fill a row."""
-    needed: set[str] = set()
-    for column in found:
-        output = system.outputs.get(column.name)
-        if column.block and isinstance(output, Formula):
-            needed |= {name.path for name in names(output.tree)}
-        else:
-            needed.add(column.source)
-    return frozenset(needed)
 
 
 class Rows:

@@ -9,6 +9,7 @@ from functools import partial
 from typing import Any
 
 from engine.continuous import ContinuousRun, Stopped
+from engine.feeding import Feeding, where
 from engine.firing import event, fired, mode_names
 from engine.interpreter import Interpreter, Stepper
 from engine.invariant_watch import InvariantWatch
@@ -21,8 +22,8 @@ from engine.starting import programs_of
 from engine.stimulus import resolved
 from engine.surroundings import Surroundings
 from engine.trajectory import Event, Trajectory, fault_names
-from language.experiment import Connection, Scenario, System
-from language.program import Program, short
+from language.experiment import Scenario, System
+from language.program import Program
 
 Build = Callable[[Program], Stepper]
 Ticked = Callable[[str, Program, Stepper], None]
@@ -67,28 +68,13 @@ class _Simulation:
         self.signals = Signals(system, scenario, self.programs, self.steppers)
         self.rows = Rows(recorded(system, scenario, self.programs))
         self.events: list[Event] = []
-        self.wires: dict[str, list[Connection]] = {name: [] for name in self.programs}
-        for (owner, _), connection in system.connections.items():
-            self.wires[owner].append(connection)
-        self.seen: dict[tuple[str, str, str], int] = {}
-        self.flags = {
-            f"{name}.{variable.name}"
-            for name, program in self.programs.items()
-            for variable in program.variables
-            if variable.name.startswith("is_new.")
-        }
+        self.feeding = Feeding(system, self.programs, self.steppers, self.signals)
         self.left: set[tuple[str, str]] = set()
         self.invariants = {
             name: InvariantWatch(name, program, self.steppers[name], self.events.append)
             for name, program in self.programs.items()
         }
         self.words: dict[str, int] = {}
-        self.limited = {
-            (name, short(variable.name))
-            for name, program in self.programs.items()
-            for variable in program.variables
-            if variable.name.startswith("latched.")
-        }
         self.around: dict[str, Surroundings] = {}
         self.flows: dict[str, ContinuousRun] = {}
         for name, program in self.programs.items():
@@ -97,7 +83,7 @@ class _Simulation:
 
     def _add_flow(self, name: str, program: Program) -> None:
         stepper, log = self.steppers[name], self.events.append
-        around = Surroundings(name, stepper, self.signals, self.wires[name], program)
+        around = Surroundings(name, stepper, self.signals, self.feeding.wires[name], program)
         self.around[name] = around
         self.flows[name] = ContinuousRun(name, program, stepper, log, around)
         if self.ticked:
@@ -143,7 +129,7 @@ class _Simulation:
             if line.course is None:
                 line.put(Fraction(0), self.signals.now(line.line.source))
         for name, flow in self.flows.items():
-            self._feed(name, Fraction(0))
+            self.feeding.feed(name, Fraction(0))
             flow.start()
 
     def _flow_to(self, time: Fraction, between: Sequence[Fraction]) -> None:
@@ -224,37 +210,9 @@ class _Simulation:
             if line.line.source in sources:
                 line.put(time, self.signals.now(line.line.source))
 
-    def _feed(self, name: str, time: Fraction) -> bool:
-        """Set the inputs of an instance; tell whether one changed."""
-        stepper, changed = self.steppers[name], False
-        for connection in self.wires[name]:
-            thing = connection.target[1]
-            value = self.signals.connected(connection)
-            kind = self.system.instances[name].automaton.inputs[thing].type
-            if kind != "real":
-                value = bool(value) if kind == "bool" else int(value)
-            before = stepper.get(f"input.{thing}")
-            stepper.set(f"input.{thing}", value)
-            now = stepper.get(f"input.{thing}")
-            if not math.isfinite(now) and (name, thing) not in self.limited:
-                raise Stopped(f"{self._where(name, time)}: input `{thing}` is {now}")
-            changed = changed or now != before
-        return changed
-
-    def _flag_new(self, name: str) -> None:
-        """A measured input is new where a sensor that it reads has sampled since the last tick."""
-        for connection in self.wires[name]:
-            thing = connection.target[1]
-            read = [sensor for sensor in connection.reads if sensor in self.schedule.samples]
-            if read and f"{name}.is_new.{thing}" in self.flags:
-                counts = {sensor: self.signals.sensors[sensor].count for sensor in read}
-                news = [self.seen.get((name, thing, s), 0) != count for s, count in counts.items()]
-                self.seen.update({(name, thing, s): count for s, count in counts.items()})
-                self.steppers[name].set(f"is_new.{thing}", any(news))
-
     def _update_flow(self, name: str, time: Fraction) -> None:
         """An input that changed is an event: guards are read again (rule 11)."""
-        changed, flow = self._feed(name, time), self.flows[name]
+        changed, flow = self.feeding.feed(name, time), self.flows[name]
         if changed and time == 0:
             flow.start()
         if changed or not flow.is_settled:
@@ -264,14 +222,14 @@ class _Simulation:
 
     def _is_controlled(self, name: str) -> bool:
         """Tell whether an input reads a sampled instance: its first value is that of tick 0."""
-        reads = [read for connection in self.wires[name] for read in connection.reads]
+        reads = [read for connection in self.feeding.wires[name] for read in connection.reads]
         return any(read.partition(".")[0] in self.programs for read in reads)
 
     def _tick(self, name: str, time: Fraction) -> None:
         stepper, program = self.steppers[name], self.programs[name]
         sources = [f"{name}.{wire.name}" for wire in program.outputs]
-        self._feed(name, time)
-        self._flag_new(name)
+        self.feeding.feed(name, time)
+        self.feeding.flag_new(name, self.schedule.samples)
         self._move_lags(sources, time)
         stepper.run("step")
         self._move_lags(sources, time)
@@ -301,15 +259,13 @@ class _Simulation:
                 run.lag.move(time, self.signals.now(run.sensor.source))
 
     def _require_finite(self, name: str, time: Fraction) -> None:
-        stepper = self.steppers[name]
-        for wire in self.programs[name].outputs:
+        stepper, program = self.steppers[name], self.programs[name]
+        for wire in program.outputs:
             value = stepper.get(wire.source)
             if isinstance(value, float) and not math.isfinite(value):
-                raise Stopped(f"{self._where(name, time)}: output `{wire.name}` is {value}")
-
-    def _where(self, name: str, time: Fraction) -> str:
-        mode = self.programs[name].mode_name(self.steppers[name].get("memory.mode"))
-        return f"t = {float(time):.9g} s, `{name}` in mode `{mode}`"
+                raise Stopped(
+                    f"{where(name, program, stepper, time)}: output `{wire.name}` is {value}"
+                )
 
     def _trajectory(self, stopped: str | None) -> Trajectory:
         return Trajectory(

@@ -7,8 +7,9 @@ from itertools import combinations
 
 from language.declaration import Formula
 from language.dimension import DimensionCheck
-from language.model import Automaton, TruthRow, TruthTable
+from language.model import Automaton
 from language.problem import Problems
+from language.truth import TruthRow, TruthTable
 
 SHOWN = {True: "T", False: "F", None: "-"}
 

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 from language.action import committing, reading, work_variable
 from language.lower import Names, expression, reads_of
-from language.model import Automaton, TruthRow, TruthTable
+from language.model import Automaton
 from language.operation import Assign, Binary, Block, Branch, Expr, Op, Ref, Unary
 from language.program import Variable
+from language.truth import TruthRow, TruthTable
 
 VERB = "decided"
 

@@ -162,7 +162,10 @@ def apply(function: str, arguments: list[Scalar], number: NumberType = "float64"
     """Return the value of an elementary operation or function."""
     if function in ELEMENTARY:
         return in_type(EXACT[number][function](*arguments), number)
-    return _function(function, tuple(arguments), number)
+    found = tuple(arguments)
+    if 0.0 in found:  # a cache takes -0.0 for 0.0
+        return _function.__wrapped__(function, found, number)
+    return _function(function, found, number)
 
 
 @lru_cache(maxsize=4096)

@@ -20,6 +20,7 @@ from language.kind import Kind as ValueKind
 from language.number import NumberType
 from language.problem import Span
 from language.syntax import Tree
+from language.truth import TruthTable
 from language.units import Dimension
 
 CHART = "chart"
@@ -179,32 +180,6 @@ class Region:
     def widest(self) -> int:
         """The largest number of transitions that leave one mode."""
         return max(len(mode.transitions) for mode in self.modes.values())
-
-
-@dataclass(frozen=True)
-class TruthRow:
-    """A row of a truth table: what each condition is (None: whatever), and what it then writes."""
-
-    name: str
-    marks: tuple[bool | None, ...]
-    results: Mapping[str, Formula]
-    span: Span
-
-
-@dataclass(frozen=True)
-class TruthTable:
-    """Conditions by name, and rows of which exactly one holds (language/decision.py)."""
-
-    name: str
-    conditions: Mapping[str, Formula]
-    rows: tuple[TruthRow, ...]
-    key: str
-    span: Span
-
-    @property
-    def written(self) -> tuple[str, ...]:
-        """The discrete variables that some row writes, each once."""
-        return tuple(dict.fromkeys(name for row in self.rows for name in row.results))
 
 
 @dataclass(frozen=True)

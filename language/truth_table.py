@@ -6,9 +6,9 @@ from collections.abc import Mapping
 
 from language.declaration import Formula
 from language.document import Entry, Node, Table
-from language.model import TruthRow, TruthTable
 from language.problem import nearest
 from language.reader import Reader
+from language.truth import TruthRow, TruthTable
 
 MARKS: Mapping[str, bool | None] = {"T": True, "F": False, "-": None}
 MOST_CONDITIONS = 16

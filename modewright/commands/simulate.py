@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -23,6 +23,9 @@ from modewright.commands.options import (
 )
 from modewright.console import announce, console, working
 from modewright.files import require_writable, write_files
+
+if TYPE_CHECKING:
+    from engine.trajectory import Trajectory
 
 
 def simulate(
@@ -65,14 +68,9 @@ def simulate(
             calibrations=calibrations or (),
             compiled=compiled,
         )
-    files: dict[Path, bytes] = {}
-    if out:
-        files |= run_files(trajectory, out)
+    files = run_files(trajectory, out) if out else {}
     if plot:
-        from engine.plot import overview
-
-        title = f"{system}, scenario {scenario}"
-        files[plot] = overview([trajectory], title=title).data(graphic_format(plot))
+        files[plot] = _picture(trajectory, f"{system}, scenario {scenario}", plot)
     write_files(files)
     if as_json:
         show.print_json(show.trajectory_json(trajectory))
@@ -81,3 +79,9 @@ def simulate(
     stop_where(trajectory.stopped is not None, trajectory)
     if not as_json:
         announce(list(files))
+
+
+def _picture(trajectory: Trajectory, title: str, plot: Path) -> bytes:
+    from engine.plot import overview
+
+    return overview([trajectory], title=title).data(graphic_format(plot))

@@ -6,9 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from tests.lockstep.chance.generator_mutants import GENERATOR
 from tests.lockstep.chance.healthy import Healthy, killed_by
 from tests.lockstep.chance.mutant import Mutant
-from tests.lockstep.chance.mutants import GENERATOR, INTERPRETER
+from tests.lockstep.chance.mutants import INTERPRETER
 from tests.lockstep.conftest import TICKS
 
 MUTANTS = (*INTERPRETER, *GENERATOR)

@@ -1,4 +1,4 @@
-"""Mutants: mistakes that lock-step on random specs must see; one list per side."""
+"""Mutants: mistakes in the interpreter that lock-step on random specs must see."""
 
 from __future__ import annotations
 
@@ -9,13 +9,11 @@ from typing import Any
 
 import pytest
 
-from codegen import expression as printed
-from codegen.statement import Writer
 from engine.arithmetic import ARITHMETIC
-from language.number import NUMBERS, NumberType
-from language.operation import Assign, Binary, Block, Branch, Compare, Expr, Op, Ref, Run, Value
+from language.number import NUMBERS
+from language.operation import Assign, Block, Branch, Op, Ref, Run, Value
 from language.program import Program, Variable
-from tests.lockstep.chance.mutant import Mutant, Patch, attribute, changed, item, lines_without
+from tests.lockstep.chance.mutant import Mutant, Patch, attribute, changed, item
 
 ACTIONS = "engine.actions"
 SHAPES = "engine.shapes"
@@ -215,90 +213,4 @@ INTERPRETER = (
     Mutant("previous is one tick late", "interpreter", rewrite=_late),
     Mutant("previous is the value of now", "interpreter", rewrite=_early),
     Mutant("the largest priority wins", "interpreter", rewrite=_any_priority),
-)
-
-
-def _reciprocal(whole: Binary, operator: str, left: Expr, right: Expr, place: Any) -> str:
-    if operator != "/":
-        return _BINARY(whole, operator, left, right, place)
-    one = printed.literal(1.0, place.number)
-    return (
-        f"({printed.c_expression(left, place)}) * ({one} / ({printed.c_expression(right, place)}))"
-    )
-
-
-def _rough(digits: int) -> Callable[[float, NumberType], str]:
-    """A literal of some digits; of float32 as many fewer than it needs."""
-
-    def decimal(value: float, number: NumberType) -> str:
-        if not math.isfinite(value):
-            return repr(value)
-        rough = float(f"{value:.{digits if number == 'float64' else digits - 8}g}")
-        return repr(rough if math.isfinite(rough) else value)
-
-    return decimal
-
-
-def _bare(expr: Expr, place: Any) -> str:
-    is_sum = isinstance(expr, Binary) and expr.operator in ("+", "-", "*", "/")
-    return printed.c_expression(expr, place) if is_sum else _OPERAND(expr, place)
-
-
-def _double(value: float | int | bool, number: NumberType) -> str:
-    return _LITERAL(value, "float64" if isinstance(value, float) else number)
-
-
-def _strict(expr: Expr, place: Any) -> str:
-    if isinstance(expr, Compare) and expr.operator == ">=":
-        expr = Compare(">", expr.left, expr.right)
-    return _EXPRESSION(expr, place)
-
-
-def _everywhere(name: str, value: Any) -> Patch:
-    def apply(patch: pytest.MonkeyPatch) -> None:
-        for module in ("expression", "statement"):
-            patch.setattr(f"codegen.{module}.{name}", value)
-
-    return apply
-
-
-def _short(writer: Writer, timer: str, condition: object, limit: int, key: str) -> Any:
-    return _COUNT(writer, timer, condition, limit - 1, key)
-
-
-_COUNT = Writer._count
-_BINARY, _OPERAND, _LITERAL = printed._binary, printed._operand, printed.literal
-_EXPRESSION = printed.c_expression
-
-GENERATOR = (
-    Mutant(
-        "a division is a product", "generator", attribute("codegen.expression._binary", _reciprocal)
-    ),
-    Mutant(
-        "literals have 15 digits", "generator", attribute("codegen.expression.decimal", _rough(15))
-    ),
-    Mutant(
-        "literals have 16 digits", "generator", attribute("codegen.expression.decimal", _rough(16))
-    ),
-    Mutant("parentheses are missing", "generator", attribute("codegen.expression._operand", _bare)),
-    Mutant(
-        "float32 is computed in double",
-        "generator",
-        attribute("codegen.expression.literal", _double),
-    ),
-    Mutant(
-        "the relation >= fails on equality",
-        "generator",
-        _everywhere("c_expression", _strict),
-    ),
-    Mutant(
-        "a case falls through",
-        "generator",
-        attribute("codegen.statement.Writer._choose", lines_without("break;")(Writer._choose)),
-    ),
-    Mutant(
-        "a counter stops one short in C",
-        "generator",
-        attribute("codegen.statement.Writer._count", _short),
-    ),
 )

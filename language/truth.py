@@ -1,0 +1,35 @@
+"""Truth: a table of conditions and rows, of which exactly one holds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from language.declaration import Formula
+from language.problem import Span
+
+
+@dataclass(frozen=True)
+class TruthRow:
+    """A row of a truth table: what each condition is (None: whatever), and what it then writes."""
+
+    name: str
+    marks: tuple[bool | None, ...]
+    results: Mapping[str, Formula]
+    span: Span
+
+
+@dataclass(frozen=True)
+class TruthTable:
+    """Conditions by name, and rows of which exactly one holds (language/decision.py)."""
+
+    name: str
+    conditions: Mapping[str, Formula]
+    rows: tuple[TruthRow, ...]
+    key: str
+    span: Span
+
+    @property
+    def written(self) -> tuple[str, ...]:
+        """The discrete variables that some row writes, each once."""
+        return tuple(dict.fromkeys(name for row in self.rows for name in row.results))

@@ -1,0 +1,119 @@
+"""A recursive observer whose run predicts, and what does not go together with one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from filterpy.common import van_loan_discretization
+
+from engine.interpreter import Interpreter
+from lockstep.compare import compare
+from tests.language.making import program, project_of, told
+from tests.language.test_recursive import CONSTANT, SPEC, made
+from tests.lockstep.programs import taped
+
+OBSERVING = """  on_2:
+    observer:
+      kalman: {{states: {states}, gain: recursive, covariance: keep}}
+      A: {{x: {{v: 1}}, v: {{x: -4 1/s^2, v: -0.3 1/s, b: 1}}, b: {{b: -0.1 1/s}}}}
+      measures: {{y_x: x}}
+      process_noise: {{v: 0.5 1/s^3, b: 0.2 1/s^5}}
+      measurement_noise: {{y_x: 0.04}}
+"""
+
+# The run predicts.
+
+MODEL = """language: 1
+automaton: m
+parameters: {k: {value: 4 1/s^2}, d: {value: 0.3 1/s}}
+inputs: {u: {unit: 1/s^2, default: 0 1/s^2}}
+states:
+  x: {unit: "1", initial: 0, range: [-50, 50]}
+  v: {unit: 1/s, initial: 0, range: [-50, 50]}
+flow: {x: der(x) = v}
+initial: free
+modes:
+  free:
+    flow: {v: der(v) = u - d * v}
+    transitions: {held: {when: x >= 1}}
+  held:
+    flow: {v: der(v) = u - k * x - d * v}
+"""
+HYBRID = """language: 1
+automaton: h
+period: 0.1 s
+numbers: float64
+model: m
+inputs: {y_x: {unit: "1"}, u: {unit: 1/s^2}}
+states: {x: {initial: 0, range: [-50, 50]}, v: {initial: 0.8 1/s, range: [-50, 50]}}
+modes:
+  only:
+    runs: {of: m.free, method: exponential}
+    observer:
+      kalman: {states: [x, v], gain: recursive, covariance: keep}
+      predict: runs
+      measures: {y_x: x}
+      process_noise: {x: 0.01 1/s, v: 0.5 1/s^3}
+      measurement_noise: {y_x: 0.04}
+outputs: [x, v]
+"""
+
+
+def test_the_run_predicts_and_its_mode_spreads_the_covariance(tmp_path: Path) -> None:
+    inside = Interpreter(program(HYBRID, project_of(tmp_path, m=MODEL)))
+    phases = {0: np.array([[0.0, 1.0], [0.0, -0.3]]), 1: np.array([[0.0, 1.0], [-4.0, -0.3]])}
+    inside.set("is_new.y_x", False)
+    seen = set()
+    inside.run("step")
+    for _ in range(25):
+        mode = inside.get("memory.run_mode")
+        seen.add(mode)
+        phi, q = van_loan_discretization(phases[mode], np.sqrt(np.diag([0.01, 0.5])), 0.1)
+        names = ("memory.P_x__x", "memory.P_x__v", "memory.P_v__v")
+        xx, xv, vv = (inside.get(name) for name in names)
+        expected = phi @ np.array([[xx, xv], [xv, vv]]) @ phi.T + q
+        x, v = inside.get("state.x"), inside.get("state.v")
+        inside.run("step")
+        found = np.array([inside.get(name) for name in names])
+        assert np.allclose(found, [expected[0, 0], expected[0, 1], expected[1, 1]], rtol=1e-10)
+        if inside.get("memory.run_mode") == mode:
+            ahead = phi @ np.array([x, v])
+            assert inside.get("state.x") == pytest.approx(ahead[0], rel=1e-12, abs=1e-12)
+    assert seen == {0, 1}
+
+
+def test_a_run_that_predicts_is_equal_in_c(tmp_path: Path) -> None:
+    used = program(HYBRID, project_of(tmp_path, m=MODEL))
+    inputs = [
+        {"input.y_x": 0.08 * k, "input.u": 0.5 * (k % 3), "is_new.y_x": k % 2 == 0}
+        for k in range(30)
+    ]
+    assert compare(taped(used, inputs)).is_equal
+
+
+def test_what_does_not_go_together_is_refused(tmp_path: Path) -> None:
+    project = project_of(tmp_path, m=MODEL)
+
+    def lines(old: str, new: str) -> list[str]:
+        assert old in HYBRID
+        return told(lambda: program(HYBRID.replace(old, new), project))
+
+    (line,) = lines("gain: recursive, covariance: keep", "gain: steady")
+    assert "`predict: runs` needs `gain: recursive`" in line
+    (line,) = lines("      predict: runs\n", "")
+    assert "has both `observer` and `runs`" in line
+    assert lines("    runs: {of: m.free, method: exponential}\n", "")
+    (line,) = lines("      predict: runs\n", "      predict: runs\n      correct: u\n")
+    assert "`correct` names an input of type bool, `u` is none" in line
+    assert told(lambda: made(("gain: recursive, covariance: keep", "covariance: keep")))
+    (line,) = told(lambda: made(("initial: on_1", "equations: {w: u * 1}\ninitial: on_1"),
+                                noise="0.2 1/s^5 + 0 1/s^3 * w"))  # fmt: skip
+    assert line.endswith("`w` is an equation: an observer reads states and inputs")
+    other = OBSERVING.format(states="[v, x, b]")
+    (line,) = told(lambda: made(("  on_2: {}", other)))
+    assert line.endswith("observers of an automaton have the same states in the same order")
+    program(
+        SPEC.replace("NOISE", CONSTANT).replace("  on_2: {}", OBSERVING.format(states="[x, v, b]"))
+    )
