@@ -28,6 +28,9 @@ def check(
         bool, typer.Option("--github", help="print problems as annotations of GitHub Actions")
     ] = False,
     sarif: Annotated[Path | None, typer.Option(help="write the problems as SARIF 2.1.0")] = None,
+    watch: Annotated[
+        bool, typer.Option("--watch", help="check again whenever a spec changes; Ctrl-C ends it")
+    ] = False,
 ) -> None:
     """Report all problems of specs, with places, codes (docs/problems.md) and help.
 
@@ -35,23 +38,41 @@ def check(
     modewright check estimator spec/ev_driveline/plant.yaml
     modewright check --all --json
     modewright check --all --github --sarif problems.sarif
+    modewright check --all --watch
     """
     from modewright import checking
+    from modewright.watching import changes, folders_of
 
     require_writable(sarif)
-    names = list(specs or [])
-    names += [str(path) for path in checking.spec_files(Path())] if every else []
-    if not names:
+    if not (specs or every):
         raise typer.BadParameter("name a spec, or use --all", param_hint="SPECS")
+
+    def names() -> list[str]:
+        return list(specs or []) + [str(path) for path in checking.spec_files(Path()) if every]
+
+    is_fine = _checked(names(), len(specs or []), as_json, as_annotations, sarif)
+    for changed in changes(folders_of(specs or [])) if watch else ():
+        console().print(f"\n{', '.join(map(str, changed))} changed", highlight=False)
+        _checked(names(), len(specs or []), as_json, as_annotations, sarif)
+    if not is_fine:
+        raise typer.Exit(PROBLEMS)
+
+
+def _checked(
+    names: list[str], named: int, as_json: bool, as_annotations: bool, sarif: Path | None
+) -> bool:
+    """Check specs and tell what was found, of those that are named their steps; is all fine?"""
+    from modewright import checking
+
     found = [checking.checked(name) for name in names]
     problems = checking.all_problems(found)
     if sarif:
         _write_sarif(sarif, problems, as_json)
     _tell(problems, len(names), as_json, as_annotations)
-    if any(problem.severity == "error" for problem in problems):
-        raise typer.Exit(PROBLEMS)
-    if not (as_json or as_annotations):
-        _tell_limits(found[: len(specs or [])])
+    is_fine = all(problem.severity != "error" for problem in problems)
+    if is_fine and not (as_json or as_annotations):
+        _tell_limits(found[:named])
+    return is_fine
 
 
 def _tell(
