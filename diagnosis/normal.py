@@ -15,6 +15,8 @@ from diagnosis.prediction import Outcome
 Reals = NDArray[np.float64]
 Columns = Mapping[str, tuple[Reals, ...]]
 """How the innovations of each recording (samples, seen) change with the coordinate of a name."""
+MOST = 1e100
+"""Bound of a change: a run that leaves all bounds tells no more than its sign."""
 STEP = 2e-3
 """Change of a coordinate for a difference, in standard deviations of its prior."""
 
@@ -59,7 +61,7 @@ def columns_of(
 
 def _known(changes: Reals) -> Reals:
     """Return changes, 0 where there is none: nothing was seen, or the run left all bounds."""
-    return np.where(np.isfinite(changes), changes, 0.0)
+    return np.clip(np.where(np.isfinite(changes), changes, 0.0), -MOST, MOST)
 
 
 def normal_of(candidate: Candidate, outcome: Outcome, columns: Columns) -> Normal:
