@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from diagnosis import wording
@@ -11,6 +12,7 @@ from diagnosis.finding import told
 from diagnosis.listing import place_rows
 from diagnosis.search import Tried
 from diagnosis.selection import Selection
+from diagnosis.whiteness import Whiteness
 
 MOST_LINES = 4
 
@@ -23,12 +25,15 @@ class Card:
     lines: tuple[str, ...]
 
 
-def cards_of(dossier: Dossier) -> list[Card]:
-    """Return the answers: where, how sure, how much better, what to keep in mind."""
+def cards_of(dossier: Dossier, left: Sequence[Whiteness] = ()) -> list[Card]:
+    """Return the answers: where, how sure, how much better, what to keep in mind.
+
+    `left` is what the model with what was found leaves over, signal by signal.
+    """
     if dossier.diagnosis is None:
         return []
     selection = dossier.diagnosis.selection
-    cards = [_where(dossier), _sure(dossier, selection), _better(dossier), _doubt(dossier)]
+    cards = [_where(dossier), _sure(dossier, selection), _better(dossier), _doubt(dossier, left)]
     return [card for card in cards if card.lines]
 
 
@@ -100,14 +105,21 @@ def _better(dossier: Dossier) -> Card:
     return Card(title, (f"misfit of free simulation, {words} recordings", *lines))
 
 
-def _doubt(dossier: Dossier) -> Card:
+def _doubt(dossier: Dossier, left: Sequence[Whiteness]) -> Card:
     verdict = dossier.verdict
+    coloured = [one.signal for one in left if one.words == "coloured"]
     lines = []
+    if coloured:
+        lines.append(f"{', '.join(coloured)}: what is left is not noise alone")
     if verdict.verdict == "ambiguous":
         lines.append("more than one effect explains it: see what to record to be sure")
     if verdict.verdict == "effect":
         rivals = [wording.effect_at(one) for one in verdict.ambiguous_with]
-        lines.append(f"nearly as good: {', '.join(rivals)}" if rivals else "no rival comes close")
+        lines.append(
+            f"nearly as good: {', '.join(rivals)}"
+            if rivals
+            else "no rival that was fitted comes close"
+        )
     findings = [text for severity, text in told(dossier.findings) if severity != "note"]
     lines += [findings[0].replace("`", "")] if findings else ["nothing odd in the recordings"]
     lacking = sum(not one.is_testable for one in dossier.check.excitation.effects)

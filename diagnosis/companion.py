@@ -30,7 +30,7 @@ def along(bench: Bench, free: Estimate, drifts: Sequence[Reals]) -> tuple[tuple[
         values = np.concatenate(parts)
         if np.std(values) > 0.0:
             found.append((name, float(np.corrcoef(values, np.concatenate(drifts))[0, 1])))
-    found.append(("the recording: each has its own", _between(drifts)))
+    found.append(("the recording (not the same in each)", _between(drifts)))
     found += [(name, _order(target, angles)) for name, angles in _angles(bench, free).items()]
     found = [(name, value) for name, value in found if np.isfinite(value)]
     return tuple(sorted(found, key=lambda pair: -abs(pair[1]))[:MOST])

@@ -39,7 +39,6 @@ from language.load import automaton_of
 from language.model import Automaton
 from language.problem import SpecError
 
-
 MUCH_LESS = 0.8
 """Part of the misfit of simulation that is left at most where an effect is confirmed by it."""
 

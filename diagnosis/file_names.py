@@ -15,3 +15,12 @@ def file_names(paths: Sequence[Path]) -> Mapping[Path, str]:
         if len(set(names.values())) == len(names):
             break
     return names
+
+
+def names_of(train: Sequence[Path], held_out: Sequence[Path]) -> Mapping[Path, str]:
+    """Return a name for each recording: none that is held out has that of one to learn from."""
+    learnt, own = file_names(train), file_names(held_out)
+    if set(learnt.values()) & set(own.values()):
+        together = file_names([*train, *held_out])
+        own = {path: together[path] for path in held_out}
+    return {**learnt, **own}

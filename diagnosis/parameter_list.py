@@ -32,6 +32,11 @@ class ParameterRow:
 def parameter_rows(dossier: Dossier, selection: Selection) -> list[ParameterRow]:
     """Return each fitted parameter: declared, recalibrated, and with what was found."""
     before, after = quantities_of(selection.base), quantities_of(selection.model)
+    brought = {
+        layer.named(own): text_of(entry, "about")
+        for layer in (tried.layer for tried in selection.accepted)
+        for own, entry in _parameters(layer.effect.body)
+    }
     coordinates = {one.name: one for one in selection.model.candidate.uncertain}
     rows = []
     for name, now in after.items():
@@ -45,11 +50,17 @@ def parameter_rows(dossier: Dossier, selection: Selection) -> list[ParameterRow]
                 with_spread(before[name].value, before[name].std) if name in before else "",
                 with_spread(now.value, now.std),
                 "" if value is None else _moved(value, now.value),
-                about_of(dossier, "parameters", name),
+                about_of(dossier, "parameters", name) or brought.get(name, ""),
                 note_of(now, coordinates[name]),
             )
         )
     return rows
+
+
+def _parameters(body: Table) -> list[tuple[str, Table]]:
+    table = body.get("parameters")
+    entries = table if isinstance(table, Table) else ()
+    return [(entry.key, entry.node) for entry in entries if isinstance(entry.node, Table)]
 
 
 def astray(selection: Selection) -> str:

@@ -66,7 +66,7 @@ def _about_verdict(dossier: Dossier, shown: Sequence[Shown]) -> dict[str, Any]:
         "has_model": bool(layers),
         "laid": [layer.id for layer in layers],
         "headline": listing.in_parts(wording.headline(dossier)),
-        "cards": cards_of(dossier),
+        "cards": cards_of(dossier, shown[0].after if shown else ()),
         "location": wording.location(dossier) if found else "",
         "messages": verdict.messages,
         "abouts": _abouts(dossier),

@@ -10,7 +10,7 @@ from diagnosis.finding import told
 from diagnosis.layers import Layer
 from diagnosis.naming import place_path, verdict_id
 from diagnosis.place_sentence import PLACES, place_sentence
-from diagnosis.search import FULL_FITS, WORTH, Tried
+from diagnosis.search import FULL_FITS, HOPELESS, WORTH, Tried
 from diagnosis.selection import CLOSE, Selection
 from diagnosis.threshold import Thresholds
 from diagnosis.verdict import Misfit as FitMisfit, Named, Quantity
@@ -146,12 +146,15 @@ def reason(tried: Tried, place: int, selection: Selection, thresholds: Threshold
     if known is None:
         if tried.promised < WORTH:
             return f"not fitted: promises less than {WORTH:g} nats"
+        best = max((t.evidence.train for t in selection.first_round if t.evidence), default=0.0)
+        if tried.promised < HOPELESS * best:
+            return f"not fitted: promises less than {100 * HOPELESS:g} % of what another gains"
         return f"not fitted: {FULL_FITS} others promise more"
     threshold = thresholds.of(tried.layer)
     if known.train <= threshold:
         return f"gains less than {threshold:.0f} nats in training"
     if known.left_out <= threshold:
-        return f"gains less than {threshold:.0f} nats on recordings that were left out"
+        return f"gains less than {threshold:.0f} nats on parts that were left out"
     if not selection.accepted:
         return "ranked behind one that was not accepted"
     return "explains less than what was accepted" if place else "not needed beside the others"

@@ -13,7 +13,7 @@ from pathlib import Path
 from diagnosis.case import Bootstrap, Case
 from diagnosis.diagnose import diagnose as diagnosed
 from diagnosis.dossier import Dossier, errors_of, hashes, undecided, unusable, usable
-from diagnosis.file_names import file_names
+from diagnosis.file_names import names_of
 from diagnosis.finding import told
 from diagnosis.fit import Fit, fit as fitted
 from diagnosis.layers import effects_in
@@ -205,7 +205,7 @@ def _case(
     whole = expanded(document, project)
     files = tuple(Path(file) for file in train), tuple(Path(file) for file in held_out)
     candidates = _candidates(effects, project)
-    names = {**file_names(files[0]), **file_names(files[1])}
+    names = names_of(*files)
     read = dict(zip(files[0], checked.recordings, strict=True))
     case = Case(whole, project, checked.mapping, *files, candidates, names=names, read=read)
     return case, automaton
