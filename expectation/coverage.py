@@ -11,7 +11,7 @@ from engine.interpreter import Interpreter
 from engine.simulate import simulate
 from engine.starting import automata_of
 from engine.stimulus import resolved
-from expectation.decision import MOST_CONDITIONS, SHOWN, Decision, Shown, decision_of
+from expectation.decision import SHOWN, Decision, Shown, decision_of
 from expectation.expected import Test
 from expectation.places import path_of
 from expectation.probe import LOOK, probed
@@ -33,6 +33,7 @@ class Coverage:
     modes: frozenset[str] = frozenset()
     transitions: frozenset[str] = frozenset()
     seen: Mapping[str, frozenset[int]] = dataclasses.field(default_factory=dict)
+    unmeasured: frozenset[str] = frozenset()
 
     @property
     def name(self) -> str:
@@ -73,10 +74,10 @@ class Coverage:
         return lines
 
     def _conditions(self, decision: Decision) -> list[str]:
+        if decision.key in self.unmeasured:
+            return [f"`{decision.key}.when` is not measured: {len(decision.conditions)} conditions"]
         if decision.key not in self.seen:
             return [f"`{decision.key}.when` was never read"] if decision.conditions else []
-        if len(decision.conditions) > MOST_CONDITIONS:
-            return [f"`{decision.key}.when` has more than {MOST_CONDITIONS} conditions"]
         words = {"always true": "was never false", "always false": "was never true"}
         return [
             f"`{decision.key}.when`: `{text}` {words.get(shown, 'was not shown to matter')}"
@@ -109,6 +110,7 @@ def coverage(test: Test) -> list[Coverage]:
                 _entered(automaton, stepper.active, stepper.reached),
                 frozenset(stepper.taken),
                 {key: combinations for key, combinations in seen.items() if combinations},
+                frozenset(d.key for d in decisions[name] if d.key not in arrays[name]),
             )
         )
     return made

@@ -9,7 +9,7 @@ A condition that is written twice is one.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Collection, Iterator
+from collections.abc import Collection
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Literal
@@ -35,15 +35,12 @@ MOST_CONDITIONS = 10
 class Decision:
     """The guard of a transition, by its key path; conditions in the order of the text.
 
-    Events that it waits for come first; that a superstate has come to its end is one condition
-    (`is_whole`), however it is found out. `places` are those of the lowered guard's conditions.
+    Events that it waits for come first; that a superstate has come to its end is one condition.
     """
 
     key: str
     conditions: tuple[str, ...]
     joined: Joined
-    places: tuple[int | None, ...]
-    is_whole: bool = False
 
     def outcome(self, combination: int) -> bool:
         """Return what the guard is; bit k of a combination is condition k."""
@@ -77,9 +74,8 @@ class Decision:
 def decision_of(transition: Transition) -> Decision:
     """Return what a transition asks for as a decision: its events, and its guard."""
     if transition.completes:
-        return Decision(transition.key, ("completion",), 0, (0,), is_whole=True)
+        return Decision(transition.key, ("completion",), 0)
     found: list[Tree] = []
-    places: list[int | None] = list(range(len(transition.events)))
 
     def joined(tree: Tree) -> Joined:
         match tree:
@@ -88,13 +84,11 @@ def decision_of(transition: Transition) -> Decision:
             case Not(operand, _):
                 return ("not", joined(operand))
             case Truth(value, _):
-                places.append(None)
                 return value
         place = next((k for k, known in enumerate(found) if alike(known, tree)), len(found))
         if place == len(found):
             found.append(tree)
-        places.append(place + len(transition.events))
-        return places[-1]  # type: ignore[return-value]
+        return place + len(transition.events)
 
     made: Joined = any_of(len(transition.events))
     guard = transition.when.tree
@@ -102,7 +96,7 @@ def decision_of(transition: Transition) -> Decision:
         own = joined(guard)
         made = ("and", made, own) if transition.events else own
     events = (f"event {name}" for name in transition.events)
-    return Decision(transition.key, (*events, *map(_text, found)), made, tuple(places))
+    return Decision(transition.key, (*events, *map(_text, found)), made)
 
 
 def any_of(count: int) -> Joined:
@@ -113,16 +107,23 @@ def any_of(count: int) -> Joined:
     return made
 
 
-def leaves(expr: Expr) -> Iterator[Expr]:
-    """Yield the conditions of a lowered guard, in the order of its text."""
-    match expr:
-        case Binary("and" | "or", left, right):
-            yield from leaves(left)
-            yield from leaves(right)
-        case Unary("not", operand):
-            yield from leaves(operand)
-        case _:
-            yield expr
+def lowered_conditions(joined: Joined, expr: Expr) -> dict[int, Expr] | None:
+    """Return what each condition is in a lowered guard; None where that is joined otherwise.
+
+    A condition may be lowered to anything: `rising(x)` to whether x is true, and was not.
+    """
+    match joined, expr:
+        case bool(), _:
+            return {}
+        case int(place), _:
+            return {place: expr}
+        case (("not", inner), Unary("not", operand)):
+            return lowered_conditions(inner, operand)
+        case ((operator, left, right), Binary(found, first, second)) if operator == found:
+            parts = lowered_conditions(left, first), lowered_conditions(right, second)
+            if parts[0] is not None and parts[1] is not None:
+                return {**parts[1], **parts[0]}
+    return None
 
 
 def _value(joined: Joined, combination: int) -> bool:

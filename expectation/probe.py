@@ -10,14 +10,13 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
-from expectation.decision import MOST_CONDITIONS, Decision, leaves
+from expectation.decision import MOST_CONDITIONS, Decision, lowered_conditions
 from language.operation import (
     Assign,
     Binary,
     Block,
     Branch,
     Choose,
-    Compare,
     Count,
     Expr,
     Op,
@@ -41,7 +40,7 @@ TAKEN = ("memory.fired", "work.wish_")
 
 @dataclasses.dataclass(frozen=True)
 class Probed:
-    """A Program with probes, and the array of each decision by its key path."""
+    """A Program with probes, and the array of each decision that has one, by its key path."""
 
     program: Program
     arrays: Mapping[str, str]
@@ -62,10 +61,11 @@ def probed(program: Program, decisions: Iterable[Decision]) -> Probed:
         for name, block in program.blocks.items():
             if name.startswith(CHOOSING):
                 blocks[name] = _everywhere(block, found.before_fired)
-    sizes = {found.arrays[d.key]: 1 << len(d.conditions) for d in found.decisions}
-    arrays = [Variable(name, "truth", size=size) for name, size in sizes.items()]
-    variables = (*program.variables, *arrays)
-    return Probed(dataclasses.replace(program, blocks=blocks, variables=variables), found.arrays)
+    arrays = {key: found.arrays[key] for key in found.stored}
+    sizes = {arrays[d.key]: 1 << len(d.conditions) for d in found.decisions if d.key in arrays}
+    more = (Variable(name, "truth", size=size) for name, size in sizes.items())
+    variables = (*program.variables, *more)
+    return Probed(dataclasses.replace(program, blocks=blocks, variables=variables), arrays)
 
 
 class _Probes:
@@ -74,7 +74,9 @@ class _Probes:
     def __init__(self, program: Program, decisions: tuple[Decision, ...]) -> None:
         self.decisions = tuple(d for d in decisions if len(d.conditions) <= MOST_CONDITIONS)
         self.arrays = {d.key: f"probe.{k}" for k, d in enumerate(self.decisions)}
+        self.stored: dict[str, None] = {}
         self._by_key = {f"{program.name} {d.key}": d for d in self.decisions}
+        self._timers = {info.key: info.timer for info in program.transitions}
 
     def after_assigned(self, op: Op) -> Iterator[Op]:
         """A guard is kept in a variable."""
@@ -87,31 +89,23 @@ class _Probes:
         match op:
             case Count(_, condition, _, key):
                 yield from self._store(key.removesuffix(".when"), condition)
-            case Branch(condition, then, _) if not _is_waiting(condition):
-                for inner in then:
-                    if isinstance(inner, Assign) and inner.target.startswith(TAKEN):
+            case Branch(condition, then, _):
+                taken = (inner for inner in then if isinstance(inner, Assign))
+                for inner in taken:  # where there is a wait the guard is read when it is counted
+                    if inner.target.startswith(TAKEN) and not self._timers.get(inner.key):
                         yield from self._store(inner.key, condition)
         yield op
 
     def _store(self, key: str, guard: Expr) -> Iterator[Op]:
         decision = self._by_key.get(key)
-        if decision is None:
+        parts = lowered_conditions(decision.joined, guard) if decision else None
+        if decision is None or parts is None:
             return
-        parts = [guard] if decision.is_whole else list(leaves(guard))
-        if len(parts) != len(decision.places):
-            raise ValueError(f"the guard of {key} has {len(parts)} conditions in its Program")
         index: Expr = whole(0)
-        for k in range(len(decision.conditions)):
-            bit = Select(parts[decision.places.index(k)], whole(1 << k), whole(0))
-            index = Binary("+", index, bit)
+        for k, part in sorted(parts.items()):
+            index = Binary("+", index, Select(part, whole(1 << k), whole(0)))
+        self.stored[decision.key] = None
         yield Store(self.arrays[decision.key], index, Value(True))
-
-
-def _is_waiting(condition: Expr) -> bool:
-    """Tell whether a branch asks whether a wait is over: its guard was read when it was counted."""
-    return isinstance(condition, Compare) and getattr(condition.left, "name", "").startswith(
-        "timer."
-    )
 
 
 def _everywhere(block: Block, change: Callable[[Op], Iterator[Op]]) -> Block:

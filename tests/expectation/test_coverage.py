@@ -14,7 +14,9 @@ from engine.simulate import simulate
 from engine.starting import automata_of
 from engine.stimulus import resolved
 from expectation.coverage import Coverage, coverage, probed_programs, together
+from language.load import load_automaton
 from language.operation import Store
+from language.project import Project
 from language.traversal import walk
 from modewright import tests
 from modewright.cli import app
@@ -130,3 +132,29 @@ def test_coverage_colours_the_graph_and_is_told(
     assert [each["shown"] for each in found["transitions"][0]["conditions"]] == [
         "unique cause", "always true",
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "spec",
+    [
+        "after_counts_the_time_since_entry_of_the_source/spec/stages.yaml",
+        "edges_of_a_continuous_automaton_are_events_of_their_argument/spec/edges.yaml",
+        "every_and_changed_are_events_of_a_continuous_automaton/spec/beats.yaml",
+        "every_beats_from_entry_and_changed_needs_an_earlier_instant/spec/beats.yaml",
+    ],
+)
+def test_guards_with_memory_are_one_condition_with_a_probe(spec: str) -> None:
+    path = ROOT / "tests" / "rules" / spec
+    automaton = load_automaton(str(path), Project(path.parent.parent))
+    decisions, _, arrays = probed_programs({"one": (automaton, [])})
+    assert set(arrays["one"]) == {decision.key for decision in decisions["one"]}
+    assert {len(decision.conditions) for decision in decisions["one"]} <= {0, 1, 2}
+
+
+def test_a_guard_with_too_many_conditions_is_told(tmp_path: Path) -> None:
+    path = project(tmp_path, "any: {always: level < 20 V}")
+    spec = tmp_path / "spec" / "latch.yaml"
+    many = " and ".join(f"level > {k / 10} V" for k in range(1, 12))
+    spec.write_text(spec.read_text().replace("level > 1 V", many))
+    (found,) = coverage(tests.load_test(str(path), tmp_path))
+    assert found.missed() == ["`modes.low.transitions.high.when` is not measured: 11 conditions"]
