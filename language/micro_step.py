@@ -107,7 +107,7 @@ def _one_step(charting: Charting) -> Block:
     if charting.size:
         ops += arrived(charting.chart)
     ops += [
-        Run("select"),
+        Run("select_transitions"),
         *_heard(charting),
         Branch(_any(charting, _chosen(charting)), (Run("commit"),)),
     ]
@@ -142,7 +142,7 @@ def _step(charting: Charting) -> Block:
     if charting.size:
         late: Block = (Branch(OVER, over, take_event()),)
         end = (Branch(WAITING, late, end),)
-    ops: list[Op] = [Run("select"), *_heard(charting)]
+    ops: list[Op] = [Run("select_transitions"), *_heard(charting)]
     ops.append(Branch(fired, (Branch(OVER, over, tuple(done)),), end))
     return (*ops, Assign(FIRST.name, Value(False)))
 

@@ -43,7 +43,7 @@ NOTHING = (1, 0)
 
 
 def selection_blocks(charting: Charting) -> dict[str, Block]:
-    """Return `count_<mode>`, `choose_<mode>` of modes with transitions, and `select`."""
+    """Return `count_<mode>`, `choose_<mode>` of modes, `select_transitions` and `hear`."""
     blocks: dict[str, Block] = {}
     for node in charting.chart.nodes:
         mode = charting.mode(node)
@@ -56,7 +56,7 @@ def selection_blocks(charting: Charting) -> dict[str, Block]:
     ops: list[Op] = [Assign(wish(region.region), whole(0)) for region in regions]
     for region in regions:
         ops += _wish(charting, region, blocks)
-    blocks["select"] = tuple(ops)
+    blocks["select_transitions"] = tuple(ops)
     if len(regions) > 1:
         blocks.update(_hearing(charting))
     return blocks
