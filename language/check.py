@@ -6,20 +6,21 @@ import dataclasses
 from collections.abc import Iterable, Mapping
 
 from language.chart_target import mode_paths
+from language.check_action import check_assignments, check_ways
 from language.check_balance import check_balances, check_flow
-from language.check_chart import check_chart, never_entered
+from language.check_chart import check_chart
 from language.check_cycle import report_refiring
 from language.check_domain import check_domains
 from language.check_element import check_laid_on
 from language.check_memory import check_memory
 from language.check_observer import check_observer
+from language.check_reached import check_reached
 from language.check_region import check_regions
-from language.check_rewind import check_reach, check_rewind
+from language.check_rewind import check_reach
 from language.check_size import check_size
 from language.check_truth_table import check_truth_tables
 from language.check_unused import check_unused
 from language.check_writer import (
-    check_continued,
     check_outputs,
     check_scaled,
     check_writers,
@@ -30,13 +31,12 @@ from language.dimension import DimensionCheck, Scope
 from language.guards import report_overlaps
 from language.inquiry import Inquiry
 from language.kind import Enumeration, Kind, Whole
-from language.model import CHART, Automaton, Mode, Region
-from language.order import equation_order, report_circle, unreached
-from language.parameter import parameter_kinds
-from language.problem import Problems, nearest
+from language.model import CHART, Automaton, Mode
+from language.order import equation_order, report_circle
+from language.problem import Problems
 from language.region import sources, with_regions
-from language.syntax import EDGES, KEPT, MEMORY, TIMES, Tree, names, whole_literal
-from language.units import SECOND, Dimension, Unit, common, fits
+from language.syntax import KEPT, Tree, whole_literal
+from language.units import Dimension, Unit, common, fits
 
 WHOLES = (Whole, Enumeration)
 
@@ -54,8 +54,7 @@ def check_automaton(automaton: Automaton, problems: Problems) -> Automaton:
     check_reach(checked, problems)
     check_domains(checked, problems)
     problems.stop_if_any()
-    for mode in _never_entered(checked):
-        problems.warning("unreached", mode.span, f"mode `{mode.name}` is never entered")
+    check_reached(checked, problems)
     report_overlaps(checked, Inquiry(checked), problems)
     report_refiring(checked, problems)
     if checked.model:
@@ -192,8 +191,8 @@ class _Check:
                 known[name] = kind if isinstance(kind, Whole) else agreed
         check_flow(automaton, mode, check)
         for assignments in (mode.update, mode.entry, mode.exit):
-            self._assignments(assignments, check)
-        self._transitions(mode, check)
+            check_assignments(automaton, assignments, check, self.problems)
+        self._ways(mode, check)
         if mode.observer:
             plain = DimensionCheck(dataclasses.replace(scope, memory=frozenset()), self.problems)
             check_observer(automaton, mode.observer, self.names, plain)
@@ -220,8 +219,8 @@ class _Check:
         check = self._everywhere(place, self._with(mode))
         check_balances(automaton, mode, check)
         for assignments in (mode.update, mode.entry, mode.exit):
-            self._assignments(assignments, check)
-        self._transitions(mode, check)
+            check_assignments(automaton, assignments, check, self.problems)
+        self._ways(mode, check)
         check_writers(automaton, mode, self.problems)
 
     def _with(self, mode: Mode) -> list[Mode]:
@@ -234,6 +233,11 @@ class _Check:
             leaves = [n for n in chart.leaves(CHART) if chart.nested(n.index, node.index)]
             found = [automaton.by_key[leaf.mode] for leaf in leaves] or found
         return found
+
+    def _ways(self, mode: Mode, check: DimensionCheck) -> None:
+        parameters = self._scope([self.automaton.parameters], "in `wait`: it is a fixed time")
+        constant = DimensionCheck(parameters, self.problems)
+        check_ways(self.automaton, mode, check, constant, self.problems)
 
     def _agreed(self, name: str, kind: Kind | None, formula: Formula) -> Kind | None:
         """Return what a name is, and report where two modes disagree on it."""
@@ -263,69 +267,6 @@ class _Check:
         label = f"`{name}` is in `{kind}` here and in `{before}` in another mode"
         self.problems.error("dimension", formula.span, label)
         return before
-
-    def _assignments(self, formulas: Mapping[str, Formula], check: DimensionCheck) -> None:
-        for name, formula in formulas.items():
-            if name not in self.automaton.carried:
-                hint = nearest(name, self.automaton.carried)
-                label = f"`{name}` is not a state or discrete variable"
-                self.problems.error("name", formula.span, label, hint)
-            else:
-                check.assigned(formula.tree, self.names[name], name)
-
-    def _transitions(self, mode: Mode, check: DimensionCheck) -> None:
-        automaton = self.automaton
-        parameters = self._scope([automaton.parameters], "in `wait`: it is a fixed time")
-        constant = DimensionCheck(parameters, self.problems)
-        remembered = frozenset(MEMORY if automaton.is_sampled else ("delay", *EDGES, *TIMES))
-        guards = dataclasses.replace(check.scope, memory=remembered)
-        guard = DimensionCheck(guards, self.problems)
-        for transition in mode.transitions:
-            region = automaton.region(transition.region)
-            if automaton.tree is None and transition.target not in region.modes:
-                label = f"there is no mode `{transition.target}`"
-                if automaton.regions:
-                    label += f" in region `{region.name}`"
-                hint = nearest(transition.target, region.modes)
-                self.problems.error("name", transition.span, label, hint)
-            guard.truth(transition.when.tree, "when")
-            if transition.wait:
-                constant.quantity(transition.wait.tree, SECOND, "wait")
-                self._fixed_wait(transition.wait)
-            self._assignments(transition.reset, check)
-            if transition.rewind:
-                check.truth(transition.rewind.until.tree, "until")
-                constant.quantity(transition.rewind.within.tree, SECOND, "within")
-                self._fixed_wait(transition.rewind.within)
-                check_rewind(automaton, transition, self.problems)
-            if transition.memory == "continue" and automaton.tree is None:
-                check_continued(automaton, transition, self.problems)
-        for invariant in mode.invariants.values():
-            check.truth(invariant.that.tree, "that")
-
-    def _fixed_wait(self, wait: Formula) -> None:
-        for read in names(wait.tree):
-            parameter = self.automaton.parameters.get(read.path)
-            if parameter and parameter_kinds(self.automaton)[read.path] != "fixed":
-                label = f"`{read.path}` is {parameter.kind}: a wait is made of fixed values"
-                self.problems.error("wait", read.span, label)
-
-
-def _never_entered(automaton: Automaton) -> list[Mode]:
-    """Return the modes that neither an initial mode nor a fault leads to."""
-    if automaton.tree:
-        return never_entered(automaton, automaton.tree)
-    return [
-        region.modes[name] for region in automaton.all_regions for name in _left(automaton, region)
-    ]
-
-
-def _left(automaton: Automaton, region: Region) -> list[str]:
-    found = unreached(region.modes, region.initial)
-    fault_mode = automaton.fault_mode
-    if fault_mode is not None and fault_mode in region.modes:
-        found = [name for name in found if name in unreached(region.modes, fault_mode)]
-    return found
 
 
 def _of_model(automaton: Automaton) -> Mapping[str, object]:
