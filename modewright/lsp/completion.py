@@ -28,7 +28,12 @@ COMBINED = (
 )
 """Combined units that are often needed; others are put together from symbols."""
 WRITABLE = ("state", "discrete variable")
-GROUPS = {"mode": "mode", "template": "template", "fault": "fault", "event": "mode"}
+GROUPS = {
+    "mode": ("mode",),
+    "template": ("template",),
+    "fault": ("fault",),
+    "event": ("event", "mode"),
+}
 SPEC_KINDS = {
     "automaton": ("automaton", "variant"),
     "system": ("system", "automaton", "variant"),
@@ -183,7 +188,7 @@ def _values(world: World, space: Namespace, kind: Kind, before: str) -> Iterator
             for each in model.group("mode"):
                 yield _item(each, f"{model.document.name}.{each.name}")
         case Value("name", of) if of in GROUPS:
-            yield from (_item(each, each.name) for each in space.group(GROUPS[of]))
+            yield from (_item(each, each.name) for each in space.group(*GROUPS[of]))
         case Value(("expression" | "balance" | "literal" | "name"), _):
             if re.search(r"(^|[^\w.])\d[\d.]*(e[-+]?\d+)? $", before):
                 yield from _units()

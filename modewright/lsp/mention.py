@@ -8,7 +8,7 @@ from pathlib import Path
 
 from language.problem import Span
 from modewright.lsp.name import Name
-from modewright.lsp.namespace import Declared, Namespace, lookup, namespace
+from modewright.lsp.namespace import Declared, Namespace, column_name, lookup, namespace
 from modewright.lsp.world import World
 
 PREFIXES = ("initial", "inputs")
@@ -78,7 +78,9 @@ def meaning(world: World, space: Namespace, name: Name) -> Meaning:
             yield part, lookup(space, name.text, name.path[:-2])
         else:
             yield part, lookup(space, name.text, name.path[:-1])
-    elif name.of in ("template", "fault", "region"):
+    elif name.of == "column":
+        yield whole, space.names.get(("column", column_name(name.path, name.text)))
+    elif (name.of, name.text) in space.names or name.of in ("template", "fault", "region"):
         yield whole, space.names.get((name.of, name.text))
     else:
         parts = _parts(name.text)

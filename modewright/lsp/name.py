@@ -50,7 +50,11 @@ def _in_key(place: Place, entry: Entry) -> Iterator[Name]:
         to = entry.node.get("to") if isinstance(entry.node, Table) else None
         if to is None:
             yield Name(entry.key, entry.span, path, "mode", is_key=True)
-    elif section in ("regions", "templates", "faults"):
+    elif "transition_table" in place.path:
+        of = "mode" if section == "rows" else "column"
+        if section in ("rows", "columns") or place.path[-2] == "rows":
+            yield Name(entry.key, entry.span, path, of, is_key=True)
+    elif section in ("regions", "templates", "faults", "events"):
         yield Name(entry.key, entry.span, path, section[:-1], is_key=True)
     elif section == "effects":
         effect, _, at = entry.key.partition("@")
@@ -68,7 +72,7 @@ def _in_scalar(place: Place, scalar: Scalar) -> Iterator[Name]:
                 text = part.strip()
                 start = scalar.text.index(text, offset)
                 offset = start + len(text)
-                yield Name(text, scalar.text_span.inside(start, len(text)), place.path)
+                yield Name(text, scalar.text_span.inside(start, len(text)), place.path, "event")
         case Value("name", of) if of:
             yield Name(scalar.text, scalar.text_span, place.path, of)
         case Value(("expression" | "balance" | "literal") as word, _):

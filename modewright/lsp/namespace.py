@@ -27,7 +27,13 @@ VALUES = {
     "vary": "what varies",
 }
 """Sections that declare what expressions read, and what each declares."""
-OTHERS = {"modes": "mode", "regions": "region", "templates": "template", "faults": "fault"}
+OTHERS = {
+    "modes": "mode",
+    "regions": "region",
+    "templates": "template",
+    "faults": "fault",
+    "events": "event",
+}
 MOST_LAYERS = 20
 
 
@@ -35,7 +41,7 @@ MOST_LAYERS = 20
 class Declared:
     """Something that has a name: where it is declared and what as.
 
-    `group` is `value`, `mode`, `region`, `template`, `fault` or `spec`;
+    `group` is `value`, `mode`, `region`, `template`, `fault`, `event`, `column` or `spec`;
     a mode has its path as its name.
     """
 
@@ -156,6 +162,9 @@ def _one(file: Path, path: tuple[str, ...], entry: Entry) -> Declared | None:
     if section in VALUES and not is_inner and is_value:
         word = VALUES[section]
         return Declared(file, "value", entry.key, word, entry.span, entry.node)
+    if section == "columns" and "transition_table" in path:
+        name = column_name(path, entry.key)
+        return Declared(file, "column", name, "column of a table", entry.span, entry.node)
     if section in OTHERS:
         word = OTHERS[section]
         name = mode_path((*path, entry.key)) if word == "mode" else entry.key
@@ -175,6 +184,11 @@ def mode_path(path: tuple[str, ...]) -> str:
             found.append(path[k + 1])
         k += 2
     return ".".join(found)
+
+
+def column_name(path: tuple[str, ...], key: str) -> str:
+    """Return the name of a column with the place of its table: others may have one like it."""
+    return f"{mode_path(path)}.{key}"
 
 
 def lookup(space: Namespace, name: str, path: tuple[str, ...] = ()) -> Declared | None:
