@@ -18,6 +18,7 @@ KALMAN_KEYS = ("states", "gain", "covariance", "covariance_range")
 NOISE_KEYS = ("process_noise", "measurement_noise")
 RUN_KEYS = ("of", "method", "substeps", "events", "follow", "linearise")
 METHODS = ("euler", "midpoint", "rk4", "exact", "exponential")
+KEEPING = ("steady", "keep")
 MAX_SUBSTEPS = 100
 MAX_EVENTS = 100
 
@@ -28,28 +29,18 @@ def read_observer(reader: Reader, node: Node, key: str, model: Automaton | None)
     """Read an observer of a mode of the model, or one with written matrices."""
     table = reader.table(node, key, (*OBSERVER_KEYS, *NOISE_KEYS))
     kalman = reader.table(table.get("kalman"), f"{key}.kalman", KALMAN_KEYS)
-    if "kalman" not in table.entries:
-        reader.problems.error("missing", node.span, "`kalman: {states: [...]}` is missing")
     gain = reader.choice(kalman.get("gain"), "gain", ("steady", "recursive"), "steady")
-    for name in ("covariance", "covariance_range"):
-        if gain == "steady" and name in kalman.entries:
-            label = f"`{name}` belongs to `gain: recursive`"
-            reader.problems.error("observer", kalman.entries[name].span, label)
     runs = reader.choice(table.get("predict"), "predict", ("matrix", "runs"), "matrix") == "runs"
-    if runs and gain == "steady":
-        label = "`predict: runs` needs `gain: recursive`: the run's mode changes the covariance"
-        reader.problems.error("observer", table.entries["predict"].span, label)
+    _complete(reader, table, node.span)
+    if gain == "steady":
+        _without_covariance(reader, table, kalman, runs)
     states = tuple(item.text for item in reader.items(kalman.get("states"), "states"))
-    measures = {}
-    for entry in reader.named(table.get("measures"), f"{key}.measures"):
-        measures[entry.key] = reader.text(entry.node, f"measures.{entry.key}", entry.span)
-    for name in ("measures", *NOISE_KEYS):
-        if name not in table.entries:
-            reader.problems.error("missing", node.span, f"`{name}` is missing in the observer")
+    measures = _measures(reader, table.get("measures"), f"{key}.measures")
     of_node = table.get("of")
     of = _mode_of_model(reader, of_node, "an observer", node.span, model) if of_node else None
     _one_source(reader, table)
-    rows, columns = set(states), set(states)
+    rows = columns = set(states)
+    correct = table.get("correct")
     inputs = tuple(item.text for item in reader.items(table.get("inputs"), "inputs"))
     return Observer(
         states=states,
@@ -69,14 +60,36 @@ def read_observer(reader: Reader, node: Node, key: str, model: Automaton | None)
         at=_point(reader, table.get("at"), f"{key}.at", model),
         runs=runs,
         gain=gain,
-        covariance=reader.choice(
-            kalman.get("covariance"), "covariance", ("steady", "keep"), "steady"
-        ),
-        correct=reader.text(table.get("correct"), "correct", node.span)
-        if "correct" in table.entries
-        else None,
+        covariance=reader.choice(kalman.get("covariance"), "covariance", KEEPING, "steady"),
+        correct=reader.text(correct, "correct", node.span) if correct else None,
         limits=_limits(reader, kalman.get("covariance_range"), f"{key}.covariance_range", rows),
     )
+
+
+def _measures(reader: Reader, node: Node | None, key: str) -> dict[str, str]:
+    found = {}
+    for entry in reader.named(node, key):
+        found[entry.key] = reader.text(entry.node, f"measures.{entry.key}", entry.span)
+    return found
+
+
+def _complete(reader: Reader, table: Table, span: Span) -> None:
+    if "kalman" not in table.entries:
+        reader.problems.error("missing", span, "`kalman: {states: [...]}` is missing")
+    for name in ("measures", *NOISE_KEYS):
+        if name not in table.entries:
+            reader.problems.error("missing", span, f"`{name}` is missing in the observer")
+
+
+def _without_covariance(reader: Reader, table: Table, kalman: Table, runs: bool) -> None:
+    """A steady gain has no covariance that anything could change."""
+    for name in ("covariance", "covariance_range"):
+        if name in kalman.entries:
+            label = f"`{name}` belongs to `gain: recursive`"
+            reader.problems.error("observer", kalman.entries[name].span, label)
+    if runs:
+        label = "`predict: runs` needs `gain: recursive`: the run's mode changes the covariance"
+        reader.problems.error("observer", table.entries["predict"].span, label)
 
 
 def _limits(

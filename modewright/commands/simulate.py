@@ -54,7 +54,7 @@ def simulate(
     modewright simulate ev_driveline -s tip_out --set 'k_hs=6000 N*m/rad' --out run.csv
     """
     from engine.run_file import run_files
-    from modewright import api, show
+    from modewright import api
 
     require_run(out)
     require_writable(out, plot)
@@ -72,13 +72,19 @@ def simulate(
     if plot:
         files[plot] = _picture(trajectory, f"{system}, scenario {scenario}", plot)
     write_files(files)
+    _tell(trajectory, list(files), as_json)
+
+
+def _tell(trajectory: Trajectory, files: list[Path], as_json: bool) -> None:
+    from modewright import show
+
     if as_json:
         show.print_json(show.trajectory_json(trajectory))
     else:
         console().print(show.events_table(trajectory.events))
     stop_where(trajectory.stopped is not None, trajectory)
     if not as_json:
-        announce(list(files))
+        announce(files)
 
 
 def _picture(trajectory: Trajectory, title: str, plot: Path) -> bytes:

@@ -140,6 +140,32 @@ modes:
     transitions: {a: {when: changed(count) or changed(count > 3 or go)}}
 outputs: [count, mode]
 """,
+    "tables inside a chart": """\
+inputs: {u: {unit: "1"}, go: {type: bool}}
+events: {trip: {}, press: {from: input}}
+micro_steps: 4
+discrete: {permit: {type: bool, initial: false}, level: {initial: 0, range: [-9, 9]}}
+tables:
+  permission:
+    if: {big: u > 0.4, go: go}
+    rows: {"T T": {permit: true, level: level + 1}, "F -": {}, "T F": {permit: false}}
+initial: run
+modes:
+  run:
+    initial: idle
+    transition_table:
+      columns:
+        start: {when: permit, priority: 2}
+        pressed: {event: press, priority: 1, raise: trip}
+        beat: {when: every(20 ms) or changed(level), priority: 3}
+      rows:
+        idle: {start: busy, pressed: stay, beat: stay}
+        busy: {start: stay, pressed: idle, beat: idle}
+    modes: {idle: {entry: {level: -0.0}}, busy: {update: {level: level - 0.5}}}
+    transitions: {down: {event: trip, when: not permit}}
+  down: {transitions: {run: {when: u < 0, history: shallow}}}
+outputs: [level, permit, mode]
+""",
     "truth tables": """\
 inputs: {u: {unit: "1"}, go: {type: bool}}
 discrete:
