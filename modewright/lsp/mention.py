@@ -13,6 +13,10 @@ from modewright.lsp.world import World
 
 PREFIXES = ("initial", "inputs")
 """What stands before names in studies: `initial.plant.theta_d`, `inputs.T_req.start`."""
+OWN = ("template", "fault", "region")
+"""What is named inside one spec only; an event of a study is a mode that is entered."""
+OF_INSTANCE = (("values",), ("inputs",))
+"""Sections of an instance whose keys are its names, not ours."""
 SPECS = ("automaton", "system", "scenario", "map", "calibration", "spec", "effect")
 
 Part = tuple[int, str]
@@ -80,7 +84,7 @@ def meaning(world: World, space: Namespace, name: Name) -> Meaning:
             yield part, lookup(space, name.text, name.path[:-1])
     elif name.of == "column":
         yield whole, space.names.get(("column", column_name(name.path, name.text)))
-    elif (name.of, name.text) in space.names or name.of in ("template", "fault", "region"):
+    elif name.of in OWN or (name.of == "event" and (name.of, name.text) in space.names):
         yield whole, space.names.get((name.of, name.text))
     else:
         parts = _parts(name.text)
@@ -89,7 +93,7 @@ def meaning(world: World, space: Namespace, name: Name) -> Meaning:
             return
         if name.of == "signal" and "measures" in name.path and space.model:
             space = space.model
-        if name.path[:1] == ("instances",) and name.path[2:3] == ("values",):
+        if name.path[:1] == ("instances",) and name.is_key and name.path[2:3] in OF_INSTANCE:
             space = space.instances.get(name.path[1], space)
         if space.document.kind == "study" and parts[0][1] in PREFIXES:
             parts = parts[1:]
