@@ -60,6 +60,7 @@ CODES: Mapping[str, tuple[str, str]] = {
     "balance": ("MW315", "A balance is not linear in the derivative of its state."),
     "table": ("MW316", "A table is not whole, or is not read as it should be."),
     "order": ("MW317", "What has to ascend does not."),
+    "past": ("MW318", "An assignment may give a value past the range of its target."),
     # Layers: variants, effects, calibrations.
     "overlay": (
         "MW401",

@@ -1,0 +1,86 @@
+"""Check of values past their range: what an assignment may give beyond what its target may have.
+
+Looked at are values that are made of inputs alone: these may be anything within their ranges. How
+far a state gets is not known here, so what reads one gives no alarm; nor does a target with an
+`on_range`, a fault or a fallback of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from fractions import Fraction
+
+from language.declaration import Formula, Limits, State
+from language.inquiry import Inquiry, Witness
+from language.lower import WHOLE_TYPES, assigned
+from language.model import Automaton, Mode
+from language.moment import Moment
+from language.number import rounded
+from language.operation import Binary, Compare, Expr, real
+from language.problem import Problems, SpecError
+
+STATES = ("state.", "discrete.", "memory.")
+"""What is carried: how far it gets is not known."""
+
+
+def check_past(automaton: Automaton, inquiry: Inquiry, problems: Problems) -> None:
+    """Warn of assignments that may give a value past the range of their target, with a witness."""
+    for mode in automaton.all_modes:
+        for formulas, guard in _assignments(mode):
+            for name, formula in formulas.items():
+                target = automaton.carried.get(name)
+                if target is None or not _is_watched(target):
+                    continue
+                try:
+                    found = _past(automaton, mode, formula, guard, target, inquiry)
+                except (KeyError, SpecError):
+                    continue
+                if found:
+                    label = f"`{name}` may be past its range of {_shown(target)} here"
+                    hint = f"at {found.text} in SI; limit the value with `clip`, or widen the range"
+                    problems.warning("past", formula.span, label, hint)
+
+
+def _assignments(mode: Mode) -> Iterator[tuple[Mapping[str, Formula], Formula | None]]:
+    """Yield what a mode assigns, with the guard that holds then."""
+    for formulas in (mode.entry, mode.exit, mode.update):
+        yield formulas, None
+    for transition in mode.transitions:
+        if not (transition.events or transition.completes):
+            yield transition.reset, transition.when
+
+
+def _is_watched(target: State) -> bool:
+    """Tell whether a range is that of a real value, and nothing more is said about leaving it."""
+    return target.range is not None and target.type == "real" and target.limits == Limits()
+
+
+def _past(
+    automaton: Automaton,
+    mode: Mode,
+    formula: Formula,
+    guard: Formula | None,
+    target: State,
+    inquiry: Inquiry,
+) -> Witness | None:
+    moment = Moment(automaton, mode)
+    conditions: list[Expr] = [moment.expression(guard.tree)] if guard else []
+    moment.expression(formula.tree)
+    value = assigned(formula.tree, moment.known, target.type in WHOLE_TYPES)
+    assert target.range
+    low, high = (rounded(Fraction(bound), automaton.numbers) for bound in target.range)
+    if any(name.startswith(STATES) for name in inquiry.question(moment.story, [value]).read):
+        return None
+    below, above = Compare("<", value, real(low)), Compare(">", value, real(high))
+    found = inquiry.answer(
+        inquiry.question(moment.story, [*conditions, Binary("or", below, above)])
+    )
+    return found if isinstance(found, Witness) else None
+
+
+def _shown(target: State) -> str:
+    """Return a range in the unit of its declaration."""
+    assert target.range
+    unit = target.unit
+    low, high = (float((bound - unit.offset) / unit.factor) for bound in target.range)
+    return f"{low:.4g} to {high:.4g} {'' if unit.text == '1' else unit.text}".rstrip()
