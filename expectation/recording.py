@@ -27,9 +27,10 @@ def recording(
     every = scenario.every
     for name, instance in system.instances.items():
         automaton = instance.automaton
-        if automaton.period and is_chart(system, name) and "mode" in automaton.outputs:
+        if is_chart(system, name) and "mode" in automaton.outputs:
             read += mode_signals(system, name)
-            every = _common(every, automaton.period, instance.offset)
+            if automaton.period:
+                every = _common(every, automaton.period, instance.offset)
     horizon = scenario.horizon
     if every != scenario.every and horizon and horizon / every > MOST_ROWS:
         label = f"rows at all ticks of its charts are more than {MOST_ROWS}"
