@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import cast
 
 from language.chart import ROOT, Chart, Keeping, Kind, Node, Order, Signal
-from language.chart_target import inside
+from language.chart_initial import RawNode, set_initials
 from language.chart_way import ways_of
-from language.document import Entry, Items, Node as YamlNode, Scalar, Table
+from language.document import Entry, Items, Node as YamlNode, Table
 from language.mode import INNER_KEYS, REGION_KEYS, ModeReader
 from language.model import CHART, Mode, Region
 from language.names import check_region_name
-from language.problem import Span, nearest
+from language.problem import Span
 from language.reader import TEXT_KEYS
 
 CHART_KEYS = ("events", "order", "micro_steps")
@@ -55,25 +55,6 @@ def _tables(node: YamlNode | None) -> Iterator[Table]:
             yield entry.node
 
 
-@dataclass
-class _Raw:
-    """A node while it is read; indices are places in the list of all."""
-
-    name: str
-    path: str
-    kind: Kind
-    parent: int
-    region: str
-    is_region: bool
-    span: Span
-    table: Table
-    mode: Mode | None = None
-    children: list[int] = field(default_factory=list)
-    number: int | None = None
-    last: int = 0
-    initial: tuple[int, ...] = ()
-
-
 @dataclass(frozen=True)
 class ReadChart:
     """What was read: the chart and the regions beside it, the superstates, the tree."""
@@ -91,7 +72,7 @@ class ChartReader:
         self.problems = modes.problems
         self.root = root
         self.templates = modes.table(root.get("templates"), "templates")
-        self.raw: list[_Raw] = []
+        self.raw: list[RawNode] = []
         self.broken = False
 
     def read(self, at: Span) -> ReadChart:
@@ -99,7 +80,7 @@ class ChartReader:
         signals = self._signals()
         self.modes.events = tuple(signals)
         top = Table({}, at)
-        self.raw.append(_Raw("", "", "parallel", NOWHERE, "", False, at, top))
+        self.raw.append(RawNode("", "", "parallel", NOWHERE, "", False, at, top))
         entries = list(self.modes.table(self.root.get("regions"), "regions"))
         for entry in entries:
             check_region_name(entry.key, entry.span, self.problems)
@@ -114,7 +95,7 @@ class ChartReader:
             self.problems.error("missing", at, "a chart has at least one mode in `modes`")
             self.problems.stop_if_any()
         known = len(self.problems.found)
-        self._initials()
+        set_initials(self.raw, self.modes)
         if len(self.problems.found) > known or self.broken:
             self.problems.stop_if_any()
         nodes = tuple(self._node(index) for index in range(len(self.raw)))
@@ -167,7 +148,7 @@ class ChartReader:
         kind = self._kind(entry, table)
         if kind == "history":
             is_region, region = False, self.raw[parent].region
-        raw = _Raw(entry.key, path, kind, parent, region, is_region, entry.span, table)
+        raw = RawNode(entry.key, path, kind, parent, region, is_region, entry.span, table)
         self.raw.append(raw)
         self.raw[parent].children.append(index)
         is_root = is_region and parent == ROOT
@@ -190,7 +171,7 @@ class ChartReader:
                 hint = "it only says what is entered in the mode around it"
                 self.problems.error("form", own.span, label, hint)
 
-    def _inside(self, raw: _Raw, index: int, key: str, path: str, above: Mode | None) -> None:
+    def _inside(self, raw: RawNode, index: int, key: str, path: str, above: Mode | None) -> None:
         prefix = "" if path == CHART else f"{path}."
         if raw.kind == "parallel":
             for entry in self.modes.named(raw.table.get("regions"), f"{key}.regions"):
@@ -214,7 +195,7 @@ class ChartReader:
             return "compound"
         return "parallel" if "regions" in table.entries else "atomic"
 
-    def _mode(self, entry: Entry, raw: _Raw, key: str, above: Mode | None) -> Mode:
+    def _mode(self, entry: Entry, raw: RawNode, key: str, above: Mode | None) -> Mode:
         """Return the mode of a node; what superstates of its region hold is handed down."""
         name = raw.path.removeprefix(f"{raw.region}.") if raw.region != CHART else raw.path
         if raw.is_region:
@@ -232,52 +213,6 @@ class ChartReader:
         made = self.modes.inner_mode(named, body, self.root, position, raw.region, key, above)
         self.modes.completing = False
         return made
-
-    def _initials(self) -> None:
-        for index, raw in enumerate(self.raw):
-            if index != ROOT:
-                self._initial(index, raw)
-        for raw in self.raw:
-            if raw.kind == "history" and not raw.initial:
-                raw.initial = self.raw[raw.parent].initial
-
-    def _initial(self, index: int, raw: _Raw) -> None:
-        node = raw.table.get("initial")
-        if raw.kind == "history":
-            words = self._words(node, "initial", raw.span) if node else []
-            owner = raw.parent
-        elif raw.kind != "compound":
-            if node is not None:
-                label = f"`{raw.name}` has no modes inside: there is no `initial`"
-                self.problems.error("form", node.span, label)
-            return
-        else:
-            own = [c for c in raw.children if self.raw[c].kind != "history"]
-            if not own:
-                label = f"`{raw.name}` has no mode inside"
-                self.problems.error("missing", raw.span, label)
-                return
-            if node is None and len(own) == 1:
-                raw.initial = (own[0],)
-                return
-            words, owner = self._words(node, "initial", raw.span), index
-        found = []
-        for word in words:
-            hit = inside(self.raw, owner, word.text)
-            if hit is None or hit == index:
-                label = f"there is no mode `{word.text}` in `{self.raw[owner].name}`"
-                names = [self.raw[c].name for c in self.raw[owner].children]
-                self.problems.error("name", word.span, label, nearest(word.text, names))
-            else:
-                found.append(hit)
-        raw.initial = tuple(found)
-
-    def _words(self, node: YamlNode | None, what: str, at: Span) -> list[Scalar]:
-        """Return the names that stand in a list, or the only one."""
-        if isinstance(node, Items):
-            return self.modes.items(node, what)
-        word = self.modes.scalar(node, what, at)
-        return [word] if word else []
 
     def _node(self, index: int) -> Node:
         raw = self.raw[index]
