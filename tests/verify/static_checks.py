@@ -1,12 +1,15 @@
-"""Verify the static checks: the time for a large chart, alarms on shipped specs, kinds found."""
+"""Verify the static checks: the time for a large chart, alarms on shipped specs, kinds found.
+
+Times are those of the processor, the best of several: a busy machine changes little.
+"""
 
 from __future__ import annotations
 
 import json
+import resource
 import subprocess
 import sys
 import tempfile
-import time
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -52,11 +55,17 @@ def checked_chart() -> tuple[float, int]:
         (Path(folder) / "chart.yaml").write_text(large_chart())
         times, told = [], 0
         for _ in range(REPEATS):
-            start = time.perf_counter()
+            before = processor_time()
             done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
-            times.append(time.perf_counter() - start)
+            times.append(processor_time() - before)
             told = len(json.loads(done.stdout)["problems"])
     return min(times), told
+
+
+def processor_time() -> float:
+    """Return the processor time of all child processes so far [s]."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 if __name__ == "__main__":
