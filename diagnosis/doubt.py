@@ -7,7 +7,7 @@ tells that it is not the right one.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from diagnosis.bench import Bench
 from diagnosis.description import Description
@@ -29,20 +29,30 @@ LEFT = 3.0
 """Times the threshold that a term gains where an accepted effect leaves something over."""
 LEFT_PART = 0.3
 """And this part of what the effect gained: a strong one is never described quite well."""
+STILL = 0.5
+"""Units of its drifts below which a model with what was accepted needs none."""
 MORE = 1.5
 """A formula is the verdict where it gains so many times as much as what was accepted."""
 
 
 def is_doubtful(
-    says: Says, selection: Selection, loci: Sequence[Locus], bench: Bench, threshold: float
+    says: Says,
+    selection: Selection,
+    loci: Sequence[Locus],
+    bench: Bench,
+    threshold: float,
+    units: Mapping[str, float],
 ) -> bool:
-    """Tell whether a formula might say more than the verdict does."""
+    """Tell whether a formula might say more than the verdict does; `units` are those of drifts."""
     if says in ("unknown", "ambiguous"):
         return True
     if says == "nothing_missing":
         shrink = 1.0 / inflation(selection.base, bench.series)
         unexplained = max((locus.gain for locus in loci), default=0.0) * shrink
         return unexplained > UNEXPLAINED * threshold
+    drifts = selection.model.noises.drifts
+    if all(drifts.get(name, 0.0) < STILL * unit for name, unit in units.items()):
+        return False
     gained = sum(tried.evidence.train for tried in selection.accepted if tried.evidence)
     return _left_over(bench, selection.model, selection.accepted) > max(
         LEFT * threshold, LEFT_PART * gained

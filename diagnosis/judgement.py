@@ -67,7 +67,7 @@ def _judged_by_observer(case: Case, raw: Bench, ways: Sequence[Way], tell: Tell)
     selection = with_hidden(bench, selection, loci, UNKNOWN * most, tell)
     says = _says(selection, loci, bench, most)
     formula = None
-    if is_doubtful(says, selection, loci, bench, most):
+    if is_doubtful(says, selection, loci, bench, most, units):
         formula = described(bench, selection.base, loci, units, most, tell)
     if formula is not None and explains_more(formula, selection):
         says, selection = "unknown", selected_formula(selection, formula)
