@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -13,6 +13,9 @@ from modewright.commands.options import Json, usage_errors
 from modewright.console import announce, console
 from modewright.exits import PROBLEMS
 from modewright.files import make_folder
+
+if TYPE_CHECKING:
+    from diagnosis.dossier import Dossier
 
 SPAN = re.compile(r"(\d+(?:\.\d*)?) ?(s|min|h)")
 SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
@@ -23,36 +26,42 @@ Train = Annotated[
 Map = Annotated[
     str | None, typer.Option("--map", "-m", help="a map of columns, if not that of the spec")
 ]
+Out = Annotated[Path, typer.Option("--out", "-o", help="the folder of the results")]
+HeldOut = Annotated[
+    list[Path] | None,
+    typer.Option("--held-out", help="a recording opened after the verdict (repeatable)"),
+]
+Effects = Annotated[
+    Path | None, typer.Option("--effects", help="a folder of effects in place of those shipped")
+]
+Nats = Annotated[
+    str,
+    typer.Option(
+        "--thresholds",
+        help="what effects must gain: kept (by an earlier bootstrap), bootstrap, usual, a file",
+    ),
+]
+Budget = Annotated[
+    str, typer.Option("--budget", help="the longest time it may take: '90 s', '10min'")
+]
+Anyway = Annotated[bool, typer.Option("--anyway", help="conclude from recordings with errors too")]
+FailOn = Annotated[
+    str | None, typer.Option("--fail-on", help="a verdict that gives exit code 1: effect")
+]
+VERDICTS = ("effect", "nothing_missing", "unknown", "ambiguous")
 
 
 def diagnose(
     spec: Annotated[str, typer.Argument(help="an automaton: name or file")],
     train: Train,
-    out: Annotated[Path, typer.Option("--out", "-o", help="the folder of the results")],
-    held_out: Annotated[
-        list[Path] | None,
-        typer.Option("--held-out", help="a recording opened after the verdict (repeatable)"),
-    ] = None,
+    out: Out,
+    held_out: HeldOut = None,
     mapping: Map = None,
-    effects: Annotated[
-        Path | None, typer.Option("--effects", help="a folder of effects in place of those shipped")
-    ] = None,
-    thresholds: Annotated[
-        str,
-        typer.Option(
-            "--thresholds",
-            help="what effects must gain: kept (by an earlier bootstrap), bootstrap, usual, a file",
-        ),
-    ] = "kept",
-    budget: Annotated[
-        str, typer.Option("--budget", help="the longest time it may take: '90 s', '10min'")
-    ] = "10min",
-    anyway: Annotated[
-        bool, typer.Option("--anyway", help="conclude from recordings with errors too")
-    ] = False,
-    fail_on: Annotated[
-        str | None, typer.Option("--fail-on", help="a verdict that gives exit code 1: effect")
-    ] = None,
+    effects: Effects = None,
+    thresholds: Nats = "kept",
+    budget: Budget = "10min",
+    anyway: Anyway = False,
+    fail_on: FailOn = None,
     as_json: Json = False,
 ) -> None:
     """Say which physics a model lacks to show what was recorded, and write a model that has it.
@@ -66,14 +75,10 @@ def diagnose(
     modewright diagnose plant.yaml --train a.csv --train b.csv --thresholds bootstrap --out found
     modewright diagnose plant.yaml --train night.csv --out found --fail-on effect --json
     """
-    from diagnosis.dossier import verdict_json
-    from diagnosis.variant import needed
-    from modewright import show, show_diagnosis
     from modewright.diagnoses import diagnose as diagnosed
 
-    verdicts = ("effect", "nothing_missing", "unknown", "ambiguous")
-    if fail_on is not None and fail_on not in verdicts:
-        raise typer.BadParameter(f"one of {', '.join(verdicts)}", param_hint="--fail-on")
+    if fail_on is not None and fail_on not in VERDICTS:
+        raise typer.BadParameter(f"one of {', '.join(VERDICTS)}", param_hint="--fail-on")
     seconds = seconds_of(budget)
     make_folder(out)
     try:
@@ -86,6 +91,16 @@ def diagnose(
         print(f"what was found is kept in {out}; the same command goes on from there",
               file=sys.stderr)  # fmt: skip
         raise
+    _show(found, out, as_json)
+    if found.verdict.verdict == fail_on:
+        raise typer.Exit(PROBLEMS)
+
+
+def _show(found: Dossier, out: Path, as_json: bool) -> None:
+    from diagnosis.dossier import verdict_json
+    from diagnosis.variant import needed
+    from modewright import show, show_diagnosis
+
     for text in needed(found):
         print(f"note: {text}", file=sys.stderr)
     if as_json:
@@ -93,8 +108,6 @@ def diagnose(
     else:
         show_diagnosis.print_dossier(console(), found)
         announce([out / "report.html"])
-    if found.verdict.verdict == fail_on:
-        raise typer.Exit(PROBLEMS)
 
 
 def tell(text: str) -> None:
