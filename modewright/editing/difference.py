@@ -106,7 +106,7 @@ def _change(kind: Kind, thing: Thing, old: Node | None, new: Node | None) -> Cha
         aspect=thing.aspect,
         before=_text(old, left_out) if old else "",
         after=_text(new, left_out) if new else "",
-        note=_note(old, new) if old and new else "",
+        note=_note(old, new, thing.group == "parameters") if old and new else "",
         before_place=_place(old),
         after_place=_place(new),
     )
@@ -151,10 +151,15 @@ def _tree(scalar: Scalar) -> Tree | None:
         return None
 
 
-def _note(old: Node, new: Node) -> str:
-    """Return how much a number changed; that two quantities are equal in other units."""
+def _note(old: Node, new: Node, is_value: bool) -> str:
+    """Return how much a quantity changed, or that it is the same in another unit.
+
+    Of bare numbers that is told where they are values: a priority has no size.
+    """
     first, second = _number(old), _number(new)
     if first is None or second is None:
+        return ""
+    if first[1].is_number and second[1].is_number and not is_value:
         return ""
     if not fits(first[1], second[1]):
         return "other unit"

@@ -194,3 +194,11 @@ def test_a_spec_is_compared_with_what_it_was_in_a_revision(
     assert same.exit_code == 0
     refused = CliRunner().invoke(app, ["diff", "nowhere:more", "more"])
     assert "Git has no `nowhere` here" in str(refused.exception)
+
+
+def test_a_priority_has_no_size_but_a_factor_has() -> None:
+    (found,) = changes(BASE.replace("priority: 1", "priority: 3"))
+    assert (found.before, found.after, found.note) == ("1", "3", "")
+    text = BASE.replace("alpha: {value: 0.2 rad}", "alpha: {value: 0.2}")
+    (found,) = changes(text.replace("value: 0.2}", "value: 0.25}"), text)
+    assert found.note == "+25 %"
