@@ -74,6 +74,8 @@ def meaning(world: World, space: Namespace, name: Name) -> Meaning:
     whole = (0, name.text)
     if name.of in SPECS:
         yield whole, _spec(world, space, name)
+    elif name.of == "mode" and name.owner is not None:
+        yield whole, _mode_of_owner(space, name)
     elif name.of == "mode":
         is_key = name.path[-2:-1] == ("modes",) or name.path[-2:-1] == ("transitions",)
         last = name.text.rpartition(".")[2]
@@ -139,6 +141,16 @@ def _mode(space: Namespace, parts: Sequence[Part], path: tuple[str, ...]) -> Mea
     if len(parts) > 1:
         yield parts[0], space.names.get(("region", parts[0][1]))
     yield parts[-1], lookup(space, ".".join(text for _, text in parts), path)
+
+
+def _mode_of_owner(space: Namespace, name: Name) -> Declared | None:
+    """Return the mode of an instance, or of a region of one."""
+    head, _, region = (name.owner or "").partition(".")
+    if head in space.instances:
+        space = space.instances[head]
+    else:
+        region = head
+    return lookup(space, f"{region}.{name.text}" if region else name.text)
 
 
 def _of_model(space: Namespace, parts: Sequence[Part]) -> Meaning:

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from language.document import Document, Entry, Scalar, Table
+from language.document import Document, Entry, Items, Scalar, Table
 from language.parse import parse_balance, parse_expression
 from language.problem import Span, SpecError
-from language.syntax import Name as Read, names as names_in
+from language.syntax import Name as Read, Relation, walk
 from modewright.editing.guide import Place, places
-from modewright.editing.shape import MappingOf, Value
+from modewright.editing.shape import MappingOf, Part, Value
 
 FREE = ("points", "rows", "columns", "redirect", "steps", "table", "pages", "windows")
 """Sections whose keys are no names of the spec."""
@@ -18,13 +18,17 @@ FREE = ("points", "rows", "columns", "redirect", "steps", "table", "pages", "win
 
 @dataclass(frozen=True)
 class Name:
-    """A dotted name as it is written: where, by which keys, and what it is to name."""
+    """A dotted name as it is written: where, by which keys, and what it is to name.
+
+    A mode may be that of an instance, or of a region of one, which `owner` names.
+    """
 
     text: str
     span: Span
     path: tuple[str, ...]
     of: str = "value"
     is_key: bool = False
+    owner: str | None = None
 
 
 def names(document: Document) -> tuple[Name, ...]:
@@ -35,11 +39,25 @@ def names(document: Document) -> tuple[Name, ...]:
 def _names(document: Document) -> Iterator[Name]:
     yield Name(document.name, document.name_span, (document.kind,), "spec")
     for place in places(document.root):
-        if isinstance(place.node, Scalar):
+        if place.kind == Part("expectation") and isinstance(place.node, Table):
+            yield from _expected_modes(place, place.node)
+        elif place.path[:1] == ("expect",) and place.section == "modes":
+            continue
+        elif isinstance(place.node, Scalar):
             yield from _in_scalar(place, place.node)
         elif isinstance(place.node, Table) and isinstance(place.kind, MappingOf):
             for entry in place.node:
                 yield from _in_key(place, entry)
+
+
+def _expected_modes(place: Place, table: Table) -> Iterator[Name]:
+    """Modes that a test expects are those of the instance beside them."""
+    of, modes = table.get("of"), table.get("modes")
+    owner = of.text if isinstance(of, Scalar) else ""
+    for node in modes.nodes if isinstance(modes, Items) else ():
+        if isinstance(node, Scalar):
+            path = (*place.path, "modes")
+            yield Name(node.text, node.text_span, path, "mode", owner=owner)
 
 
 def _in_key(place: Place, entry: Entry) -> Iterator[Name]:
@@ -76,13 +94,23 @@ def _in_scalar(place: Place, scalar: Scalar) -> Iterator[Name]:
         case Value("name", of) if of:
             yield Name(scalar.text, scalar.text_span, place.path, of)
         case Value(("expression" | "balance" | "literal") as word, _):
-            for name in _read(scalar, word):
-                yield Name(name.path, name.span, place.path)
+            yield from _in_expression(place, scalar, word)
 
 
-def _read(scalar: Scalar, word: str) -> list[Read]:
+def _in_expression(place: Place, scalar: Scalar, word: str) -> Iterator[Name]:
+    """What stands beside `est.mode ==` is a mode of `est`."""
     try:
         trees = parse_balance(scalar) if word == "balance" else (parse_expression(scalar),)
     except SpecError:
-        return []
-    return [name for tree in trees for name in names_in(tree)]
+        return
+    parts = [part for tree in trees for part in walk(tree)]
+    owners: dict[Span, str] = {}
+    for part in parts:
+        match part:
+            case Relation(_, Read(path, _), Read(_, span), _) if path.split(".")[-1] == "mode":
+                owners[span] = path.removesuffix("mode").removesuffix(".")
+    for part in parts:
+        if isinstance(part, Read):
+            owner = owners.get(part.span)
+            of = "value" if owner is None else "mode"
+            yield Name(part.path, part.span, place.path, of, owner=owner)

@@ -38,6 +38,20 @@ modes: {waiting: {transitions: {ready: {when: main.closed}}}, ready: {}}
 initial: waiting
 outputs: [mode]
 """,
+    "closing": """\
+language: 1
+test: closing
+scenario: {of: pair, horizon: 1 s}
+expect:
+  first: {modes: [open, closed], of: right}
+  late: {that: right.mode == closed, at: end}
+""",
+    "pair": """\
+language: 1
+system: pair
+instances: {right: {of: contactor}}
+connections: {right.command: "true"}
+""",
     "slow": """\
 language: 1
 variant: slow
@@ -58,10 +72,10 @@ parameters: {t_close: 21 ms}
     ("group", "name", "places"),
     [
         ("value", "t_close", {"contactor": 2, "pack": 1, "slow": 2, "measured": 1}),
-        ("value", "command", {"contactor": 3, "pack": 1}),
-        ("mode", "closed", {"contactor": 2, "pack": 1, "slow": 1}),
-        ("mode", "open", {"contactor": 3, "slow": 1}),
-        ("spec", "contactor", {"contactor": 1, "pack": 1, "slow": 1, "measured": 1}),
+        ("value", "command", {"contactor": 3, "pack": 1, "pair": 1}),
+        ("mode", "closed", {"contactor": 2, "pack": 1, "closing": 2, "slow": 1}),
+        ("mode", "open", {"contactor": 3, "closing": 1, "slow": 1}),
+        ("spec", "contactor", {"contactor": 1, "pack": 1, "pair": 1, "slow": 1, "measured": 1}),
     ],
 )
 def test_a_name_is_followed_through_instances_variants_and_calibrations(
