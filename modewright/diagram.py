@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from language.document import Document, Entry, Node, Scalar, Table
+from language.document import Document, Entry, Items, Node, Scalar, Table
 from language.overlay import lay, without
 from language.problem import Problems
 from language.text import shortened, visible
@@ -202,10 +202,17 @@ def _arrows(path: Key, mode: Table, known: set[Key]) -> Iterator[Arrow]:
     transitions = mode.get("transitions")
     for entry in transitions if isinstance(transitions, Table) else ():
         if isinstance(entry.node, Table):
-            name = _text(entry.node.get("to")) or entry.key
-            target = _target(tuple(name.split(".")), path, known)
-            if target:
-                yield Arrow(path, target, tuple(_label(entry.node)), entry.key)
+            for name in _names(entry.node.get("to"), entry.key):
+                target = _target(tuple(name.split(".")), path, known)
+                if target:
+                    yield Arrow(path, target, tuple(_label(entry.node)), entry.key)
+
+
+def _names(to: Node | None, key: str) -> list[str]:
+    """Return the targets of a transition: those of a list, the only one, or its key."""
+    if isinstance(to, Items):
+        return [_text(item) for item in to.nodes]
+    return [_text(to) or key]
 
 
 def _target(name: Key, path: Key, known: set[Key]) -> Key | None:

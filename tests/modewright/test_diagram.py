@@ -83,6 +83,18 @@ def test_a_transition_that_leaves_an_outer_mode_starts_there_and_names_its_sourc
     assert "from slow" in shown(nested().svg())
 
 
+def test_a_transition_with_several_targets_has_an_arrow_to_each_and_none_without_one() -> None:
+    text = NESTED.replace(
+        "run: {event: clear, when: ok}", "on_both: {to: [run, run.fast], event: e}"
+    )
+    text = text.replace("slow: {when: v < 2 m/s}", "slow: {to: [], when: v < 2 m/s}")
+    arrows = {(a.source, a.target) for a in diagram_of(document_of(Source("a"), text)).arrows}
+    both = {(("fault",), ("run",)), (("fault",), ("run", "fast"))}
+    ends = {tuple(tuple(p for p in path if p != "chart") for path in pair) for pair in arrows}
+    assert both <= ends
+    assert (("run", "fast"), ("run", "slow")) not in ends
+
+
 def test_what_a_mode_takes_from_a_template_is_shown() -> None:
     text = """\
 language: 1
