@@ -13,6 +13,7 @@ from language.parameter import parameter_order
 from language.problem import Problems, SpecError
 from language.region import sources
 from language.syntax import Likeness, Tree
+from language.truth import decisions
 
 HELP = {
     "divisor": "exclude 0 by an enclosing `if`, or by `max(..., limit)`",
@@ -56,8 +57,8 @@ class _ModeDomains:
         ranging = self.ranging
         for name in equation_order(self.mode):
             self.look(name)
-        decided = self.automaton.decisions if self.mode.region == CHART else ()
-        for formula in (*actions(self.mode), *decided):
+        tables = self.automaton.tables if self.mode.region == CHART else ()
+        for formula in (*actions(self.mode), *decisions(tables)):
             ranging.expression(formula.tree)
         for balance in self.mode.flow.values():
             ranging.expression(balance.right)

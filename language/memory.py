@@ -44,6 +44,7 @@ from language.syntax import (
     memory_key,
     walk,
 )
+from language.truth import decisions
 
 MAX_DELAY = 4096
 """Longest delay in values kept: 32 kB of an instance."""
@@ -104,7 +105,7 @@ def applications(automaton: Automaton, functions: tuple[str, ...]) -> dict[str, 
 def remembering(automaton: Automaton) -> tuple[Application, ...]:
     """Return every use of a function with memory; what is inside of one comes before it."""
     found: list[Application] = []
-    trees = [formula.tree for formula in automaton.decisions]
+    trees = [formula.tree for formula in decisions(automaton.tables)]
     for mode in automaton.all_modes:
         trees += [formula.tree for formula in formulas(mode)]
         trees += [balance.right for balance in mode.flow.values()]

@@ -281,14 +281,6 @@ class Automaton:
         return self.region(transition.region).modes[transition.target]
 
     @cached_property
-    def decisions(self) -> tuple[Formula, ...]:
-        """The conditions of the truth tables, and what their rows write."""
-        tables = self.tables
-        conditions = [formula for table in tables for formula in table.conditions.values()]
-        rows = [row for table in tables for row in table.rows]
-        return (*conditions, *(formula for row in rows for formula in row.results.values()))
-
-    @cached_property
     def carried(self) -> Mapping[str, State]:
         """The states and discrete variables: all that assignments may write."""
         return {**self.states, **self.discrete}

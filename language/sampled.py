@@ -11,33 +11,30 @@ from __future__ import annotations
 import dataclasses
 
 from language.action import (
-    action_variables,
     committing,
-    discrete_variables,
     entry,
     first_entry,
     reading,
 )
-from language.activation import activation_variables, elapse
+from language.activation import elapse
 from language.chart import Chart
 from language.charting import Charting
 from language.constants import derive_block, parameter_constants, values_of
-from language.covariance import COVARIANCE_RANGE, covariance_variables
-from language.decision import decision_block, decision_variables
+from language.covariance import COVARIANCE_RANGE
+from language.decision import decision_block
 from language.evaluate import Scalar
 from language.event import capacity
 from language.fault import FAULT_GUARD, fault_names, with_fault_transitions
-from language.invariant import INVARIANTS, invariant_block, invariant_variables
-from language.kalman import Kalman, kalman, observer_variables
+from language.invariant import INVARIANTS, invariant_block
+from language.kalman import Kalman, kalman
 from language.limit import (
     HAPPENED,
     MICRO_STEP_LIMIT,
     first_latched,
     latch,
-    limit_variables,
 )
 from language.lower import equation_names, equations, variable_names
-from language.memory import delays_of, keep_block, memory_variables, with_delays
+from language.memory import delays_of, keep_block, with_delays
 from language.micro_step import chart_blocks, chart_variables, first_entries, nothing_left
 from language.model import CHART, Automaton, Mode
 from language.operation import (
@@ -59,12 +56,12 @@ from language.program import (
     ModeInfo,
     MotionInfo,
     Program,
-    Variable,
 )
 from language.recursive import recursive
 from language.region import in_modes
-from language.rewind import REWIND_LIMIT, advance_blocks, rewind_blocks, rewind_variables
+from language.rewind import REWIND_LIMIT, advance_blocks, rewind_blocks
 from language.run import EVENT_LIMIT, run_motion, start_regions
+from language.sampled_variable import sampled_variables
 from language.stamp import STALE_CALIBRATION, STAMPS, stamps_block, stamps_of
 from language.tick import by_mode, tick_block
 from language.transition import enter_run, sampled_commit, sampled_jump, transition_infos
@@ -73,9 +70,6 @@ from language.wiring import (
     enter_initial,
     finished,
     initial_ops,
-    input_variables,
-    mode_and_fired,
-    state_variables,
 )
 
 STARTED = Assign("memory.started", Value(True))
@@ -137,7 +131,8 @@ class _Sampled:
         automaton = self.automaton
         modes = automaton.modes.values()
         blocks: dict[str, Block] = {}
-        variables = self._variables()
+        of_chart = chart_variables(self.charting) if self.charting else []
+        variables = sampled_variables(automaton, self.transitions, self.delays, of_chart)
         runs = [mode.run for mode in modes if mode.run]
         if runs:
             motion = run_motion(automaton, runs, self.values, self.problems)
@@ -208,35 +203,6 @@ class _Sampled:
             "init": self._init(bool(stamps)),
             "step": self._step(),
         }
-
-    def _variables(self) -> list[Variable]:
-        automaton = self.automaton
-        found = input_variables(automaton, "input")
-        measured = [m.observer.measures for m in automaton.modes.values() if m.observer]
-        for name in dict.fromkeys(name for measures in measured for name in measures):
-            about = f"{name} is a new value in this tick"
-            found.append(Variable(f"is_new.{name}", "truth", about=about))
-        found += state_variables(automaton)
-        found += discrete_variables(automaton)
-        found += input_variables(automaton, "before")
-        for info in self.transitions:
-            if info.timer:
-                about = f"ticks that the guard has been true, at most {info.ticks + 1}"
-                found.append(Variable(info.timer, "whole", about=about))
-        found += observer_variables(automaton)
-        found += covariance_variables(automaton)
-        found += memory_variables(automaton, self.delays)
-        found += activation_variables(automaton)
-        found += rewind_variables(automaton)
-        found += mode_and_fired(automaton, "tick")
-        found += chart_variables(self.charting) if self.charting else ()
-        found.append(Variable("memory.started", "truth", about="the first tick is done"))
-        found.append(Variable("memory.faults", "whole", about="latched fault bits"))
-        found += action_variables(automaton)
-        found += decision_variables(automaton)
-        found += limit_variables(automaton)
-        found += invariant_variables(automaton)
-        return list({variable.name: variable for variable in found}.values())
 
     def _run_modes(self) -> tuple[ModeInfo, ...]:
         assert self.automaton.model

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from language.declaration import Formula
@@ -33,3 +33,12 @@ class TruthTable:
     def written(self) -> tuple[str, ...]:
         """The discrete variables that some row writes, each once."""
         return tuple(dict.fromkeys(name for row in self.rows for name in row.results))
+
+
+def decisions(tables: Iterable[TruthTable]) -> list[Formula]:
+    """Return the conditions of truth tables, and what their rows write."""
+    found: list[Formula] = []
+    for table in tables:
+        found += table.conditions.values()
+        found += (formula for row in table.rows for formula in row.results.values())
+    return found

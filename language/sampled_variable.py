@@ -1,0 +1,63 @@
+"""Sampled variable: what a ticking automaton carries, and what it computes with."""
+
+from __future__ import annotations
+
+from language.action import (
+    action_variables,
+    discrete_variables,
+)
+from language.activation import activation_variables
+from language.covariance import covariance_variables
+from language.decision import decision_variables
+from language.invariant import invariant_variables
+from language.kalman import observer_variables
+from language.limit import (
+    limit_variables,
+)
+from language.memory import Delay, memory_variables
+from language.model import Automaton
+from language.program import (
+    TransitionInfo,
+    Variable,
+)
+from language.rewind import rewind_variables
+from language.wiring import (
+    input_variables,
+    mode_and_fired,
+    state_variables,
+)
+
+
+def sampled_variables(
+    automaton: Automaton,
+    transitions: tuple[TransitionInfo, ...],
+    delays: tuple[Delay, ...],
+    of_chart: list[Variable],
+) -> list[Variable]:
+    """Return the variables of a sampled automaton; `finished` leaves out what is not used."""
+    found = input_variables(automaton, "input")
+    measured = [m.observer.measures for m in automaton.modes.values() if m.observer]
+    for name in dict.fromkeys(name for measures in measured for name in measures):
+        about = f"{name} is a new value in this tick"
+        found.append(Variable(f"is_new.{name}", "truth", about=about))
+    found += state_variables(automaton)
+    found += discrete_variables(automaton)
+    found += input_variables(automaton, "before")
+    for info in transitions:
+        if info.timer:
+            about = f"ticks that the guard has been true, at most {info.ticks + 1}"
+            found.append(Variable(info.timer, "whole", about=about))
+    found += observer_variables(automaton)
+    found += covariance_variables(automaton)
+    found += memory_variables(automaton, delays)
+    found += activation_variables(automaton)
+    found += rewind_variables(automaton)
+    found += mode_and_fired(automaton, "tick")
+    found += of_chart
+    found.append(Variable("memory.started", "truth", about="the first tick is done"))
+    found.append(Variable("memory.faults", "whole", about="latched fault bits"))
+    found += action_variables(automaton)
+    found += decision_variables(automaton)
+    found += limit_variables(automaton)
+    found += invariant_variables(automaton)
+    return list({variable.name: variable for variable in found}.values())
