@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from fractions import Fraction
 
+from language.elimination import Inequality, is_infeasible
 from language.operation import Binary, Call, Compare, Expr, Ref, Unary, Value
 from language.question import Extent, Question
 
@@ -32,6 +33,7 @@ def narrowed(question: Question) -> dict[str, Extent] | None:
     forms = _Forms(question)
     bounds: dict[Direction, _Bounds] = {}
     truths: dict[str, bool] = {}
+    inequalities: list[Inequality] = []
     for condition in question.conditions:
         for part, is_true in _together(condition, True, forms):
             match part:
@@ -44,7 +46,19 @@ def narrowed(question: Question) -> dict[str, Extent] | None:
                     relation = str(operator) if is_true else OPPOSITE[operator]
                     if found is not None and _contradicts(found, relation, bounds, question):
                         return None
+                    inequalities += _inequalities(found, relation)
+    if is_infeasible(inequalities):
+        return None
     return {**_narrower(bounds, question), **_certain(truths, question)}
+
+
+def _inequalities(form: Form | None, operator: str) -> Iterator[Inequality]:
+    """Yield what `form operator 0` says, as what is above 0."""
+    if form is not None and operator in (">", ">=", "=="):
+        yield form[0], form[1], operator == ">"
+    if form is not None and operator in ("<", "<=", "=="):
+        factors = {name: -value for name, value in form[0].items()}
+        yield factors, -form[1], operator == "<"
 
 
 def _narrower(bounds: Mapping[Direction, _Bounds], question: Question) -> dict[str, Extent]:

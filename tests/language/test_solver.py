@@ -105,6 +105,8 @@ def test_a_point_outside_of_the_extents_is_no_witness() -> None:
         ("x + y > 1 and p", "-y >= x"),
         ("not (x < 2 or p)", "x / 2 <= 0.75"),
         ("x + n > 13",),
+        ("x > 1", "y > x", "y < 1"),
+        ("y - x > 0", "x - 2 * y > 0", "y >= 0"),
         ("p", "x > 0 and not p"),
     ],
 )

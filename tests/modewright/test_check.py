@@ -22,7 +22,7 @@ flow:
   x: der(x) = w
 outputs: [x]
 """
-HEAVY = ("numpy", "scipy", "matplotlib", "jinja2", "filterpy")
+HEAVY = ("numpy", "scipy", "matplotlib", "jinja2", "filterpy", "z3")
 
 
 def test_check_loads_neither_numerics_nor_generator() -> None:
