@@ -28,8 +28,9 @@ def along(bench: Bench, free: Estimate, drifts: Sequence[Reals]) -> tuple[tuple[
     found = []
     for name, parts in _columns(bench, free).items():
         values = np.concatenate(parts)
-        if np.std(values) > 0.0:
-            found.append((name, float(np.corrcoef(values, np.concatenate(drifts))[0, 1])))
+        together = np.concatenate(drifts)
+        if np.std(values) > 0.0 and np.std(together) > 0.0:
+            found.append((name, float(np.corrcoef(values, together)[0, 1])))
     found.append(("the recording (not the same in each)", _between(drifts)))
     found += [(name, _order(target, angles)) for name, angles in _angles(bench, free).items()]
     found = [(name, value) for name, value in found if np.isfinite(value)]

@@ -39,6 +39,8 @@ from language.load import automaton_of
 from language.model import Automaton
 from language.problem import SpecError
 
+LITTLE_MORE = 1.1
+"""Part of the misfit of simulation from which on a signal is simulated worse."""
 MUCH_LESS = 0.8
 """Part of the misfit of simulation that is left at most where an effect is confirmed by it."""
 
@@ -84,6 +86,8 @@ def diagnose(case: Case, tell: Tell = lambda text: None) -> Diagnosis:
     hashes = {case.name_of(path): _digest(path) for path in case.train}
     verdict = dataclasses.replace(verdict, inputs=hashes, messages=(place_sentence(loci, bench),))
     held, unread = _held_out(case, automaton, seen, bench.series[0].is_linear)
+    for text in unread:
+        tell(text)
     if held:
         tell(
             "held out: "
@@ -173,16 +177,16 @@ def _named_alone(tried: Tried, automaton: Automaton) -> Named:
 def _confirmed(verdict: Verdict, selection: Selection, held: tuple[Series, ...]) -> Verdict:
     """Return the verdict with what the held out recordings say of it.
 
-    They confirm it where they are foreseen better, or simulated better in every signal: a base that
-    drifts may foresee as well without knowing why.
+    They confirm it where they are foreseen better and no signal is simulated worse, or each much
+    better: a base that drifts may foresee as well without knowing why.
     """
     base = adapted(selection.base, held)
     model = adapted(selection.model, held)
     shown = misfits(base, model, held)
     fit = {**verdict.fit, "held_out": shown}
-    is_better = model.likelihood < base.likelihood or all(
-        one.nrmse_after < MUCH_LESS * one.nrmse_before for one in shown.values()
-    )
+    left = [one.nrmse_after / one.nrmse_before for one in shown.values() if one.nrmse_before]
+    is_foreseen = model.likelihood < base.likelihood and max(left, default=0.0) < LITTLE_MORE
+    is_better = is_foreseen or max(left, default=1.0) < MUCH_LESS
     confirmed = is_better if selection.accepted else None
     return dataclasses.replace(verdict, fit=fit, confirmed=confirmed)
 

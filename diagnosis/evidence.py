@@ -83,7 +83,7 @@ def inflation(model: Estimate, series: Sequence[Series]) -> float:
         whole = [e[np.isfinite(e[:, channel]), channel] for e in model.outcome.innovations]
         power = sum(float(e @ e) for e in whole)
         total = 1.0
-        for lag in range(1, lags + 1):
+        for lag in range(1, lags + 1) if power > 0.0 else ():
             together = sum(float(e[lag:] @ e[:-lag]) for e in whole if len(e) > lag)
             total += 2.0 * (together / power) ** 2
         found.append(total)

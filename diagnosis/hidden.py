@@ -19,12 +19,14 @@ from diagnosis.layers import DRIFT, Layer, fitting
 from diagnosis.level import units_of
 from diagnosis.locus import Locus
 from diagnosis.search import Tell, Tried
-from diagnosis.selection import Selection
+from diagnosis.selection import Selection, counted
 
 MOST = 0.8
 """Part of the squares of a drift that its loudest samples have."""
 SHORT = 0.22
 """Part of all samples that these are at most, of what acts in windows."""
+KNOWN = 0.8
+"""Correlation with something known from which on an input is not hidden: it follows that."""
 LITTLE = 0.5
 """Part of what it gains that effects explain less of, if it is to stand for them."""
 ROUNDS = 5
@@ -46,7 +48,7 @@ def with_hidden(
     base = selection.base
     shrink = 1.0 / inflation(base, bench.series)
     loud = [one for one in loci if _layer(bench, one) and shrink * one.gain > needed]
-    if not loud:
+    if not loud or any(abs(r) > KNOWN for _, r in loud[0].along):
         return selection
     locus, quiet = loud[0], freed(bench, base)
     drift = next(d for d in bench.drifts if d.place == locus.place)
@@ -58,7 +60,7 @@ def with_hidden(
         if quiet.cost - without.cost > LITTLE * (quiet.cost - model.cost):
             return selection
     known, layer = evidence(model, quiet, bench.series), _layer(bench, locus)
-    if layer is None or known.least < needed:
+    if layer is None or counted(known) < needed:
         return selection
     tell(f"accepted {layer.id}: {known.least:.0f} nats, silent most of the time")
     found = Tried(layer, quiet.cost - model.cost, model, known)

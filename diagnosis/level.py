@@ -161,7 +161,7 @@ def first_fit(
     How far innovations usually are out, beyond which they count no more, is known after it.
     """
     first = settled(candidate, series, noises_of(series, units), {}, units, turns=1)
-    limits = FAR * first.outcome.robust()
+    limits = FAR * np.maximum(first.outcome.robust(), 1e-12)
     return dataclasses.replace(first, noises=dataclasses.replace(first.noises, limits=limits))
 
 

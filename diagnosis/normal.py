@@ -76,7 +76,7 @@ def normal_of(candidate: Candidate, outcome: Outcome, columns: Columns) -> Norma
         known = np.isfinite(innovation)
         far = np.maximum(np.abs(innovation) / outcome.limits, 1.0)
         each = [columns[name][r][part] * known for name in candidate.names]
-        jacobian = np.array(each).reshape(count, -1)
+        jacobian = np.array(each).reshape(count, innovation.size)
         weighted = jacobian * np.where(known, scale / far, 0.0).reshape(-1)
         a[place] = weighted @ jacobian.T
         g[place] = weighted @ np.where(known, innovation, 0.0).reshape(-1)

@@ -108,6 +108,7 @@ def _about_models(dossier: Dossier, shown: Sequence[Shown]) -> dict[str, Any]:
 
 def _about_data(dossier: Dossier) -> dict[str, Any]:
     return {
+        "unread": dossier.diagnosis.unread if dossier.diagnosis else (),
         "findings": [(s, listing.in_parts(text)) for s, text in told(dossier.findings)],
         "recordings": listing.recording_rows(dossier),
         "untestable": listing.untestable(dossier),

@@ -102,6 +102,9 @@ def series_of(
     fed = {c.column.to: c for c in recording.channels.values() if c.column.to is not None}
     compared = {c.column.compare: c for c in recording.channels.values() if c.column.compare}
     used = [*fed.values(), *(compared[name] for name in seen if name in compared)]
+    short = next((channel for channel in used if len(channel.times) < 2), None)
+    if short is not None:
+        raise ValueError(f"{recording.name}: `{short.column.name}` has one sample only")
     end = min(channel.times[-1] for channel in used)
     start = _start([compared[name] for name in seen if name in compared], used)
     step = period or min(grid_period(channel.seconds) for channel in used)

@@ -22,6 +22,16 @@ def test_a_model_that_lacks_nothing_is_told_so(tmp_path: Path) -> None:
     assert "lacks nothing" in (folder / "found" / "report.html").read_text("utf-8")
 
 
+@pytest.mark.parametrize("seen", [0.0, 7.5])
+def test_a_signal_that_never_moves_is_no_defect_of_ours(tmp_path: Path, seen: float) -> None:
+    folder = bench(tmp_path / "still", T_c=0.0)
+    for k in range(2):
+        rows = [f"{i / 100:.2f},0,{seen}" for i in range(1000)]
+        text = "t_s,torque,speed\n" + "\n".join(rows) + "\n"
+        (folder / f"run_{k}.csv").write_text(text, "utf-8")
+    assert run(folder, *COMMAND, "--out", "found", "--anyway") == 0
+
+
 def test_a_torque_that_acts_in_windows_is_an_unknown_input(tmp_path: Path) -> None:
     folder = bench(tmp_path / "struck", T_c=0.0, hit=3.0)
     assert run(folder, *COMMAND, "--out", "found") == 0
@@ -32,6 +42,30 @@ def test_a_torque_that_acts_in_windows_is_an_unknown_input(tmp_path: Path) -> No
     loud = [window for window in verdict["location"]["windows"] if window[1] - window[0] > 0.5]
     assert {(round(start), file) for start, _, file in loud} == {(2, "run_0.csv"), (5, "run_1.csv")}
     assert run(folder, "check", "found/variant.yaml") == 0
+
+
+def test_what_is_held_out_and_cannot_be_used_is_told_on_the_screen_and_in_the_report(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = bench(tmp_path / "broken", T_c=0.0)
+    (folder / "run_2.csv").write_text("t_s,torque,speed\n0,1,2\n", "utf-8")
+    assert run(folder, *COMMAND, "--out", "found") == 0
+    told = "run_2.csv was held out and cannot be used: run_2.csv: `torque` has one sample only"
+    assert told in capsys.readouterr().err
+    page = (folder / "found" / "report.html").read_text("utf-8")
+    assert told.replace("`", "") in page.replace("`", "")
+
+
+def test_a_spec_without_a_range_is_diagnosed_as_it_is(tmp_path: Path) -> None:
+    folder = bench(tmp_path / "exact")
+    path = folder / "spec" / "spinner.yaml"
+    text = (
+        path.read_text("utf-8").replace("range: [0.3, 0.8]", "").replace("range: [0.01, 0.5]", "")
+    )
+    path.write_text(text.replace("0.5 kg*m^2,", "0.55 kg*m^2").replace("rad, }", "rad}"), "utf-8")
+    assert run(folder, *COMMAND, "--out", "found") == 0
+    verdict = json.loads((folder / "found" / "verdict.json").read_text("utf-8"))
+    assert verdict["verdict"] in ("effect", "ambiguous")
 
 
 def test_a_budget_that_is_over_leaves_what_was_found_and_what_to_go_on_from(
