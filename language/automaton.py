@@ -290,12 +290,11 @@ class _AutomatonReader(Reader):
             neutral, _ = self.quantity(node, "neutral", node.span, unit)
             if limits and not limits[0] <= neutral <= limits[1]:
                 self.problems.error("range", node.span, "the neutral value is outside the range")
-        starts = []
-        for item in self.items(table.get("starts"), "starts"):
-            start, _ = self.quantity(item, "starts", item.span, unit)
+        items = self.items(table.get("starts"), "starts")
+        starts = [self.quantity(item, "starts", item.span, unit)[0] for item in items]
+        for item, start in zip(items, starts, strict=True):
             if limits and not limits[0] <= start <= limits[1]:
                 self.problems.error("range", item.span, "this start is outside the range")
-            starts.append(start)
         per = self.choice(table.get("per"), "per", ("model", "recording"), "model")
         form = self.choice(table.get("form"), "form", FORMS, "constant")
         return Fitting(neutral, tuple(starts), cast(Per, per), cast(Form, form))

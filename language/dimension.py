@@ -17,6 +17,7 @@ from language.kind import (
     as_real,
     combined,
     said,
+    wholes_of,
 )
 from language.problem import Problems, Span, nearest
 from language.syntax import (
@@ -197,7 +198,7 @@ class DimensionCheck:
 
     def _arithmetic(self, tree: Arithmetic) -> Dimension | Whole | None:
         first, second = self.kind(tree.left), self.kind(tree.right)
-        wholes = _wholes(tree.left, first, tree.right, second)
+        wholes = wholes_of(tree.left, first, tree.right, second)
         if wholes and tree.operator != "/":
             return self._safe(combined(tree.operator, *wholes), tree)
         left, right = self._number(first, tree.left), self._number(second, tree.right)
@@ -249,7 +250,7 @@ class DimensionCheck:
     def _relation(self, tree: Relation) -> Truthful:
         first, second = self.kind(tree.left), self.kind(tree.right)
         equality = tree.operator in ("==", "!=")
-        if _wholes(tree.left, first, tree.right, second):
+        if wholes_of(tree.left, first, tree.right, second):
             return "truth"
         if equality and (first is None or second is None):
             return "truth"
@@ -275,7 +276,7 @@ class DimensionCheck:
         first, second = self.kind(tree.then), self.kind(tree.other)
         if first is None or second is None:
             return None
-        wholes = _wholes(tree.then, first, tree.other, second)
+        wholes = wholes_of(tree.then, first, tree.other, second)
         if wholes:
             return wholes[0].joined(wholes[1])
         left, right = as_real(first), as_real(second)
@@ -288,16 +289,3 @@ class DimensionCheck:
             self.report("type", tree.span, label)
             return None
         return left
-
-
-def _wholes(
-    a: Tree, first: Kind | None, b: Tree, second: Kind | None
-) -> tuple[Whole, Whole] | None:
-    """Return both as whole numbers where one is, and the other is too or is a literal like `2`."""
-    if isinstance(first, Whole) and isinstance(second, Whole):
-        return first, second
-    if isinstance(first, Whole) and (value := whole_literal(b)) is not None:
-        return first, Whole(value, value)
-    if isinstance(second, Whole) and (value := whole_literal(a)) is not None:
-        return Whole(value, value), second
-    return None

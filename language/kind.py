@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from language.syntax import Tree, whole_literal
 from language.units import NUMBER, Dimension
 
 Type = Literal["real", "int", "bool", "enum"]
@@ -72,3 +73,16 @@ def said(kind: Kind) -> str:
     if isinstance(kind, Enumeration):
         return f"one of {', '.join(kind.values)}"
     return "a whole number" if isinstance(kind, Whole) else "a quantity"
+
+
+def wholes_of(
+    a: Tree, first: Kind | None, b: Tree, second: Kind | None
+) -> tuple[Whole, Whole] | None:
+    """Return both as whole numbers where one is, and the other is too or is a literal like `2`."""
+    if isinstance(first, Whole) and isinstance(second, Whole):
+        return first, second
+    if isinstance(first, Whole) and (value := whole_literal(b)) is not None:
+        return first, Whole(value, value)
+    if isinstance(second, Whole) and (value := whole_literal(a)) is not None:
+        return Whole(value, value), second
+    return None

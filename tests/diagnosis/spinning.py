@@ -35,6 +35,16 @@ map: bench_columns
 time: {column: t_s, unit: s}
 columns: {torque: {to: T, unit: N*m}, speed: {compare: w, unit: rad/s}}
 """
+RIDER = """language: 1
+automaton: rider
+period: 5 ms
+numbers: float64
+model: spinner_diagnosed
+inputs: {T: {unit: N*m, range: [-50, 50]}}
+states: {w: {initial: 0 rad/s, range: [-300, 300]}}
+modes: {run: {runs: {of: spinner_diagnosed.turning, method: rk4, substeps: 2, events: 4}}}
+outputs: [w]
+"""
 EFFECTS = ("coulomb_friction", "torque_gain", "unknown_input", "viscous_friction")
 J, B, T_C = 0.55, 0.12, 2.0
 """What the rotor really has: inertia [kg*m^2], viscous [N*m*s/rad] and dry friction [N*m]."""

@@ -27,18 +27,8 @@ from diagnosis.dossier import verdict_json
 from diagnosis.shelf import Shelf, hash_of
 from diagnosis.variant import needed
 from modewright.diagnoses import base_of
-from tests.diagnosis.spinning import COMMAND, SCHEMA, T_C, B, J, bench, run
+from tests.diagnosis.spinning import COMMAND, RIDER, SCHEMA, T_C, B, J, bench, run
 
-RIDER = """language: 1
-automaton: rider
-period: 5 ms
-numbers: float64
-model: spinner_diagnosed
-inputs: {T: {unit: N*m, range: [-50, 50]}}
-states: {w: {initial: 0 rad/s, range: [-300, 300]}}
-modes: {run: {runs: {of: spinner_diagnosed.turning, method: rk4, substeps: 2, events: 4}}}
-outputs: [w]
-"""
 RIG = """language: 1
 system: rig
 inputs: {T: {unit: N*m}}
