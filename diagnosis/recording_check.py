@@ -12,6 +12,7 @@ from diagnosis.consistency import Relation, relations
 from diagnosis.disagreement import disagreements
 from diagnosis.excitation import Excitation, excitation
 from diagnosis.finding import Finding, by_severity
+from diagnosis.outlier import outliers, pauses, without_huge
 from engine.interpreter import Interpreter, Stepper
 from engine.recording import Recording, pieces
 from language.experiment import RecordingMap
@@ -21,6 +22,8 @@ from language.program import Program
 Mistakes = Callable[[Sequence[Recording]], list[Finding] | None]
 SHORTEST = 2.0
 """Time of a recording below which it tells nothing [s]: an observer needs 0.5 s to find in."""
+BROKEN = ("no_signal", "too_short", "outlier", "leap")
+"""Findings after which a recording is compared with nothing."""
 FEWEST = 100
 """Samples of a channel below which nothing can be told apart."""
 
@@ -57,15 +60,25 @@ def check_recordings(
     """
     channels, findings = [], []
     for recording in recordings:
+        findings += [*outliers(recording, automaton), *pauses(recording)]
+    leapt = {finding.recording for finding in findings if finding.kind == "leap"}
+    far = {(finding.recording, finding.channel) for finding in findings}
+    recordings = [without_huge(recording) for recording in recordings]
+    for recording in recordings:
         for channel in recording.channels.values():
             check = check_channel(recording, channel)
             channels.append(check)
             findings += findings_of(check, channel.column.compare is not None)
     excited = excitation(recordings, channels)
-    findings += _missing(recordings, channels, mapping, automaton)
+    findings = [f for f in findings if f.kind not in ("dropped", "gap") or f.recording not in leapt]
+    findings += [
+        finding
+        for finding in _missing(recordings, channels, mapping, automaton)
+        if (finding.recording, finding.channel) not in far
+    ]
     findings += _too_little(recordings, channels, excited)
     found: list[Relation] = []
-    broken = {f.recording for f in findings if f.kind in ("no_signal", "too_short")}
+    broken = {f.recording for f in findings if f.kind in BROKEN}
     whole = [one for one in recordings if "" not in broken and one.name not in broken]
     if automaton is None and whole:
         findings += alike(whole)

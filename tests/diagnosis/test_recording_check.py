@@ -220,3 +220,37 @@ def test_without_a_model_two_speeds_of_one_motion_tell_clocks_and_signs(
     assert seen(check_recordings([one], bench())) == expected
     surer = {("error", kind, channel) for _, kind, channel in expected}
     assert seen(check_recordings([one, two], bench())) == surer
+
+
+def at(key: str, value: float) -> Spoil:
+    """Spoil one sample in the middle."""
+
+    def spoil(times: Values, values: dict[str, Values]) -> None:
+        values[key][len(times) // 2] = value
+
+    return spoil
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("key", ["torque", "motor"])
+@pytest.mark.parametrize("value", [1e6, -1e6, 1e300, 1.7e308])
+def test_one_value_far_from_all_others_is_told_with_its_place(key: str, value: float) -> None:
+    found = check(spoiled(at(key, value)))
+    assert seen(found) == {("error", "outlier", key)}
+    assert " at 4.5 s" in found.findings[0].text and f"{value:.4g} " in found.findings[0].text
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_channel_of_huge_values_is_told_once() -> None:
+    assert seen(check(spoiled(scaled("motor", 1e160)))) == {("error", "outlier", "motor")}
+
+
+@pytest.mark.parametrize("seconds", [3600.0, 1.7e9])
+@pytest.mark.parametrize("first", [450, 899])
+def test_stamps_that_leap_are_told_and_not_simulated(seconds: float, first: int) -> None:
+    times, values = tip_in()
+    times = times.copy()
+    times[first:] += seconds
+    found = check(recording_of("leaping", times, values))
+    assert seen(found) == {("error", "leap", "")}
+    assert f"time leaps from {(first - 1) / 100:g} s" in found.findings[0].text
