@@ -15,12 +15,11 @@ from engine.firing import event, fired, mode_names
 from engine.interpreter import Interpreter, Stepper
 from engine.recording import Channel, Recording
 from engine.trajectory import Event, Trajectory, Values, column_array, fault_names
-from language.experiment import Column, RecordingMap
-from language.map import column_dimension
+from language.experiment import RecordingMap
 from language.model import CHART, Automaton
-from language.problem import Problems, SpecError, nearest
+from language.pairing import paired
+from language.problem import Problems, SpecError
 from language.program import Program
-from language.units import NUMBER, Dimension, fits
 
 MAX_TICKS = 20_000_000
 """Most ticks of one replay."""
@@ -55,37 +54,12 @@ def used_columns(automaton: Automaton, mapping: RecordingMap) -> tuple[list[str]
     Raises SpecError: an input without a column, a wrong dimension, an unknown output.
     """
     problems = Problems()
-    used, left_out = [], []
-    fed = set(mapping.constants)
-    _check_constants(automaton, mapping, problems)
-    for column in mapping.columns.values():
-        if column.compare is not None:
-            if column.compare not in automaton.outputs:
-                label = f"`{column.compare}` is not an output of `{automaton.name}`"
-                hint = nearest(column.compare, automaton.outputs)
-                problems.error("name", column.span, label, hint)
-            else:
-                want = automaton.dimensions.get(automaton.source_of(column.compare), NUMBER)
-                _check_dimension(column, want, f"output `{column.compare}`", problems)
-            used.append(column.name)
-            continue
-        thing = automaton.inputs.get(column.to or "")
-        if thing is None:
-            left_out.append(column.name)
-            continue
-        _check_dimension(column, thing.unit.dimension, f"input `{thing.name}`", problems)
-        if thing.name in fed:
-            problems.error("duplicate", column.span, f"input `{thing.name}` is fed twice")
-        fed.add(thing.name)
-        if column.hold == "linear":
+    used, left_out = paired(automaton, mapping, problems)
+    for column in (mapping.columns[name] for name in used):
+        if column.to is not None and column.hold == "linear":
             label = f"column `{column.name}` is held `linear`: a replay reads the latest"
             hint = "`hold: previous`; linear is for a scenario's `recording`"
             problems.error("form", column.span, label, hint)
-        used.append(column.name)
-    for name, thing in automaton.inputs.items():
-        if name not in fed and thing.default is None:
-            label = f"map `{mapping.name}` gives no value for input `{name}` of `{automaton.name}`"
-            problems.error("missing", mapping.span, label, nearest(name, left_out))
     problems.stop_if_any()
     left_out += [name for name in mapping.constants if name not in automaton.inputs]
     return used, left_out
@@ -145,22 +119,6 @@ def _ticked_through(
         if ticked:
             ticked(stepper)
     return keep
-
-
-def _check_dimension(column: Column, want: Dimension, what: str, problems: Problems) -> None:
-    if not fits(column_dimension(column), want):
-        label = f"column `{column.name}` is in `{column_dimension(column)}`"
-        problems.error("dimension", column.span, label, f"{what} is in `{want}`")
-
-
-def _check_constants(automaton: Automaton, mapping: RecordingMap, problems: Problems) -> None:
-    """Constants for inputs that this automaton lacks are for another one that the map serves."""
-    for name, (_, dimension) in mapping.constants.items():
-        thing = automaton.inputs.get(name)
-        if thing and not fits(dimension, thing.unit.dimension):
-            label = f"constant `{name}` is in `{dimension}`"
-            hint = f"input `{name}` is in `{thing.unit.dimension}`"
-            problems.error("dimension", mapping.span, label, hint)
 
 
 class _Cursor:

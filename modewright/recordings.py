@@ -22,6 +22,7 @@ from language.load import automaton_of
 from language.map import read_map
 from language.missing import ToolMissing
 from language.model import Automaton
+from language.pairing import check_pairing
 from language.problem import Problems, SpecError
 from language.program import Program
 from language.project import Project, expanded, read_document
@@ -73,6 +74,7 @@ def check_recordings(
         raise SpecError(problems.found)
     if named:
         mapping = read_map(read_document(project.path_of(named)), project)
+        _check_map(automaton, mapping)
     else:
         mapping = guessed_map(Path(files[0]), databases)
     used = used_columns(mapping, automaton)
@@ -115,6 +117,14 @@ def _has(path: Path, mapping: RecordingMap, column: str) -> bool:
     except SpecError as error:
         return any(problem.kind not in LACKING for problem in error.problems)
     return True
+
+
+def _check_map(automaton: Automaton | None, mapping: RecordingMap) -> None:
+    """Raise SpecError where a map is not one for an automaton."""
+    problems = Problems()
+    if automaton is not None:
+        check_pairing(automaton, mapping, problems)
+    problems.stop_if_any()
 
 
 def _automaton(spec: str, project: Project) -> Automaton:

@@ -79,3 +79,20 @@ def test_a_parameter_without_a_range_is_not_fitted(folder: Path) -> None:
     with pytest.raises(mw.SpecError) as refused:
         mw.fit("stiff.yaml", ["run_0.csv"], ["J"])
     assert [p.label for p in refused.value.problems] == ["`J` has no range to be fitted in"]
+
+
+@pytest.mark.parametrize("command", [["recording", "check", "--spec"], ["fit"], ["diagnose"]])
+def test_a_map_of_another_spec_is_told_with_its_lines(
+    command: list[str], folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = (folder / "spec" / "bench_columns.yaml").read_text("utf-8")
+    other = text.replace("map: bench_columns", "map: other").replace("to: T,", "to: torque,")
+    (folder / "other.yaml").write_text(other.replace("unit: rad/s", "unit: m"), "utf-8")
+    files = ["run_0.csv"] if command[0] == "recording" else ["--train", "run_0.csv"]
+    out = ["--out", "odd"] if command[0] == "diagnose" else []
+    words = [*command, "spinner", *files, "--map", "other.yaml", *out]
+    assert exit_code(lambda: app(words, standalone_mode=False)) == 1
+    told = capsys.readouterr().err
+    assert "other.yaml:2:6: error: map `other` gives no value for input `T` of `spinner`" in told
+    assert "other.yaml:4:11: error: `torque` is not an input of `spinner` [MW115]" in told
+    assert "column `speed` is in `m` [MW305]" in told
