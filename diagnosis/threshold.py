@@ -62,7 +62,7 @@ def thresholds_in(path: Path) -> Thresholds:
     """Return the thresholds of a file: `usual` and `effects` by name. Raises ValueError."""
     try:
         known = json.loads(path.read_text("utf-8"))
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise ValueError(f"{path} cannot be read as thresholds: {error}") from None
     if not isinstance(known, dict) or known.get("format") != FORMAT:
         raise ValueError(f"{path} holds no thresholds: its format is not {FORMAT}")

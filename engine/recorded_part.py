@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import filecmp
 import re
 from fractions import Fraction
 from pathlib import Path
@@ -45,8 +46,16 @@ def windows_of(path: Path, mapping: RecordingMap, problems: Problems) -> tuple[W
 
 
 def overlap(first: Path, second: Path) -> bool:
-    """Tell whether two paths name the same values: the same file, and parts with a common time."""
+    """Tell whether two paths name the same values: the same file or a copy, with a common time."""
     (one, a), (other, b) = part_of(first), part_of(second)
-    if one.resolve() != other.resolve():
+    if one.resolve() != other.resolve() and not is_copy(one, other):
         return False
     return a is None or b is None or max(a[0], b[0]) < min(a[1], b[1])
+
+
+def is_copy(one: Path, other: Path) -> bool:
+    """Tell whether two files hold the same bytes; one that cannot be read is no copy."""
+    try:
+        return filecmp.cmp(one, other, shallow=False)
+    except OSError:
+        return False

@@ -17,6 +17,7 @@ from diagnosis.file_names import names_of
 from diagnosis.finding import told
 from diagnosis.fit import Fit, fit as fitted
 from diagnosis.layers import effects_in
+from diagnosis.leftover import left_by
 from diagnosis.library import library
 from diagnosis.threshold import EVERYWHERE, Thresholds, thresholds_in, written
 from diagnosis.variant import needed, variant_text
@@ -26,7 +27,7 @@ from language.effect import Effect
 from language.load import automaton_of
 from language.model import Automaton
 from language.project import Project, expanded, read_document, shown
-from modewright.files import make_folder, write_files
+from modewright.files import OutputError, make_folder, remove_files, write_files
 from modewright.recordings import CheckedRecordings, check_recordings
 
 Tell = Callable[[str], None]
@@ -94,7 +95,7 @@ def diagnose(
     bootstrap, limits = _wanted(thresholds)
     checked = check_recordings(train, map, spec, root=root)
     case, automaton = _case(spec, train, held_out, checked, effects, root)
-    stages = Path(out) / STAGES if out is not None else None
+    stages = _stages(out)
     case = dataclasses.replace(
         case, thresholds=limits, bootstrap=bootstrap, stages=stages, before=clock.check
     )
@@ -114,6 +115,16 @@ def diagnose(
     if out is not None:
         save_diagnosis(dossier, out, spec)
     return dossier
+
+
+def _stages(out: str | Path | None) -> Path | None:
+    """Return where stages are kept. Raises OutputError where they cannot be."""
+    if out is None:
+        return None
+    stages = Path(out) / STAGES
+    if os.path.lexists(stages) and not stages.is_dir():
+        raise OutputError(f"{stages}: this is a file; what is found on the way is kept there")
+    return stages
 
 
 def _concluded(
@@ -156,14 +167,23 @@ def save_diagnosis(dossier: Dossier, out: str | Path, spec: str) -> list[Path]:
     make_folder(folder)
     variant = variant_text(dossier, base_of(dossier, spec, folder))
     files = {}
-    if dossier.case.thresholds.groups:
+    if dossier.case.thresholds != EVERYWHERE:
         files[folder / "thresholds.json"] = written(dossier.case.thresholds).encode()
     for name, data in report_files(dossier, variant, Path(shown(folder))).items():
         files[folder / name] = data
+    stale = [path for path in left_by(folder) if path not in files and not _is_read(path, dossier)]
     write_files(files)
+    remove_files(stale)
     if not dossier.ended:
         shutil.rmtree(folder / STAGES, ignore_errors=True)
     return list(files)
+
+
+def _is_read(path: Path, dossier: Dossier) -> bool:
+    """Tell whether a file is one that the diagnosis itself has read."""
+    recordings = (*dossier.case.train, *dossier.case.held_out)
+    is_recording = path.resolve() in {file_of(one).resolve() for one in recordings}
+    return is_recording or path.stem in {effect.name for effect in dossier.case.effects or ()}
 
 
 def base_of(dossier: Dossier, spec: str, folder: Path) -> str:
@@ -178,17 +198,22 @@ def base_of(dossier: Dossier, spec: str, folder: Path) -> str:
 def _require_apart(train: Sequence[str | Path], held_out: Sequence[str | Path]) -> None:
     """Raise ValueError where a recording is named twice, or is both learnt from and held out."""
     for one, other in itertools.combinations(train, 2):
-        if overlap(Path(one), Path(other)):
-            raise ValueError(f"{other} is named twice: each recording counts once")
+        _require_other(other, "is named twice: each recording counts once", one)
     for one, other in itertools.combinations(held_out, 2):
-        if overlap(Path(one), Path(other)):
-            raise ValueError(f"{other} is held out twice: each recording counts once")
+        _require_other(other, "is held out twice: each recording counts once", one)
     for file in held_out:
         path = file_of(Path(file))
         if not path.is_file() or not os.access(path, os.R_OK):
             raise ValueError(f"{file} cannot be held out: there is no such file that can be read")
-        if any(overlap(Path(file), Path(learnt)) for learnt in train):
-            raise ValueError(f"{file} is learnt from: it cannot be held out")
+        for learnt in train:
+            _require_other(file, "is learnt from: it cannot be held out", learnt)
+
+
+def _require_other(file: str | Path, what: str, earlier: str | Path) -> None:
+    """Raise ValueError where a recording has values of an earlier one."""
+    if overlap(Path(file), Path(earlier)):
+        same = file_of(Path(file)).resolve() == file_of(Path(earlier)).resolve()
+        raise ValueError(f"{file} {what}" if same else f"{file}, a copy of {earlier}, {what}")
 
 
 def _case(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 
@@ -14,6 +14,10 @@ class OutputError(Exception):
 
 def make_folder(folder: Path) -> None:
     """Make a folder and those above it. Raises OutputError."""
+    if folder.is_symlink() and not folder.exists():
+        raise OutputError(f"{folder}: this is a link to what is not there")
+    if folder.exists() and not folder.is_dir():
+        raise OutputError(f"{folder}: this is a file; name a folder")
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -55,3 +59,12 @@ def write_files(files: Mapping[Path, bytes]) -> None:
     finally:
         for name, _ in made:
             Path(name).unlink(missing_ok=True)
+
+
+def remove_files(paths: Iterable[Path]) -> None:
+    """Remove files. Raises OutputError."""
+    for path in paths:
+        try:
+            path.unlink(missing_ok=True)
+        except OSError as error:
+            raise OutputError(f"{path}: {error.strerror}") from None

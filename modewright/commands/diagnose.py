@@ -26,7 +26,19 @@ Train = Annotated[
 Map = Annotated[
     str | None, typer.Option("--map", "-m", help="a map of columns, if not that of the spec")
 ]
-Out = Annotated[Path, typer.Option("--out", "-o", help="the folder of the results")]
+
+
+def folder_of(text: str) -> Path:
+    """Return the folder that a text names: none is named by an empty one."""
+    if not text.strip():
+        raise typer.BadParameter("name a folder")
+    return Path(text)
+
+
+Out = Annotated[
+    Path,
+    typer.Option("--out", "-o", help="the folder of the results", parser=folder_of, metavar="PATH"),
+]
 HeldOut = Annotated[
     list[Path] | None,
     typer.Option("--held-out", help="a recording opened after the verdict (repeatable)"),
