@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -26,7 +27,7 @@ from diagnosis.ways import better_way, ways_of
 from language.document import Document, Table
 from language.load import automaton_of
 from language.model import Automaton
-from language.problem import Problems, nearest
+from language.problem import Problems, Source, Span, nearest
 from language.tree import put
 
 AT_THE_END = 1e-3
@@ -70,7 +71,7 @@ class Fit:
     @property
     def undetermined(self) -> tuple[str, ...]:
         """The parameters of which these data say next to nothing."""
-        return tuple(one.name for one in self.parameters if one.left > UNDETERMINED)
+        return tuple(one.name for one in self.parameters if not one.left <= UNDETERMINED)
 
     def calibration(self, name: str, date: str = "") -> str:
         """Return the fit as a calibration file, values in SI."""
@@ -82,7 +83,8 @@ class Fit:
             value = value_text(one.quantity.value, self.automaton.parameters[one.name])
             unit = "" if one.quantity.unit == "1" else f" {one.quantity.unit}"
             note = f"  # {one.note}" if one.note else ""
-            text = f"{{value: {value}, std: {one.quantity.std:.3g}{unit}}}"
+            std = f", std: {one.quantity.std:.3g}{unit}" if math.isfinite(one.quantity.std) else ""
+            text = f"{{value: {value}{std}}}"
             lines.append(f"  {one.name}: {text}{note}")
         return "\n".join(lines) + "\n"
 
@@ -125,7 +127,8 @@ def only(document: Document, automaton: Automaton, names: Sequence[str]) -> Docu
         if parameter is None:
             label = f"`{automaton.name}` has no parameter `{name}`"
             hint = nearest(name, automaton.parameters)
-            problems.error("name", automaton.span, label, hint)
+            asked = Source("command line", (name,))
+            problems.error("name", Span(asked, 1, 1, max(1, len(name))), label, hint)
         elif parameter.range is None or parameter.value is None:
             label = f"`{name}` has no range to be fitted in"
             problems.error("range", parameter.span, label, "`range: [low, high]` beside its value")
@@ -166,7 +169,7 @@ def note_of(now: Quantity, coordinate: Uncertain) -> str:
     width = AT_THE_END * (coordinate.high - coordinate.low)
     if min(now.value - coordinate.low, coordinate.high - now.value) < width:
         return "at the end of its range"
-    if spread_of(now, coordinate) > UNDETERMINED:
+    if not spread_of(now, coordinate) <= UNDETERMINED:
         return "these data do not determine it"
     return ""
 

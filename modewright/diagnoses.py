@@ -42,6 +42,10 @@ class BudgetSpent(Exception):
     """The time that a diagnosis may take has passed before it came to a verdict."""
 
 
+class UnusableRecordings(Exception):
+    """Recordings have errors that make whatever follows from them worthless."""
+
+
 class _Budget:
     """The time [s] that a diagnosis may take, and what has been told in it."""
 
@@ -266,12 +270,14 @@ def fit(
     map: str | None = None,
     root: Path | None = None,
     *,
+    anyway: bool = False,
     tell: Tell = lambda text: None,
 ) -> Fit:
     """Fit parameters of an automaton within their ranges to what was recorded.
 
     `parameters` are those that may move: all that have a range, if none are named. What is odd
-    about the recordings is told. Raises SpecError, ValueError, ToolMissing.
+    about the recordings is told. Those with errors are not used, but if it is wanted `anyway`.
+    Raises UnusableRecordings where most of them are, SpecError, ValueError, ToolMissing.
     """
     _require_apart(train, ())
     checked = check_recordings(train, map, spec, root=root)
@@ -279,4 +285,11 @@ def fit(
         if severity != "note":
             tell(f"{severity}: {text}")
     case, _ = _case(spec, train, (), checked, None, root)
+    kept = case.train if anyway else usable(checked.check, case)
+    if not kept:
+        raise UnusableRecordings("the recordings are not usable; nothing was fitted to them")
+    for file in case.train:
+        if file not in kept:
+            tell(f"left out: {case.name_of(file)}")
+    case = dataclasses.replace(case, train=kept)
     return fitted(case, parameters, tell)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -10,7 +11,10 @@ import typer
 from modewright.commands.diagnose import Map, Train, tell
 from modewright.commands.options import Json, usage_errors
 from modewright.console import announce, console
-from modewright.files import require_writable, write_files
+from modewright.exits import PROBLEMS
+from modewright.files import OutputError, require_writable, write_files
+
+Anyway = Annotated[bool, typer.Option("--anyway", help="fit to recordings with errors too")]
 
 
 def fit(
@@ -27,6 +31,7 @@ def fit(
         str | None, typer.Option("--name", help="of the calibration; that of its file if absent")
     ] = None,
     date: Annotated[str, typer.Option("--date", help="of the recordings: '2026-11-21'")] = "",
+    anyway: Anyway = False,
     as_json: Json = False,
 ) -> None:
     """Fit parameters within their ranges to recordings; tell what these cannot determine.
@@ -38,17 +43,23 @@ def fit(
     from language.calibration import DATE
     from language.names import NAME
     from modewright import show, show_diagnosis
-    from modewright.diagnoses import fit as fitted
+    from modewright.diagnoses import UnusableRecordings, fit as fitted
 
     require_writable(out)
+    if out and out.suffix != ".yaml":
+        raise OutputError(f"{out}: a calibration ends with .yaml")
     title = name or (out.stem if out else "fitted")
     if not NAME.fullmatch(title):
         raise typer.BadParameter(f"`{title}` is not a name", param_hint="--name")
     if date and not DATE.fullmatch(date):
         raise typer.BadParameter("a date is written as `2026-11-21`", param_hint="--date")
-    chosen = [part.strip() for part in parameters.split(",")] if parameters else None
-    with usage_errors():
-        found = fitted(spec, train, chosen, mapping, tell=tell)
+    chosen = names_of(parameters) if parameters is not None else None
+    try:
+        with usage_errors():
+            found = fitted(spec, train, chosen, mapping, anyway=anyway, tell=tell)
+    except UnusableRecordings as error:
+        print(f"error: {error} (`--anyway` fits all the same)", file=sys.stderr)
+        raise typer.Exit(PROBLEMS) from None
     if out:
         write_files({out: found.calibration(title, date).encode()})
     if as_json:
@@ -56,3 +67,14 @@ def fit(
     else:
         show_diagnosis.print_fit(console(), found)
         announce([out] if out else [])
+
+
+def names_of(text: str) -> list[str]:
+    """Return the names of --parameters."""
+    names = [part.strip() for part in text.split(",")]
+    if not all(names):
+        raise typer.BadParameter(f"`{text}` has an empty name", param_hint="--parameters")
+    twice = [name for k, name in enumerate(names) if name in names[:k]]
+    if twice:
+        raise typer.BadParameter(f"`{twice[0]}` is named twice", param_hint="--parameters")
+    return names

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 import pytest
@@ -59,7 +60,10 @@ def test_only_those_named_move_and_the_calibration_is_a_spec(
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (["--parameters", "J,bb"], "`spinner` has no parameter `bb`"),
+        (["--parameters", "J,bb"], "command line:1:1: error: `spinner` has no parameter `bb`"),
+        (["--parameters", "J,,b"], "`J,,b` has an empty name"),
+        (["--parameters", "J,b,J"], "`J` is named twice"),
+        (["--out", "rig.txt"], "rig.txt: a calibration ends with .yaml"),
         (["--name", "rig 7"], "`rig 7` is not a name"),
         (["--date", "21.11.2026"], "a date is written as"),
     ],
@@ -96,3 +100,38 @@ def test_a_map_of_another_spec_is_told_with_its_lines(
     assert "other.yaml:2:6: error: map `other` gives no value for input `T` of `spinner`" in told
     assert "other.yaml:4:11: error: `torque` is not an input of `spinner` [MW115]" in told
     assert "column `speed` is in `m` [MW305]" in told
+
+
+def test_nothing_is_fitted_to_recordings_with_errors_but_anyway(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lines = (folder / "run_0.csv").read_text("utf-8").splitlines()
+    cells = (line.split(",") for line in lines[1:])
+    still = "\n".join(f"{time},3,{speed}" for time, _, speed in cells)
+    (folder / "still.csv").write_text(f"t_s,torque,speed\n{still}\n", "utf-8")
+    command = ["fit", "spinner", "--train", "still.csv", "--parameters", "b", "--out", "still.yaml"]
+    assert exit_code(lambda: app(command, standalone_mode=False)) == 1
+    assert "the recordings are not usable; nothing was fitted" in capsys.readouterr().err
+    assert not (folder / "still.yaml").exists()
+    assert exit_code(lambda: app([*command, "--anyway"], standalone_mode=False)) == 0
+    assert mw.check("still.yaml") == []
+
+
+def test_recordings_with_errors_are_left_out_of_more(folder: Path) -> None:
+    lines = (folder / "run_2.csv").read_text("utf-8").splitlines()
+    (folder / "short.csv").write_text("\n".join(lines[:60]) + "\n", "utf-8")
+    told: list[str] = []
+    found = mw.fit("spinner", ["run_0.csv", "run_1.csv", "short.csv"], ["b"], tell=told.append)
+    assert list(found.inputs) == ["run_0.csv", "run_1.csv"]
+    assert "left out: short.csv" in told
+
+
+def test_a_deviation_that_is_no_number_is_not_written() -> None:
+    found = mw.fit("spinner", ["run_0.csv"], ["b"])
+    (one,) = found.parameters
+    quantity = dataclasses.replace(one.quantity, std=float("nan"))
+    lost = dataclasses.replace(one, quantity=quantity, left=float("nan"))
+    lost_fit = dataclasses.replace(found, parameters=(lost,))
+    assert "std" in found.calibration("rig")
+    assert "nan" not in lost_fit.calibration("rig")
+    assert lost_fit.undetermined == ("b",)
