@@ -34,11 +34,15 @@ def by_severity(findings: Sequence[Finding]) -> tuple[Finding, ...]:
 
 
 def told(findings: Sequence[Finding]) -> list[tuple[Severity, str]]:
-    """Return findings as lines, those of one kind together, the worst first."""
-    groups: dict[tuple[Severity, str], list[Finding]] = {}
+    """Return findings as lines, those of one kind together, the worst first.
+
+    Why a signal is missing is another line for each.
+    """
+    groups: dict[tuple[Severity, str, str], list[Finding]] = {}
     for finding in by_severity(findings):
-        groups.setdefault((finding.severity, finding.kind), []).append(finding)
-    return [(severity, _line(group)) for (severity, _), group in groups.items()]
+        why = finding.text if finding.kind == "no_signal" and "`" in finding.text else ""
+        groups.setdefault((finding.severity, finding.kind, why), []).append(finding)
+    return [(severity, _line(group)) for (severity, _, _), group in groups.items()]
 
 
 def _line(group: Sequence[Finding]) -> str:
@@ -46,7 +50,8 @@ def _line(group: Sequence[Finding]) -> str:
     channels = ", ".join(f"`{name}`" for name in dict.fromkeys(f.channel for f in group) if name)
     files = ", ".join(name for name in dict.fromkeys(f.recording for f in group) if name)
     if "`" in first.text:  # it names the channel itself
-        more = f", and {len(group) - 1} more like that" if len(group) > 1 else ""
+        others = len(group) - 1 if first.kind != "no_signal" else 0
+        more = f", and {others} more like that" if others else ""
         return first.text + more + (f" ({files})" if files else "")
     channels += f" ({files})" if files and channels else files
     return f"{channels}: {first.text}" if channels else first.text

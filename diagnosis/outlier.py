@@ -77,9 +77,10 @@ def _far(values: Values) -> NDArray[np.bool_]:
 
 def _declared(channel: Channel, value: float, automaton: Automaton | None, factor: float) -> str:
     """Return what the automaton says of a value that is out of the range of its state."""
-    if automaton is None or channel.column.compare not in automaton.outputs:
+    output = channel.column.compare
+    if automaton is None or output is None or output not in automaton.outputs:
         return ""
-    state = automaton.states.get(automaton.source_of(channel.column.compare))
+    state = automaton.states.get(automaton.source_of(output))
     if state is None or state.range is None or state.range[0] <= value <= state.range[1]:
         return ""
     low, high = (float(one) / factor for one in state.range)

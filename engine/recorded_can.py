@@ -13,6 +13,8 @@ from language.missing import ToolMissing
 from language.problem import Problems, Source, Span, SpecError
 from language.project import shown
 
+DATABASES = (".dbc", ".arxml", ".kcd", ".sym")
+"""Endings of files that say what CAN frames mean; DBC is the usual one."""
 Frame = tuple[float, bytes]
 Key = tuple[int, bool]
 """Number of a frame, and whether it is an extended one."""
@@ -48,6 +50,10 @@ def _messages(mapping: RecordingMap, cantools: Any) -> dict[Key, Any]:
         paths = [folder / written.text for folder in folders if exists(folder / written.text)]
         if not paths:
             problems.error("unreadable", written.span, f"there is no file `{written.text}`")
+            continue
+        if paths[0].suffix.lower() not in DATABASES:
+            label = f"`{written.text}` is not a DBC file by its name"
+            problems.error("unreadable", written.span, label, f"it ends with {DATABASES[0]}")
             continue
         with problems.collecting():
             require_inside(paths[0], written.span, root_of(Path(written.span.source.name)))

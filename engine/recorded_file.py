@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import stat
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -71,6 +72,16 @@ def require_size(path: Path, source: Source) -> None:
         problems = Problems()
         problems.error("empty", Span(source, 1, 1), "the recording is empty")
         raise SpecError(problems.found)
+
+
+def require_file(path: Path, source: Source) -> None:
+    """Raise SpecError for a pipe or a device: it may never end, and can be read only once."""
+    try:
+        mode = path.stat().st_mode
+    except OSError:
+        return  # what is wrong is told where it is read
+    if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
+        raise unreadable(source, "read: it is a pipe or a device", "write it into a file first")
 
 
 def unreadable(source: Source, how: str, help: str = "") -> SpecError:

@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 
 from engine.channel_reader import ChannelReader, require_names
 from engine.recorded_csv import read_csv
-from engine.recorded_file import RecordedFile
+from engine.recorded_file import RecordedFile, require_file
 from engine.recorded_part import file_of, windows_of
 from language.experiment import Column, RecordingMap, Window
-from language.problem import Problems
+from language.problem import Problems, Source
+from language.project import shown
 
 
 @dataclass(frozen=True)
@@ -110,6 +111,7 @@ def read_recording(path: Path, mapping: RecordingMap, used: Sequence[str]) -> Re
 def open_recorded(path: Path, mapping: RecordingMap, problems: Problems) -> RecordedFile:
     """Return what a file holds, by the ending of its name. Raises SpecError, ToolMissing."""
     path = file_of(path)
+    require_file(path, Source(shown(path)))
     ending = path.suffix.lower()
     if ending == ".parquet":
         from engine.recorded_parquet import read_parquet

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NoReturn
 from diagnosis.library import Described, described, library
 from diagnosis.naming import OTHER_NAMES
 from language.document import Document
+from language.load import automaton_of
 from language.problem import Problems, Source, Span, SpecError, nearest
 from language.project import Project, expanded, read_document
 
@@ -97,4 +98,7 @@ def _step(text: str) -> tuple[str, str]:
 
 
 def _base(reference: str, project: Project) -> Document:
-    return expanded(read_document(project.path_of(reference)), project)
+    """Return the expanded automaton of a reference. Raises SpecError."""
+    document = expanded(read_document(project.path_of(reference)), project)
+    automaton_of(document, project)
+    return document

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from engine.plot import Picture
 
 
+Lacking = dict[str, str]
+"""Why a file has none of some columns, by their names in the map."""
 LACKING = ("column", "empty")
 """Problems of a file that lacks a column, or has no value in it."""
 
@@ -79,12 +81,15 @@ def check_recordings(
         mapping = guessed_map(Path(files[0]), databases)
     used = used_columns(mapping, automaton)
     names = file_names([Path(file) for file in files])
-    recordings = tuple(_read(path, name, mapping, used) for path, name in names.items())
+    read = [_read(path, name, mapping, used) for path, name in names.items()]
+    recordings = tuple(recording for recording, _ in read)
+    lacking = {recording.name: why for recording, why in read}
     if spec is None or automaton is None:
-        return CheckedRecordings(checked(recordings, mapping, automaton), mapping, recordings)
+        check = _explained(checked(recordings, mapping, automaton), lacking)
+        return CheckedRecordings(check, mapping, recordings)
     document = expanded(read_document(project.path_of(spec)), project)
     mistakes = partial(mistakes_of, document, project, automaton, mapping)
-    check = checked(recordings, mapping, automaton, stepper_of, mistakes)
+    check = _explained(checked(recordings, mapping, automaton, stepper_of, mistakes), lacking)
     return CheckedRecordings(check, mapping, recordings)
 
 
@@ -96,27 +101,44 @@ def stepper_of(program: Program) -> Stepper:
         return Interpreter(program)
 
 
-def _read(path: Path, name: str, mapping: RecordingMap, used: Sequence[str]) -> Recording:
-    """Read a recording, without the columns that it has not got. Raises SpecError, ToolMissing.
+def _read(
+    path: Path, name: str, mapping: RecordingMap, used: Sequence[str]
+) -> tuple[Recording, Lacking]:
+    """Read a recording, without the columns that it has not got; say why it has not.
 
-    What else is wrong with a file is a problem of the file.
+    What else is wrong with a file is a problem of the file. Raises SpecError, ToolMissing.
     """
+    why: Lacking = {}
     try:
         recording = read_recording(path, mapping, used)
     except SpecError as error:
-        kept = [column for column in used if _has(path, mapping, column)]
+        why = {column: text for column in used if (text := _lack(path, mapping, column))}
+        kept = [column for column in used if column not in why]
         if not kept or any(problem.kind not in LACKING for problem in error.problems):
             raise
         recording = read_recording(path, mapping, kept)
-    return dataclasses.replace(recording, name=name)
+    return dataclasses.replace(recording, name=name), why
 
 
-def _has(path: Path, mapping: RecordingMap, column: str) -> bool:
+def _lack(path: Path, mapping: RecordingMap, column: str) -> str:
+    """Return why a file does not have a column; empty where it has, or is wrong otherwise."""
     try:
         read_recording(path, mapping, [column])
     except SpecError as error:
-        return any(problem.kind not in LACKING for problem in error.problems)
-    return True
+        lacks = [problem for problem in error.problems if problem.kind in LACKING]
+        if len(lacks) == len(error.problems):
+            return "; ".join(text for text in (lacks[0].label, lacks[0].help) if text)
+    return ""
+
+
+def _explained(check: RecordingCheck, lacking: Mapping[str, Lacking]) -> RecordingCheck:
+    """Return a check in which missing signals are told with why they are."""
+    findings = []
+    for one in check.findings:
+        why = lacking.get(one.recording, {}).get(one.channel, "")
+        is_absent = bool(why) and one.kind == "no_signal"
+        findings.append(dataclasses.replace(one, text=why) if is_absent else one)
+    return dataclasses.replace(check, findings=tuple(findings))
 
 
 def _check_map(automaton: Automaton | None, mapping: RecordingMap) -> None:

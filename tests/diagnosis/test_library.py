@@ -139,3 +139,11 @@ def test_a_picture_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.chdir(tmp_path)
     assert run("effects", "torque_gain@T", "--at", "spinner", "--plot", "shown.svg") == 0
     assert (tmp_path / "shown.svg").read_bytes().startswith(b"<?xml")
+
+
+def test_a_map_has_no_places(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(ROOT)
+    assert run("effects", "--at", "blind_columns") == 1
+    assert "`blind_columns` is a map, not an automaton" in capsys.readouterr().err

@@ -225,7 +225,9 @@ class TestCan:
         path = tmp_path / f"drive.{ending}"
         write_can(path)
         (tmp_path / "junk.dbc").write_text("this is no DBC", "utf-8")
-        text = told(path, "dbc: [cat.dbc, junk.dbc]\n" + COLUMNS)
+        (tmp_path / "list.csv").write_text("a,b", "utf-8")
+        text = told(path, "dbc: [cat.dbc, junk.dbc, list.csv]\n" + COLUMNS)
+        assert "error: `list.csv` is not a DBC file by its name" in text
         assert "error: there is no file `cat.dbc`" in text
         assert "error: `junk.dbc` cannot be understood" in text
 

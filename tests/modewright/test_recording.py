@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from functools import partial
 from pathlib import Path
 
@@ -106,3 +107,24 @@ def test_what_cannot_be_read_is_told_with_its_place(
     spec.write_text(spec.read_text().replace("recording_map: bench\n", ""))
     assert run("drive.csv", "--spec", "small_driveline") == 1
     assert "`small_driveline` names no map of recordings" in capsys.readouterr().err
+
+
+def test_a_column_that_is_not_there_is_told_with_the_nearest_name(
+    project: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    head, rest = (project / "drive.csv").read_text("utf-8").split("\n", 1)
+    misspelt = head.replace("torque", "Torque").replace("wheel", "motor")
+    (project / "odd.csv").write_text(f"{misspelt}\n{rest}", "utf-8")
+    assert run("odd.csv", "--spec", "small_driveline") == 1
+    text = " ".join(capsys.readouterr().out.split())
+    assert "there is no column `torque`, which map `bench` reads; did you mean `Torque`?" in text
+    assert "error: there are two columns `motor` (odd.csv)" in text
+    assert "error: there is no column `wheel`" in text
+
+
+def test_a_pipe_is_no_recording(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for name in ("pipe.csv", "pipe.dat"):  # of .dat the first bytes are looked at
+        os.mkfifo(project / name)
+        assert run(name, "--map", "bench") == 1
+        told = capsys.readouterr().err
+        assert f"{name}:1:1: error: the recording cannot be read: it is a pipe or a device" in told
