@@ -82,18 +82,22 @@ def relations(
     mapping: RecordingMap,
     automaton: Automaton,
     build: Callable[[Program], Stepper] = Interpreter,
+    made: Programs | None = None,
 ) -> list[Relation]:
-    """Return how the outputs of each piece go with a simulation under the recorded inputs."""
+    """Return how the outputs of each piece go with a simulation under the recorded inputs.
+
+    Programs `made` by an earlier call for the same automaton are not made again.
+    """
     found: list[Relation] = []
     left = MOST_SIMULATED
     automaton = _coarse(automaton)
-    made: Programs = {}
+    made = {} if made is None else made
     each = min(LONGEST_PIECE, max(SHORTEST_PIECE, MOST_SIMULATED / max(1, len(recordings))))
     for recording in recordings:
         for piece in pieces(recording):
             if left <= 0:
                 return found
-            part = _thinned(_part(piece, each))
+            part = _thinned(lively(piece, each))
             left -= part.end - part.start
             run = free_run(automaton, part, mapping, build, made)
             for name, compared in run.compared.items():
@@ -115,7 +119,7 @@ def _coarse(automaton: Automaton) -> Automaton:
     )
 
 
-def _part(piece: Recording, longest: Fraction) -> Recording:
+def lively(piece: Recording, longest: Fraction) -> Recording:
     """Return the most lively stretch of a piece that is no longer than `longest`."""
     if piece.end - piece.start <= longest:
         return piece

@@ -16,7 +16,7 @@ class Finding:
     """What was found: `channel` is the name in the map, empty where it is the whole recording.
 
     Kinds: too_short, no_signal, dropped, gap, jitter, repeated, stuck, clipped, no_excitation,
-    outlier, leap, clock_offset, sign, unit, scale.
+    outlier, leap, clock_offset, sign, unit, swap, scale.
     """
 
     kind: str

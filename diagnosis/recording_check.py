@@ -13,6 +13,7 @@ from diagnosis.disagreement import disagreements
 from diagnosis.excitation import Excitation, excitation
 from diagnosis.finding import Finding, by_severity
 from diagnosis.outlier import outliers, pauses, without_huge
+from diagnosis.remedy import cured, remedies
 from engine.interpreter import Interpreter, Stepper
 from engine.recording import Recording, pieces
 from language.experiment import RecordingMap
@@ -84,7 +85,9 @@ def check_recordings(
         findings += alike(whole)
     if automaton is not None and automaton.period is None and whole:
         found = relations(whole, mapping, automaton, build)
-        findings += _compared(disagreements(found, automaton, mapping, whole), whole, mistakes)
+        odd = disagreements(found, automaton, mapping, whole)
+        odd = cured(odd, remedies(found, whole, mapping, automaton, build, odd))
+        findings += _compared(odd, whole, mistakes)
     return RecordingCheck(tuple(channels), by_severity(findings), excited, tuple(found))
 
 

@@ -254,3 +254,25 @@ def test_stamps_that_leap_are_told_and_not_simulated(seconds: float, first: int)
     found = check(recording_of("leaping", times, values))
     assert seen(found) == {("error", "leap", "")}
     assert f"time leaps from {(first - 1) / 100:g} s" in found.findings[0].text
+
+
+def exchanged(times: Values, values: dict[str, Values]) -> None:
+    values["motor"], values["wheel"] = values["wheel"], values["motor"]
+
+
+@pytest.mark.parametrize(
+    ("spoil", "kind", "channel", "text"),
+    [
+        (exchanged, "swap", "motor", "`motor` and `wheel` are exchanged"),
+        (scaled("torque", 1e-3), "unit", "torque", "kN*m taken for N*m?"),
+        (scaled("motor", 0.5 / math.pi), "unit", "motor", "revolutions per second taken for rad/s"),
+    ],
+)
+def test_what_is_tried_tells_units_and_columns_that_are_exchanged(
+    spoil: Spoil, kind: str, channel: str, text: str
+) -> None:
+    one = check(spoiled(spoil, "bad"), spoiled(None, "good"))
+    assert [(f.kind, f.recording, f.channel) for f in one.findings] == [(kind, "bad", channel)]
+    assert text in one.findings[0].text
+    (every,) = check(spoiled(spoil, "a"), spoiled(spoil, "b")).findings
+    assert (every.kind, every.recording, every.channel) == (kind, "", channel)
