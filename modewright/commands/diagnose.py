@@ -37,7 +37,9 @@ def folder_of(text: str) -> Path:
 
 Out = Annotated[
     Path,
-    typer.Option("--out", "-o", help="the folder of the results", parser=folder_of, metavar="PATH"),
+    typer.Option(
+        "--out", "-o", help="the folder of the results", parser=folder_of, metavar="<path>"
+    ),
 ]
 HeldOut = Annotated[
     list[Path] | None,

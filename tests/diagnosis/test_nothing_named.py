@@ -26,7 +26,7 @@ def test_a_model_that_lacks_nothing_is_told_so(tmp_path: Path) -> None:
 def test_a_signal_that_never_moves_is_no_defect_of_ours(tmp_path: Path, seen: float) -> None:
     folder = bench(tmp_path / "still", T_c=0.0)
     for k in range(2):
-        rows = [f"{i / 100:.2f},0,{seen}" for i in range(1000)]
+        rows = [f"{i / 100:.2f},0,{seen}" for i in range(1000 + k)]
         text = "t_s,torque,speed\n" + "\n".join(rows) + "\n"
         (folder / f"run_{k}.csv").write_text(text, "utf-8")
     assert run(folder, *COMMAND, "--out", "found", "--anyway") == 0
