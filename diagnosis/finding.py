@@ -9,6 +9,8 @@ from typing import Literal
 Severity = Literal["error", "warning", "note"]
 """An error makes a verdict about physics worthless, a warning may, a note does not."""
 ORDER: tuple[Severity, ...] = ("error", "warning", "note")
+ONE_BY_ONE = ("no_signal", "outlier", "leap")
+"""Kinds whose findings share a line only where they say the same."""
 
 
 @dataclass(frozen=True)
@@ -16,7 +18,7 @@ class Finding:
     """What was found: `channel` is the name in the map, empty where it is the whole recording.
 
     Kinds: too_short, no_signal, dropped, gap, jitter, repeated, stuck, clipped, no_excitation,
-    outlier, leap, clock_offset, sign, unit, swap, scale.
+    outlier, leap, time, clock_offset, sign, unit, swap, scale.
     """
 
     kind: str
@@ -36,11 +38,11 @@ def by_severity(findings: Sequence[Finding]) -> tuple[Finding, ...]:
 def told(findings: Sequence[Finding]) -> list[tuple[Severity, str]]:
     """Return findings as lines, those of one kind together, the worst first.
 
-    Why a signal is missing is another line for each.
+    Values and reasons that are not the same are told in another line for each.
     """
     groups: dict[tuple[Severity, str, str], list[Finding]] = {}
     for finding in by_severity(findings):
-        why = finding.text if finding.kind == "no_signal" and "`" in finding.text else ""
+        why = finding.text if finding.kind in ONE_BY_ONE else ""
         groups.setdefault((finding.severity, finding.kind, why), []).append(finding)
     return [(severity, _line(group)) for (severity, _, _), group in groups.items()]
 

@@ -13,7 +13,7 @@ from diagnosis.disagreement import disagreements
 from diagnosis.excitation import Excitation, excitation
 from diagnosis.finding import Finding, by_severity
 from diagnosis.outlier import outliers, pauses, without_huge
-from diagnosis.remedy import cured, remedies
+from diagnosis.remedy import cured, milliseconds, remedies
 from engine.interpreter import Interpreter, Stepper
 from engine.recording import Recording, pieces
 from language.experiment import RecordingMap
@@ -23,7 +23,7 @@ from language.program import Program
 Mistakes = Callable[[Sequence[Recording]], list[Finding] | None]
 SHORTEST = 2.0
 """Time of a recording below which it tells nothing [s]: an observer needs 0.5 s to find in."""
-BROKEN = ("no_signal", "too_short", "outlier", "leap")
+BROKEN = ("no_signal", "too_short", "outlier", "leap", "time")
 """Findings after which a recording is compared with nothing."""
 FEWEST = 100
 """Samples of a channel below which nothing can be told apart."""
@@ -79,6 +79,9 @@ def check_recordings(
     ]
     findings += _too_little(recordings, channels, excited)
     found: list[Relation] = []
+    if automaton is not None and automaton.period is None:
+        for recording in recordings:
+            findings += milliseconds(recording, mapping, automaton, build)
     broken = {f.recording for f in findings if f.kind in BROKEN}
     whole = [one for one in recordings if "" not in broken and one.name not in broken]
     if automaton is None and whole:

@@ -10,6 +10,8 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from diagnosis.consistency import SHORTEST_PIECE, Relation, lively, relations
 from diagnosis.disagreement import FACTORS, MOST
 from diagnosis.finding import Finding
@@ -35,6 +37,8 @@ FAR = 0.7
 """Distance from the model (the logarithm of a gain of 2) that a remedy has to make up for."""
 SURE = 0.9
 """Correlation from which what the gain says of a unit needs no trial."""
+LONGEST_STEP, MOST_STEPS = 0.5, 200
+"""Seconds between samples, and steps of the model, from which milliseconds are tried."""
 MOST_TRIED = 3
 """Recordings of those that do not go with the model in which remedies are tried."""
 
@@ -114,6 +118,47 @@ def remedies(
     if len(alike) == 1 and len(odd) >= max(2.0, MOST * len(recordings)) and len(told) > 1:
         return [alike.pop().finding("")]
     return [remedy.finding(name) for name, remedy in told.items()]
+
+
+def milliseconds(
+    recording: Recording,
+    mapping: RecordingMap,
+    automaton: Automaton,
+    build: Callable[[Program], Stepper],
+) -> list[Finding]:
+    """Return whether the time of a recording is one of milliseconds.
+
+    That is sure where the recording then goes with the model; else it is asked.
+    """
+    usual = min(
+        (
+            float(np.median(np.diff(one.seconds)))
+            for one in recording.channels.values()
+            if len(one.times) > 1
+        ),
+        default=0.0,
+    )
+    steps = usual / float(automaton.step)
+    if usual < LONGEST_STEP or steps < MOST_STEPS:
+        return []
+    text = f"a sample each {usual:.4g} s is one in {steps:.4g} steps of `{automaton.name}`"
+    try:
+        part = lively(pieces(_faster(recording))[0], SHORTEST_PIECE)
+        after = relations([part], mapping, automaton, build)
+    except (SpecError, ArithmeticError, KeyError):
+        after = []
+    is_sure = bool(after) and all(_is_right(relation) for relation in after)
+    text += ": is the time in ms?" + (" Then it goes with the model" if is_sure else "")
+    return [Finding("time", recording.name, "", text, "error" if is_sure else "warning")]
+
+
+def _faster(recording: Recording) -> Recording:
+    """Return a recording a thousand times as fast, without the windows of its map."""
+    channels = {
+        name: Channel(one.column, tuple(time / 1000 for time in one.times), one.values)
+        for name, one in recording.channels.items()
+    }
+    return Recording(recording.name, channels, recording.end / 1000, recording.start / 1000)
 
 
 def _best(

@@ -28,7 +28,7 @@ from language.load import automaton_of
 from language.model import Automaton
 from language.project import Project, expanded, read_document, shown
 from modewright.files import OutputError, make_folder, remove_files, write_files
-from modewright.recordings import CheckedRecordings, check_recordings
+from modewright.recordings import CheckedRecordings, check_recordings, held_out_findings
 
 Tell = Callable[[str], None]
 KEPT = "kept"
@@ -155,7 +155,10 @@ def _concluded(
     case = dataclasses.replace(case, thresholds=found.thresholds)
     after = hashes(case, case.held_out)
     dossier = Dossier(case, automaton, checked.check, found.verdict, found, after, left_out)
-    messages = (*reasons, *summary(dossier), *found.unread, *needed(dossier))
+    held_out = held_out_findings(case, automaton)
+    for text in held_out:
+        clock.tell(text)
+    messages = (*reasons, *summary(dossier), *found.unread, *held_out, *needed(dossier))
     verdict = dataclasses.replace(found.verdict, messages=messages)
     return dataclasses.replace(dossier, verdict=verdict)
 

@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING
 
 from codegen.build import BuildError
 from codegen.stepper import CompiledStepper
+from diagnosis.case import Case
 from diagnosis.file_names import file_names
+from diagnosis.finding import told
 from diagnosis.guessed_map import guessed_map
 from diagnosis.mistakes import mistakes_of
 from diagnosis.recording_check import RecordingCheck, check_recordings as checked, used_columns
@@ -80,6 +82,8 @@ def check_recordings(
     else:
         mapping = guessed_map(Path(files[0]), databases)
     used = used_columns(mapping, automaton)
+    if len({Path(file).resolve() for file in files}) < len(files):
+        raise ValueError("a recording is named twice: each recording counts once")
     names = file_names([Path(file) for file in files])
     read = [_read(path, name, mapping, used) for path, name in names.items()]
     recordings = tuple(recording for recording, _ in read)
@@ -91,6 +95,26 @@ def check_recordings(
     mistakes = partial(mistakes_of, document, project, automaton, mapping)
     check = _explained(checked(recordings, mapping, automaton, stepper_of, mistakes), lacking)
     return CheckedRecordings(check, mapping, recordings)
+
+
+def held_out_findings(case: Case, automaton: Automaton) -> tuple[str, ...]:
+    """Return what a check finds of recordings that are held out, for people.
+
+    It is told beside a verdict that is final. What cannot be read is told elsewhere.
+    """
+    used = used_columns(case.mapping, automaton)
+    recordings = []
+    for path in case.held_out:
+        try:
+            recordings.append(_read(path, case.name_of(path), case.mapping, used)[0])
+        except (SpecError, ToolMissing, ValueError):
+            continue
+    if not recordings:
+        return ()
+    mistakes = partial(mistakes_of, case.document, case.project, automaton, case.mapping)
+    check = checked(recordings, case.mapping, automaton, stepper_of, mistakes)
+    serious = [finding for finding in check.findings if finding.severity != "note"]
+    return tuple(f"held out, {severity}: {text}" for severity, text in told(serious))
 
 
 def stepper_of(program: Program) -> Stepper:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from modewright.commands.options import Json, Plot, graphic_format
+from modewright.commands.options import Json, Plot, graphic_format, usage_errors
 from modewright.console import announce, console, counted, working
 from modewright.exits import EXIT_CODES, PROBLEMS
 from modewright.files import require_writable, write_files
@@ -50,7 +50,7 @@ def check(
     from modewright.recordings import check_recordings
 
     require_writable(plot)
-    with working(f"looking at {counted(len(files), 'recording')}"):
+    with working(f"looking at {counted(len(files), 'recording')}"), usage_errors():
         checked = check_recordings(files, mapping, spec, databases or ())
     if plot:
         title = ", ".join(file.name for file in files) + (f" against {spec}" if spec else "")

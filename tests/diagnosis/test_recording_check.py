@@ -29,6 +29,7 @@ from tests.diagnosis.driving import (
     spoiled,
     tip_in,
 )
+from tests.diagnosis.spinning import run
 
 RPM = 30.0 / math.pi
 
@@ -276,3 +277,34 @@ def test_what_is_tried_tells_units_and_columns_that_are_exchanged(
     assert text in one.findings[0].text
     (every,) = check(spoiled(spoil, "a"), spoiled(spoil, "b")).findings
     assert (every.kind, every.recording, every.channel) == (kind, "", channel)
+
+
+def test_time_in_milliseconds_is_asked_for() -> None:
+    times, values = tip_in()
+    (one,) = [
+        f for f in check(recording_of("slow", 1e3 * times, values)).findings if f.channel == ""
+    ]
+    assert (one.severity, one.kind) == ("error", "time")
+    assert one.text.startswith("a sample each 10 s") and "is the time in ms?" in one.text
+
+
+def test_what_is_missing_is_told_with_the_value_of_each_channel() -> None:
+    def still(_: Values, values: dict[str, Values]) -> None:
+        values["motor"], values["wheel"] = (
+            0.0 * values["motor"] + 300.0,
+            0.0 * values["wheel"] + 7.0,
+        )
+
+    lines = [text for _, text in told(check(spoiled(still)).findings)]
+    assert lines == [
+        "`motor` (tip_in): is 300 all the time: the signal is missing",
+        "`wheel` (tip_in): is 7 all the time: the signal is missing",
+    ]
+
+
+def test_a_recording_that_is_named_twice_is_wrong_usage(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "run.csv").write_text("t_s,w_radps\n0,1\n1,2\n", "utf-8")
+    assert run(tmp_path, "recording", "check", "run.csv", "./run.csv") == 2
+    assert "named twice" in capsys.readouterr().err
