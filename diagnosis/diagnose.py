@@ -34,7 +34,7 @@ from diagnosis.starting import settled_at_start, started
 from diagnosis.threshold import EVERYWHERE, Thresholds
 from diagnosis.verdict import Misfit, Named, Ranked, Says, Verdict
 from diagnosis.ways import ways_of
-from engine.recorded_part import file_of
+from engine.recorded_part import file_of, overlap
 from language.load import automaton_of
 from language.model import Automaton
 from language.problem import SpecError
@@ -107,7 +107,12 @@ def _held_out(
     """Open what is held out; what cannot be read is told, for the verdict stands without it."""
     held: list[Series] = []
     unread = []
-    for path in case.held_out:
+    for k, path in enumerate(case.held_out):
+        known = next((o for o in (*case.train, *case.held_out[:k]) if overlap(path, o)), None)
+        if known is not None:
+            named = f"{case.name_of(path)} was held out and cannot be used"
+            unread.append(f"{named}: it is a copy of {case.name_of(known)}")
+            continue
         try:
             held += paced(read_series(path, case, automaton, seen), automaton, seen, is_linear)
         except (SpecError, ValueError) as error:

@@ -45,10 +45,13 @@ def windows_of(path: Path, mapping: RecordingMap, problems: Problems) -> tuple[W
     return found
 
 
-def overlap(first: Path, second: Path) -> bool:
-    """Tell whether two paths name the same values: the same file or a copy, with a common time."""
+def overlap(first: Path, second: Path, opened: bool = True) -> bool:
+    """Tell whether two paths name the same values: the same file or a copy, with a common time.
+
+    Where they may not be `opened` yet, a copy is taken for another file.
+    """
     (one, a), (other, b) = part_of(first), part_of(second)
-    if one.resolve() != other.resolve() and not is_copy(one, other):
+    if one.resolve() != other.resolve() and not (opened and is_copy(one, other)):
         return False
     return a is None or b is None or max(a[0], b[0]) < min(a[1], b[1])
 
