@@ -12,7 +12,6 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter
 
 from diagnosis.candidate import Candidate
 from diagnosis.estimation import Estimate
@@ -79,6 +78,8 @@ def _calm(values: Reals) -> Reals:
     """Return an input without its noise; steps stay. In a gap noise alone would move a shaft."""
     if _white(values) == 0.0:
         return values
+    from scipy.ndimage import median_filter  # takes a quarter of a second to load
+
     return np.asarray(median_filter(values, CALM, mode="nearest"), dtype=np.float64)
 
 
