@@ -22,7 +22,7 @@ SHIFT = 0.01
 """How far states are moved at the start, as a part of their ranges."""
 FORGOTTEN = 0.01
 """Part of the largest difference of two runs that may be left in the second half of a recording."""
-SIMULATED = Thresholds({}, 30.0, "the usual threshold of whole simulations")
+SIMULATED = Thresholds({}, 30.0, "the usual threshold of whole simulations", modes=1.0)
 """What an effect must gain: what a simulation misses hangs together, so few samples count."""
 LEFT_OUT = 0.5
 """Part of it that must be gained left out: what an event shows the rest of a drive may not know."""

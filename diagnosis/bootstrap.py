@@ -141,7 +141,7 @@ def thresholds_of(replicates: Sequence[Gains]) -> Thresholds:
     times = tail(worst, LEVEL)
     groups = {name: _bounded(times * scale) for name, scale in scales.items()}
     origin = f"by {len(replicates)} replicates of the recalibrated model"
-    return Thresholds(groups, _bounded(times * LEAST_SCALE), origin)
+    return Thresholds(groups, _bounded(times * LEAST_SCALE), origin, modes=1.0)
 
 
 def _bounded(value: float) -> float:

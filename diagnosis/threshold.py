@@ -19,16 +19,20 @@ FORMAT = "modewright-thresholds/1"
 class Thresholds:
     """Nats that an effect must gain: `usual`, or those of its group of effects; `origin` in words.
 
-    A group is an effect at all its places.
+    A group is an effect at all its places. One that brings modes has to gain `modes` times the
+    usual: with each mode an observer has gains of its own, which may gain a little by accident.
     """
 
     groups: Mapping[str, float] = field(default_factory=dict)
     usual: float = USUAL
     origin: str = "the usual threshold"
+    modes: float = 3.0
 
     def of(self, layer: Layer) -> float:
         """Return what a layer has to gain [nats]."""
-        return self.groups.get(group_of(layer), self.usual)
+        brings_modes = layer.effect.body.get("regions") is not None
+        usual = self.usual * (self.modes if brings_modes else 1.0)
+        return self.groups.get(group_of(layer), usual)
 
     @property
     def most(self) -> float:
@@ -71,7 +75,9 @@ def thresholds_in(path: Path) -> Thresholds:
     if not all(_is_positive(value) for value in values):
         raise ValueError(f"{path}: `usual` and each of `effects` is a number of nats above 0")
     origin = str(known.get("origin", "")) or f"those of {path.name}"
-    return Thresholds({str(k): float(v) for k, v in groups.items()}, float(usual), origin)
+    return Thresholds(
+        {str(k): float(v) for k, v in groups.items()}, float(usual), origin, modes=1.0
+    )
 
 
 def _is_positive(value: object) -> bool:

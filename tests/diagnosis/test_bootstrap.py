@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import diagnosis.bootstrap as bootstrap
+from diagnosis.alone import SIMULATED
 from diagnosis.bench import Bench, balance_drifts
 from diagnosis.bootstrap import (
     CEILING,
@@ -24,12 +25,12 @@ from diagnosis.bootstrap import (
     thresholds_of,
 )
 from diagnosis.estimation import Estimate
-from diagnosis.layers import drift, fitting, shipped_effects
+from diagnosis.layers import Layer, drift, fitting, shipped_effects
 from diagnosis.level import settled
 from diagnosis.prediction import noises_of
 from diagnosis.replicate import replicate
 from diagnosis.series import Series
-from diagnosis.threshold import Thresholds, thresholds_in, written
+from diagnosis.threshold import USUAL, Thresholds, thresholds_in, written
 from language.load import automaton_of
 from language.project import expanded
 from modewright.diagnoses import diagnose
@@ -190,7 +191,7 @@ def test_what_gains_often_needs_more_and_nothing_needs_less_than_the_floor() -> 
     assert found.usual == FLOOR
     lost = [{"slow": 900.0}] * 10 + [{}] * 6
     assert thresholds_of(lost).groups["slow"] == CEILING
-    assert thresholds_of([{}] * 30) == Thresholds({}, FLOOR, found.origin)
+    assert thresholds_of([{}] * 30) == Thresholds({}, FLOOR, found.origin, modes=1.0)
 
 
 def test_thresholds_are_those_of_an_effect_at_all_its_places(bench: Bench) -> None:
@@ -202,9 +203,17 @@ def test_thresholds_are_those_of_an_effect_at_all_its_places(bench: Bench) -> No
     assert (found.text, found.most, Thresholds().text) == ("25 to 30", 30.0, "45")
 
 
+def test_an_effect_that_brings_modes_has_to_gain_three_times_the_usual() -> None:
+    gap = next(effect for effect in shipped_effects() if effect.name == "backlash")
+    layer = Layer(gap, "half_shaft", "half_shaft")
+    assert Thresholds().of(layer) == 3.0 * USUAL
+    assert Thresholds({"backlash": 60.0}).of(layer) == 60.0
+    assert SIMULATED.of(layer) == SIMULATED.usual
+
+
 def test_thresholds_are_read_as_they_were_written(tmp_path: Path) -> None:
     file = tmp_path / "thresholds.json"
-    found = Thresholds({"backlash": 31.25}, 25.0, "by 30 replicates")
+    found = Thresholds({"backlash": 31.25}, 25.0, "by 30 replicates", modes=1.0)
     file.write_text(written(found))
     assert thresholds_in(file) == found
 
