@@ -15,6 +15,7 @@ from diagnosis.dossier import usable, verdict_json
 from diagnosis.finding import Finding
 from diagnosis.report import report_files
 from diagnosis.wording import headline, separation
+from modewright.recordings import held_out_findings
 from tests.diagnosis.spinning import SCHEMA, bench
 
 
@@ -73,3 +74,15 @@ def test_recordings_with_errors_are_left_out_unless_they_are_most(
     check = dataclasses.replace(dossier.check, findings=(*errors, noted))
     case = dataclasses.replace(dossier.case, train=(Path("a"), Path("b"), Path("c")))
     assert usable(check, case) == tuple(Path(name) for name in kept)
+
+
+def test_what_is_odd_in_a_held_out_recording_is_told(dossier: mw.Dossier, tmp_path: Path) -> None:
+    assert not any(text.startswith("held out, ") for text in dossier.verdict.messages)
+    lines = dossier.case.held_out[0].read_text("utf-8").splitlines()
+    lines[len(lines) // 2] = lines[len(lines) // 2].rpartition(",")[0] + ",1e300"
+    spoiled = tmp_path / "spoiled.csv"
+    spoiled.write_text("\n".join(lines), "utf-8")
+    names = {**dossier.case.names, spoiled: "spoiled.csv"}
+    case = dataclasses.replace(dossier.case, held_out=(spoiled,), names=names)
+    (told,) = held_out_findings(case, dossier.automaton)
+    assert told.startswith("held out, error: `speed` (spoiled.csv): is 1e+300 rad/s at ")
