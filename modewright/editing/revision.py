@@ -100,4 +100,9 @@ def _extract(reference: str, revision: str, folder: Path) -> None:
         problems.error("name", place, f"Git has no `{revision}` here: {first}")
         raise SpecError(problems.found) from None
     with tarfile.open(fileobj=io.BytesIO(data)) as archive:
-        archive.extractall(folder, filter="data")
+        for member in archive:
+            content = archive.extractfile(member) if member.isfile() else None
+            target = (folder / member.name).resolve()
+            if content is not None and target.is_relative_to(folder.resolve()):
+                target.parent.mkdir(parents=True, exist_ok=True)
+                target.write_bytes(content.read())
