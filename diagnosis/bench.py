@@ -39,10 +39,6 @@ class Bench:
     drifts: tuple[Layer, ...]
     shelf: Shelf = NOWHERE
     _made: dict[tuple[str, ...], Candidate] = field(default_factory=dict, repr=False)
-    freed: dict[str, tuple[Estimate, tuple[Series, ...], Estimate]] = field(
-        default_factory=dict, repr=False
-    )
-    """By the place that is free: the base that was freed last, its recordings, what it became."""
 
     def kept(
         self, words: str, candidate: Candidate, given: Sequence[object], make: Fit

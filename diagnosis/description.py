@@ -54,7 +54,7 @@ def described(
     """Return the formula that explains most of what the base lacks; None where none gains."""
     found: list[Description] = []
     for formula, locus in _formulas(bench, base, loci):
-        starts = [base.values(0), locus.values]
+        starts = [base.values(0), _beside(base, locus)]
         one = _described(bench, base, formula, locus, starts, units)
         if one is not None:
             tell(_line(one))
@@ -112,9 +112,14 @@ def _formulas(bench: Bench, base: Estimate, loci: Sequence[Locus]) -> list[tuple
     return found
 
 
+def _beside(base: Estimate, locus: Locus) -> dict[str, float]:
+    """Return the parameters [SI] that were fitted beside the freedom of a place."""
+    return (locus.free or base).values(0)
+
+
 def _model(bench: Bench, base: Estimate, locus: Locus) -> Estimate:
     """Return the base, or what it is with the parameters fitted beside the freedom of a place."""
-    point = point_of(base.candidate, len(bench.series), locus.values)
+    point = point_of(base.candidate, len(bench.series), _beside(base, locus))
     other = looked_at(base.candidate, bench.series, base.noises, point)
     return other if other.cost < base.cost else base
 

@@ -43,12 +43,12 @@ class Evidence:
         return min(self.train, self.left_out)
 
     @property
-    def rest(self) -> float:
+    def without_best(self) -> float:
         """What is gained left out without the recording that gains most."""
         return self.left_out - max(self.each)
 
     @property
-    def most(self) -> float:
+    def without_worst(self) -> float:
         """What is gained left out without the recording that gains least."""
         return self.left_out - min(self.each)
 
@@ -114,18 +114,21 @@ def _gained(before: Reals, after: Reals, counts: Reals) -> Reals:
 def _left_out(model: Estimate, series: Sequence[Series]) -> Reals:
     """Return the squares (recordings, seen) of each block at the point that the others ask for."""
     found = np.zeros((len(series), len(model.candidate.predictor.seen)))
-    for fold in range(FOLDS if model.normal else 0):
+    if model.normal is None:
+        return np.full(found.shape, np.inf)
+    for fold in range(FOLDS):
         outcome = _without(model, series, fold)
         if not outcome.is_whole:
             return np.full(found.shape, np.inf)
         found += _squares(outcome, fold, False)
-    return found if model.normal else np.full(found.shape, np.inf)
+    return found
 
 
 def _without(model: Estimate, series: Sequence[Series], fold: int) -> Outcome:
     """Return the recordings foreseen from where a model would be without a fold.
 
     A step that does not do the others any good is shortened: the model is not as linear as that.
+    Where not even a tenth of it does, the model stays where it is.
     """
     assert model.normal is not None
     scale = model.outcome.variances()

@@ -7,7 +7,7 @@ anything at all: it is named only where it is silent most of the time.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -45,25 +45,26 @@ def with_hidden(
     Gains are those over the base without drifts, of which the base as it is may have taken its
     part. `needed` are the nats that it must gain at least.
     """
-    base = selection.base
-    shrink = 1.0 / inflation(base, bench.series)
-    loud = [one for one in loci if _layer(bench, one) and shrink * one.gain > needed]
+    shrink = 1.0 / inflation(selection.base, bench.series)
+    known = _inputs(bench)
+    loud = [one for one in loci if one.path in known and shrink * one.gain > needed]
     if not loud or any(abs(r) > KNOWN for _, r in loud[0].along):
         return selection
-    locus, quiet = loud[0], freed(bench, base)
-    drift = next(d for d in bench.drifts if d.place == locus.place)
-    model = with_normal(freed(bench, base, drift), bench.series)
-    if not acts_in_windows(model, drift.named(DRIFT)):
+    locus, layer = loud[0], known[loud[0].path]
+    assert locus.free is not None, "a locus with a gain was let free"
+    drift = next(one for one in bench.drifts if one.place == locus.place)
+    if not acts_in_windows(locus.free, drift.named(DRIFT)):
         return selection
+    quiet, model = freed(bench, selection.base), with_normal(locus.free, bench.series)
     if selection.accepted:
         without = _quieted(bench, selection.model)
         if quiet.cost - without.cost > LITTLE * (quiet.cost - model.cost):
             return selection
-    known, layer = evidence(model, quiet, bench.series), _layer(bench, locus)
-    if layer is None or counted(known) < needed:
+    gained = evidence(model, quiet, bench.series)
+    if counted(gained) < needed:
         return selection
-    tell(f"accepted {layer.id}: {known.least:.0f} nats, silent most of the time")
-    found = Tried(layer, quiet.cost - model.cost, model, known)
+    tell(f"accepted {layer.id}: {counted(gained):.0f} nats, silent most of the time")
+    found = Tried(layer, quiet.cost - model.cost, model, gained)
     first = (found, *selection.first_round)
     return dataclasses.replace(
         selection, base=quiet, model=model, accepted=(found,), first_round=first, rivals=()
@@ -88,13 +89,13 @@ def acts_in_windows(model: Estimate, name: str) -> bool:
     return loudest < SHORT * len(squares)
 
 
-def _layer(bench: Bench, locus: Locus) -> Layer | None:
-    """Return the input without parameters that the library knows for a balance."""
-    known: Mapping[str, Layer] = {
-        layer.place: layer
+def _inputs(bench: Bench) -> dict[str, Layer]:
+    """Return, by path, the inputs without parameters that the library knows for balances."""
+    balances = {drift.place for drift in bench.drifts}
+    return {
+        f"flow.{layer.place}": layer
         for effect in bench.effects
         if effect.body.get("parameters") is None
         for layer in fitting(bench.document, effect)
+        if layer.place in balances
     }
-    is_balance = locus.section == "flow" and any(d.place == locus.place for d in bench.drifts)
-    return known.get(locus.place) if is_balance else None

@@ -83,7 +83,7 @@ def _judged_by_simulation(
     loci = located(bench, base)
     tell(place_sentence(loci, bench))
     tell("what happened long ago does not matter here: whole simulations are judged")
-    thresholds = SIMULATED if case.thresholds is EVERYWHERE else case.thresholds
+    thresholds = SIMULATED if case.thresholds == EVERYWHERE else case.thresholds
     found = alone(raw, base)
     selection = selected(found.bench, found.base, {}, thresholds, tell, LEFT_OUT)
     says = _says(selection, loci, found.bench, max(USUAL, thresholds.most))

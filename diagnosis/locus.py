@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,7 +29,7 @@ class Locus:
     """One place: `gain` [nats] of its freedom over none; `rms` of its drift [SI], and that as a
     `part` of what acts there; the `windows` (start, end, recording) in which it is loud, its share
     by mode, and what it goes `along` with. At a `named` one stands an effect that was accepted.
-    `values` are the parameters [SI] fitted beside its freedom.
+    `free` is the base with this freedom, its parameters fitted beside it.
     """
 
     section: str
@@ -41,7 +41,7 @@ class Locus:
     along: tuple[tuple[str, float], ...] = ()
     part: float = 0.0
     named: bool = False
-    values: Mapping[str, float] = dataclasses.field(default_factory=dict, repr=False)
+    free: Estimate | None = dataclasses.field(default=None, repr=False, compare=False)
 
     @property
     def path(self) -> str:
@@ -72,7 +72,7 @@ def locus_of(bench: Bench, section: str, layer: Layer, free: Estimate) -> Locus:
         _shares(bench, drifts, modes),
         along(bench, free, drifts),
         part=size / scale if scale > 0.0 else 0.0,
-        values=free.values(0),
+        free=free,
     )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.finding import Finding
+from diagnosis.noise import MAD
 from engine.recording import Channel, Recording, pieces
 from language.model import Automaton
 
@@ -70,7 +71,7 @@ def _far(values: Values) -> NDArray[np.bool_]:
     around = np.pad(values, WIDTH // 2, mode="edge")
     lasting = np.median(np.lib.stride_tricks.sliding_window_view(around, WIDTH), axis=1)
     distance = np.abs(values - lasting)
-    noise = 1.4826 * float(np.median(distance))
+    noise = MAD * float(np.median(distance))
     least = max(FAR * float(np.ptp(lasting)), OUT_OF_NOISE * noise)
     return distance > least if np.ptp(lasting) > 0.0 else np.zeros(len(values), dtype=np.bool_)
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -145,7 +145,7 @@ def milliseconds(
     try:
         part = lively(pieces(_faster(recording))[0], SHORTEST_PIECE)
         after = relations([part], mapping, automaton, build)
-    except (SpecError, ArithmeticError, KeyError):
+    except (SpecError, ArithmeticError):
         after = []
     is_sure = bool(after) and all(_is_right(relation) for relation in after)
     text += ": is the time in ms?" + (" Then it goes with the model" if is_sure else "")
@@ -172,7 +172,7 @@ def _best(
     for remedy in possible:
         try:
             after = run(remedy.of(recording))
-        except (SpecError, ArithmeticError, KeyError):
+        except (SpecError, ArithmeticError):
             continue
         if after and all(_is_right(relation) for relation in after):
             distances[remedy] = max(_distance(relation) for relation in after)
@@ -233,11 +233,7 @@ def cured(odd: Sequence[Finding], cures: Sequence[Finding]) -> list[Finding]:
     new = [
         cure for cure in cures if cure.kind != "unit" or (cure.channel, cure.recording) not in same
     ]
-    where: Mapping[str, None] = dict.fromkeys(cure.recording for cure in new)
+    where = {cure.recording for cure in new}
     if "" in where:
         return list(new)
     return [*[f for f in odd if f.recording not in where], *new]
-
-
-def _reason(finding: Finding) -> str:
-    return finding.text.rpartition(": ")[2]

@@ -78,7 +78,7 @@ def _calm(values: Reals) -> Reals:
     """Return an input without its noise; steps stay. In a gap noise alone would move a shaft."""
     if _white(values) == 0.0:
         return values
-    from scipy.ndimage import median_filter  # takes a quarter of a second to load
+    from scipy.ndimage import median_filter  # slow to load
 
     return np.asarray(median_filter(values, CALM, mode="nearest"), dtype=np.float64)
 

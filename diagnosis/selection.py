@@ -137,12 +137,12 @@ def counted(known: Evidence, left_out: float = 1.0) -> float:
     A little in one recording is more often an accident of it than physics. One that denies what all
     others show may be the only one that tells how large it is.
     """
-    shared = len(known.each) == 1 or known.rest > SHARED * known.left_out
+    shared = len(known.each) == 1 or known.without_best > SHARED * known.left_out
     least = min(known.train, known.left_out / left_out)
     whole = least if shared else least / ALONE
     if len(known.each) < FEW:
         return whole
-    return max(whole, min(known.train, known.most / left_out) / ALONE)
+    return max(whole, min(known.train, known.without_worst / left_out) / ALONE)
 
 
 def looked_again(

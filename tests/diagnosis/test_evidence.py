@@ -47,4 +47,4 @@ def test_an_unstable_model_counts_as_nothing() -> None:
 
 
 def test_the_rest_is_what_the_best_recording_leaves() -> None:
-    assert Evidence(1.0, 60.0, (10.0, 40.0, 10.0)).rest == 20.0
+    assert Evidence(1.0, 60.0, (10.0, 40.0, 10.0)).without_best == 20.0

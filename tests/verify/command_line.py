@@ -7,14 +7,16 @@ from __future__ import annotations
 
 import json
 import os
-import resource
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable
 from pathlib import Path
 
-REPEATS = 5
+ROOT = Path(__file__).resolve().parent.parent.parent
+sys.path.insert(0, str(ROOT))
+
+from tests.verify.processor import seconds_of  # noqa: E402
+
 HELP_AGAINST_TYPER = 2.0
 """`modewright --help` against an empty typer application's: what we import ourselves, with room."""
 EMPTY = """
@@ -29,8 +31,8 @@ HELP_SECONDS = 0.5
 def main() -> int:
     """Print every figure; return 0 if all are met."""
     command = str(Path(sys.executable).parent / "modewright")
-    bare = best(lambda: run([sys.executable, "-I", "-c", EMPTY]))
-    helped = best(lambda: run([command, "--help"]))
+    bare = seconds_of(lambda: run([sys.executable, "-I", "-c", EMPTY]))
+    helped = seconds_of(lambda: run([command, "--help"]))
     first, again = compiled(command)
     figures = {
         "help [s]": (helped, helped < HELP_SECONDS),
@@ -41,17 +43,6 @@ def main() -> int:
     for name, (value, met) in figures.items():
         print(f"{'met ' if met else 'OPEN'} {name}: {json.dumps(round(value, 3))}")
     return 0 if all(met for _, met in figures.values()) else 1
-
-
-def best(measured: Callable[[], object]) -> float:
-    """Return the least processor time of several runs of a child process [s]."""
-    found = []
-    for _ in range(REPEATS):
-        before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        measured()
-        after = resource.getrusage(resource.RUSAGE_CHILDREN)
-        found.append(after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime)
-    return min(found)
 
 
 def compiled(command: str) -> tuple[int, int]:
