@@ -23,9 +23,9 @@ from diagnosis.selection import Selection
 from diagnosis.verdict import Says
 from language.problem import SpecError
 
-UNEXPLAINED = 4.0
+UNEXPLAINED = 2.5
 """Times the threshold that the freedom of a place gains where a formula is tried."""
-LEFT = 3.0
+LEFT = 2.0
 """Times the threshold that a term gains where an accepted effect leaves something over."""
 LEFT_PART = 0.3
 """And this part of what the effect gained: a strong one is never described quite well."""

@@ -34,7 +34,7 @@ MUCH = 0.1
 candidates that gained less are not tried in another way."""
 SHARED = 0.15
 """The part of what an effect gains that must be left without the recording that gains most."""
-ALONE = 4.0
+ALONE = 3.0
 """Times the threshold that is enough where less than that is left."""
 BETTER = 10.0
 """Nats by which a model must fit better for its candidates to be looked at again."""

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from diagnosis.layers import Layer
 
-USUAL = 45.0
+USUAL = 75.0
 """Nats that an effect must gain both in training and left out; a bootstrap gives better ones."""
 FORMAT = "modewright-thresholds/1"
 
@@ -26,7 +26,7 @@ class Thresholds:
     groups: Mapping[str, float] = field(default_factory=dict)
     usual: float = USUAL
     origin: str = "the usual threshold"
-    modes: float = 3.0
+    modes: float = 2.0
 
     def of(self, layer: Layer) -> float:
         """Return what a layer has to gain [nats]."""

@@ -200,7 +200,7 @@ def test_thresholds_are_those_of_an_effect_at_all_its_places(bench: Bench) -> No
     assert found.of(fitting(bench.document, friction)[0]) == 30.0
     assert found.of(fitting(bench.document, offset)[0]) == 25.0
     assert found.of(drift("balance", "w")) == 25.0
-    assert (found.text, found.most, Thresholds().text) == ("25 to 30", 30.0, "45")
+    assert (found.text, found.most, Thresholds().text) == ("25 to 30", 30.0, "75")
 
 
 def test_an_effect_that_brings_modes_has_to_gain_three_times_the_usual() -> None:
