@@ -40,6 +40,37 @@ def prepared(case: Manoeuvre) -> Callable[[], Solution]:
 
 
 def _loop(case: Manoeuvre) -> Callable[..., Any]:
+    piece_of, alpha = _piece_of(case), case.values()["alpha"]
+
+    def leg(stop: float, torque: Any, carried: Any) -> Any:
+        def flow(carried: Any) -> Any:
+            t, y, mode, times, modes, count = carried
+            end, y = piece_of(t, stop, y, mode, torque)
+            is_event = end < stop
+            side = jnp.where(y[3] > 0, 1, -1)
+            hit = jnp.where(mode == 0, side, 0)
+            moved = y.at[3].set(jnp.where(mode == 0, side * alpha, y[3] - side * NUDGE))
+            times = jnp.where(is_event, times.at[count].set(end), times)
+            modes = jnp.where(is_event, modes.at[count].set(hit), modes)
+            y, mode = jnp.where(is_event, moved, y), jnp.where(is_event, hit, mode)
+            return end, y, mode, times, modes, count + is_event
+
+        return jax.lax.while_loop(lambda one: one[0] < stop, flow, carried)
+
+    def run(start: Any, torques: Any) -> Any:
+        empty = jnp.zeros(MOST_EVENTS)
+        count = jnp.array(0)
+        carried = (jnp.array(0.0), start, jnp.array(1), empty, empty.astype(int), count)
+        for stop, torque in zip((case.step_ms, case.horizon_ms), torques, strict=True):
+            carried = leg(stop / 1000, torque, carried)
+        _, y, _, times, modes, count = carried
+        return y, times, modes, count
+
+    return run
+
+
+def _piece_of(case: Manoeuvre) -> Callable[..., Any]:
+    """Return what solves a mode until its guard or a time ends it: that time, and the states."""
     contact, gap, free = rates_and_guards(case)
     alpha = case.values()["alpha"]
 
@@ -55,42 +86,10 @@ def _loop(case: Manoeuvre) -> Callable[..., Any]:
     term, solver = diffrax.ODETerm(rates), diffrax.Dopri5()
     event = diffrax.Event(guard, optimistix.Bisection(1e-12, 1e-12))
     steps = diffrax.PIDController(rtol=TOLERANCE, atol=TOLERANCE, dtmax=LONGEST)
+    options: dict[str, Any] = {"stepsize_controller": steps, "event": event, "max_steps": 4000}
 
-    def leg(stop: float, torque: Any, carried: Any) -> Any:
-        def flow(carried: Any) -> Any:
-            t, y, mode, times, modes, count = carried
-            piece = diffrax.diffeqsolve(
-                term,
-                solver,
-                t,
-                stop,
-                1e-3,
-                y,
-                (mode, torque),
-                stepsize_controller=steps,
-                event=event,
-                max_steps=4000,
-            )
-            end, y = piece.ts[-1], piece.ys[-1]
-            side = jnp.where(y[3] > 0, 1, -1)
-            hit = jnp.where(mode == 0, side, 0)
-            y = y.at[3].set(jnp.where(mode == 0, side * alpha, y[3] - side * NUDGE))
-            is_event = end < stop
-            times = jnp.where(is_event, times.at[count].set(end), times)
-            modes = jnp.where(is_event, modes.at[count].set(hit), modes)
-            y = jnp.where(is_event, y, piece.ys[-1])
-            mode = jnp.where(is_event, hit, mode)
-            return end, y, mode, times, modes, count + is_event
+    def piece(t: Any, stop: float, y: Any, mode: Any, torque: Any) -> tuple[Any, Any]:
+        done = diffrax.diffeqsolve(term, solver, t, stop, 1e-3, y, (mode, torque), **options)
+        return done.ts[-1], done.ys[-1]
 
-        return jax.lax.while_loop(lambda one: one[0] < stop, flow, carried)
-
-    def run(start: Any, torques: Any) -> Any:
-        empty = jnp.zeros(MOST_EVENTS)
-        count = jnp.array(0)
-        carried = (jnp.array(0.0), start, jnp.array(1), empty, empty.astype(int), count)
-        for stop, torque in zip((case.step_ms, case.horizon_ms), torques, strict=True):
-            carried = leg(stop / 1000, torque, carried)
-        _, y, _, times, modes, count = carried
-        return y, times, modes, count
-
-    return run
+    return piece

@@ -26,49 +26,56 @@ def prepared(case: Manoeuvre) -> Callable[[], Solution]:
 
 
 def _run(case: Manoeuvre) -> Solution:
-    contact, gap, free = rates_and_guards(case)
-    alpha, torque, mode = case.values()["alpha"], 0.0, 1
-    events: list[tuple[float, int]] = []
-
-    def rates(x: Any, u: Any, t: float) -> Any:
-        return np.array((contact if mode else gap)(x, torque))
-
-    plant = ODE(rates, np.array([float(value) for value in case.start()]))
-
-    def crossing(own: int, guard: Callable[[Any], float], new: int) -> Any:
-        """A guard of one mode that ends it where it falls below zero."""
-
-        def act(t: float) -> None:
-            nonlocal mode
-            mode = new
-            state = plant.engine.get().copy()
-            if new:
-                state[3] = new * alpha
-            plant.engine.set(state)
-            events.append((float(t), new))
-            for one in guards:
-                one.off()
-            for one in of_mode[new]:
-                one.on()
-
-        return ZeroCrossingDown(lambda t: guard(plant.engine.get()), act, tolerance=CLOSE)
-
-    of_mode = {
-        1: [crossing(1, free, 0)],
-        0: [
-            crossing(0, lambda y: alpha - y[3], 1),
-            crossing(0, lambda y: alpha + y[3], -1),
-        ],
-        -1: [crossing(-1, lambda y: -free(y), 0)],
-    }
-    guards = [one for group in of_mode.values() for one in group]
-    for one in (*of_mode[0], *of_mode[-1]):
-        one.off()
-    simulation = Simulation([plant], [], guards, Solver=RKDP54, log=False, **OPTIONS)
+    plant = _Plant(case)
+    guards = [one for group in plant.guards.values() for one in group]
+    simulation = Simulation([plant.block], [], guards, Solver=RKDP54, log=False, **OPTIONS)
     start = 0
     for stop, value in zip((case.step_ms, case.horizon_ms), case.torques, strict=True):
-        torque = float(value)
+        plant.torque = float(value)
         simulation.run((stop - start) / 1000)
         start = stop
-    w_em = np.array([float(plant.engine.get()[0])])
-    return Solution(tuple(events), (case.horizon_ms,), w_em)
+    w_em = np.array([float(plant.block.engine.get()[0])])
+    return Solution(tuple(plant.events), (case.horizon_ms,), w_em)
+
+
+class _Plant:
+    """The driveline in contact (mode 1 or -1) or in the gap (0): a block, guards by mode."""
+
+    def __init__(self, case: Manoeuvre) -> None:
+        self.contact, self.gap, free = rates_and_guards(case)
+        alpha = self.alpha = case.values()["alpha"]
+        self.torque, self.mode = 0.0, 1
+        self.events: list[tuple[float, int]] = []
+        self.block = ODE(self.rates, np.array([float(value) for value in case.start()]))
+        self.guards = {
+            1: [self.crossing(free, 0)],
+            0: [
+                self.crossing(lambda y: alpha - y[3], 1),
+                self.crossing(lambda y: alpha + y[3], -1),
+            ],
+            -1: [self.crossing(lambda y: -free(y), 0)],
+        }
+        self.switch()
+
+    def rates(self, x: Any, u: Any, t: float) -> Any:
+        return np.array((self.contact if self.mode else self.gap)(x, self.torque))
+
+    def crossing(self, guard: Callable[[Any], float], new: int) -> Any:
+        """A guard that ends its mode where it falls below zero."""
+
+        def act(t: float) -> None:
+            state = self.block.engine.get().copy()
+            if new:
+                state[3] = new * self.alpha
+            self.block.engine.set(state)
+            self.events.append((float(t), new))
+            self.mode = new
+            self.switch()
+
+        return ZeroCrossingDown(lambda t: guard(self.block.engine.get()), act, tolerance=CLOSE)
+
+    def switch(self) -> None:
+        """Let only the guards of the mode act."""
+        for mode, group in self.guards.items():
+            for one in group:
+                one.on() if mode == self.mode else one.off()

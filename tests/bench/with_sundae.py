@@ -18,34 +18,8 @@ OPTIONS = {"method": "Adams", "rtol": 1e-8, "atol": 1e-8, "max_step": 0.01}
 
 def prepared(case: Manoeuvre) -> Callable[[], Solution]:
     """Return what runs a manoeuvre once."""
-    contact, gap, free = rates_and_guards(case)
     alpha, torque = case.values()["alpha"], [0.0]
-
-    def rates_of(mode: int) -> Callable[..., None]:
-        known = contact if mode else gap
-
-        def rates(t: float, y: Any, yp: Any) -> None:
-            yp[:] = known(y.tolist(), torque[0])
-
-        return rates
-
-    def events_of(mode: int) -> Callable[..., None]:
-        def events(t: float, y: Any, e: Any) -> None:
-            if mode:
-                e[0] = mode * free(y)
-            else:
-                e[0], e[1] = alpha - y[3], alpha + y[3]
-
-        events.terminal = [True] * (1 if mode else 2)  # type: ignore[attr-defined]
-        events.direction = [-1] * (1 if mode else 2)  # type: ignore[attr-defined]
-        return events
-
-    solvers = {
-        mode: CVODE(
-            rates_of(mode), eventsfn=events_of(mode), num_events=1 if mode else 2, **OPTIONS
-        )
-        for mode in (1, 0, -1)
-    }
+    solvers = {mode: _solver(case, mode, torque) for mode in (1, 0, -1)}
 
     def run() -> Solution:
         y = np.array([float(value) for value in case.start()])
@@ -63,3 +37,23 @@ def prepared(case: Manoeuvre) -> Callable[[], Solution]:
         return Solution(tuple(events), (case.horizon_ms,), y[:1])
 
     return run
+
+
+def _solver(case: Manoeuvre, mode: int, torque: list[float]) -> Any:
+    """Return what solves a mode until a guard ends it; `torque` [N*m] (1,) is read at each call."""
+    contact, gap, free = rates_and_guards(case)
+    alpha, count = case.values()["alpha"], 1 if mode else 2
+    known = contact if mode else gap
+
+    def rates(t: float, y: Any, yp: Any) -> None:
+        yp[:] = known(y.tolist(), torque[0])
+
+    def events(t: float, y: Any, e: Any) -> None:
+        if mode:
+            e[0] = mode * free(y)
+        else:
+            e[0], e[1] = alpha - y[3], alpha + y[3]
+
+    events.terminal = [True] * count  # type: ignore[attr-defined]
+    events.direction = [-1] * count  # type: ignore[attr-defined]
+    return CVODE(rates, eventsfn=events, num_events=count, **OPTIONS)

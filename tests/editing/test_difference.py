@@ -78,37 +78,29 @@ def test_numbers_are_compared_in_si(value: str, note: str) -> None:
         (
             "when: T < 0 N*m,",
             "when: T <= 0 N*m,",
-            ("changed", "transitions", "drive -> free", "guard", "T < 0 N*m", "T <= 0 N*m"),
+            "changed | transitions | drive -> free | guard | T < 0 N*m | T <= 0 N*m",
         ),
-        (
-            "wait: 5 ms",
-            "wait: 7 ms",
-            ("changed", "transitions", "drive -> free", "wait", "5 ms", "7 ms"),
-        ),
-        (
-            ", priority: 1",
-            "",
-            ("removed", "transitions", "free -> drive", "priority", "1", ""),
-        ),
+        ("wait: 5 ms", "wait: 7 ms", "changed | transitions | drive -> free | wait | 5 ms | 7 ms"),
+        (", priority: 1", "", "removed | transitions | free -> drive | priority | 1 | "),
         (
             ", late: {to: drive, when: T > k}",
             "",
-            ("removed", "transitions", "free -> drive (late)", "", "to: drive, when: T > k", ""),
+            "removed | transitions | free -> drive (late) |  | to: drive, when: T > k | ",
         ),
         (
             "{to: drive, when: T > k}",
             "{to: free, when: T > k}",
-            ("changed", "transitions", "free -> free (late)", "target", "drive", "free"),
+            "changed | transitions | free -> free (late) | target | drive | free",
         ),
-        ("T: k * theta", "T: k * x", ("changed", "equations", "T", "", "k * theta", "k * x")),
-        ("period: 1 ms", "period: 2 ms", ("changed", "settings", "period", "", "1 ms", "2 ms")),
-        ("n: n + 1", "n: n + 2", ("changed", "actions", "n in drive", "entry", "n + 1", "n + 2")),
-        ("number: 7", "number: 8", ("changed", "modes", "drive", "number", "7", "8")),
+        ("T: k * theta", "T: k * x", "changed | equations | T |  | k * theta | k * x"),
+        ("period: 1 ms", "period: 2 ms", "changed | settings | period |  | 1 ms | 2 ms"),
+        ("n: n + 1", "n: n + 2", "changed | actions | n in drive | entry | n + 1 | n + 2"),
+        ("number: 7", "number: 8", "changed | modes | drive | number | 7 | 8"),
     ],
 )
-def test_a_change_is_told_of_what_it_is_about(old: str, new: str, told: tuple[str, ...]) -> None:
+def test_a_change_is_told_of_what_it_is_about(old: str, new: str, told: str) -> None:
     assert BASE.count(old) == 1
-    assert only(BASE.replace(old, new)) == told
+    assert " | ".join(only(BASE.replace(old, new))) == told
 
 
 def test_blanks_order_comments_and_templates_make_no_difference() -> None:

@@ -16,57 +16,8 @@ from modewright.editing.format import formatted
 from modewright.editing.page import page_of
 from tests.editing.corpus import ROOT, documents, plain
 
-UNTIDY = """\
-language: 1
-automaton:   heater   # a room
-
-
-parameters:
-      T_on:             {value: 18 degC,about:   "below, it heats"}  # checked
-      P:                { value: 2 kW }
-      # of the supply
-      limits_of_power: {value: 3 kW}
-
-modes:
-   # at first
-   idle:
-        transitions:   {heating: {when: T < T_on,  priority: 1},
-            off: {when: T > T_on, priority: 2}}
-   heating: {}
-outputs: [ a,b , c ]
-about: >
-    two lines{blanks}
-    of text
-req:
-- A-1
--   A-2
-
-
-""".replace("{blanks}", "   ")
-TIDY = """\
-language: 1
-automaton: heater     # a room
-
-parameters:
-  T_on: {value: 18 degC, about: "below, it heats"}                   # checked
-  P:    {value: 2 kW}
-  # of the supply
-  limits_of_power: {value: 3 kW}
-
-modes:
-  # at first
-  idle:
-    transitions: {heating: {when: T < T_on, priority: 1},
-        off: {when: T > T_on, priority: 2}}
-  heating: {}
-outputs: [a, b, c]
-about: >
-    two lines{blanks}
-    of text
-req:
-- A-1
-- A-2
-""".replace("{blanks}", "   ")
+HERE = Path(__file__).parent
+UNTIDY, TIDY = (HERE / "untidy.yaml").read_text(), (HERE / "tidy.yaml").read_text()
 
 
 def test_an_untidy_spec_is_laid_out_by_the_rules() -> None:

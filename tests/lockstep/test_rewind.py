@@ -13,7 +13,7 @@ from language.load import load_automaton, program_of
 from language.number import NUMBERS
 from language.program import Program
 from language.project import Project
-from lockstep.compare import Tape, judged
+from lockstep.compare import Tape
 from tests.language.making import ROOT
 from tests.lockstep.chance.batch import Batch
 from tests.lockstep.programs import Tick
@@ -179,6 +179,6 @@ def test_what_goes_back_is_equal_in_c(
 ) -> None:
     program = programs[f"{name}_{number}"]
     tape, seen = taped(program, drive(name) if name == "hko" else inputs(name))
-    verdict = judged(tape, batch.run(program, b"".join(tape.inputs)))
+    verdict = batch.verdict(tape)
     assert verdict.is_equal, str(verdict.first)
     assert {what for what, count in seen.items() if count} == SEEN - LACKING.get(name, set()), seen

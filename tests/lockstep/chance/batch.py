@@ -9,6 +9,7 @@ from pathlib import Path
 
 from codegen.build import compiler, optimised, write_harness
 from language.program import Program
+from lockstep.compare import Tape, Verdict, judged
 
 FLAGS = (*optimised("O1"), "-w")
 SECONDS = 300
@@ -51,6 +52,10 @@ class Batch:
         done = subprocess.run(command, input=records, capture_output=True, timeout=SECONDS)
         assert done.returncode == 0, done.returncode
         return done.stdout
+
+    def verdict(self, tape: Tape) -> Verdict:
+        """Return what the comparison of a tape with the C of its Program gives."""
+        return judged(tape, self.run(tape.program, b"".join(tape.inputs)))
 
 
 def _sources(program: Program, folder: Path) -> list[Path]:
