@@ -119,17 +119,10 @@ class _TestReader(Reader):
 
     def _expectation(self, entry: Entry) -> Expectation | None:
         told = len(self.problems.found)
-        every = {key for keys in KEYS.values() for key in keys}
-        table = self.table(entry.node, f"expect.{entry.key}", (*KEYS, *every))
-        kinds = [key for key in table.entries if key in KEYS]
-        if len(kinds) != 1:
-            if len(self.problems.found) == told:
-                at = table.entries[kinds[1]].span if kinds else entry.span
-                label = f"`{entry.key}` expects one thing"
-                self.problems.error("form", at, label, f"one of {', '.join(KEYS)}")
+        found = self.kind_of(entry, f"expect.{entry.key}", KEYS, "expects")
+        if found is None:
             return None
-        kind = kinds[0]
-        own = self.table(table, kind, (kind, *KEYS[kind]))
+        kind, own = found
         place = self._place(own, entry.span) if kind == "modes" else None
         subject = self._subject(kind, own.entries[kind], place)
         when = self._when(own, entry, kind)
@@ -146,7 +139,7 @@ class _TestReader(Reader):
             span=own.entries[kind].node.span,
             count=self.whole(count, "count", 1, 0, MOST_EVENTS) if count is not None else None,
             place=place,
-            requirements=requirements_of(table),
+            requirements=requirements_of(own),
         )
 
     # What is expected.

@@ -145,9 +145,9 @@ class _AutomatonReader(Reader):
         self.sampled = period is not None
         numbers = self._numbers(tree)
         own = {e.key: self._parameter(e) for e in self.named(tree.get("parameters"), "parameters")}
-        modes = ModeReader(self.problems, model)
-        read = ChartReader(modes, tree).read(self.at) if is_chart(tree) else None
-        chart, *beside = read.regions if read else modes.regions(tree, self.at)
+        modes = ModeReader(self.problems, model, tree)
+        read = ChartReader(modes).read(self.at) if is_chart(tree) else None
+        chart, *beside = read.regions if read else modes.regions(self.at)
         places = mode_paths(read.tree) if read else chart.modes
         laid_on = ElementReader(self.problems)
         variables = VariableReader(self.problems, model, self.sampled, tree, places)

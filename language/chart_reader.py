@@ -11,15 +11,16 @@ from language.chart import ROOT, Chart, Keeping, Kind, Node, Order, Signal
 from language.chart_initial import RawNode, set_initials
 from language.chart_way import ways_of
 from language.document import Entry, Items, Node as YamlNode, Table
-from language.mode import INNER_KEYS, REGION_KEYS, ModeReader
+from language.mode import INNER_KEYS, REGION_KEYS, ModeReader, check_numbers
 from language.model import CHART, Mode, Region
 from language.names import check_region_name
 from language.problem import Span
 from language.reader import TEXT_KEYS
+from language.site import Site
+from language.transition_reader import CHART_WAY_KEYS
 
 CHART_KEYS = ("events", "order", "micro_steps")
 """Keys at the root that make the modes a chart."""
-WAY_MARKS = ("event", "raise", "history", "internal")
 MOST_MICRO_STEPS = 255
 NOWHERE = -1
 
@@ -44,7 +45,7 @@ def _modes(owner: Table) -> Iterator[Table]:
 def _is_nested(mode: Table) -> bool:
     ways = _tables(mode.get("transitions"))
     return any(key in mode.entries for key in INNER_KEYS) or any(
-        any(key in way.entries for key in WAY_MARKS) or isinstance(way.get("to"), Items)
+        any(key in way.entries for key in CHART_WAY_KEYS) or isinstance(way.get("to"), Items)
         for way in ways
     )
 
@@ -67,18 +68,16 @@ class ReadChart:
 class ChartReader:
     """Reads the tree of an automaton with the help of the reader of modes."""
 
-    def __init__(self, modes: ModeReader, root: Table) -> None:
+    def __init__(self, modes: ModeReader) -> None:
         self.modes = modes
         self.problems = modes.problems
-        self.root = root
-        self.templates = modes.table(root.get("templates"), "templates")
+        self.root = modes.root
         self.raw: list[RawNode] = []
         self.broken = False
 
     def read(self, at: Span) -> ReadChart:
         """Return the chart of an automaton. Raises SpecError where there is no tree."""
         signals = self._signals()
-        self.modes.events = tuple(signals)
         top = Table({}, at)
         self.raw.append(RawNode("", "", "parallel", NOWHERE, "", False, at, top))
         entries = list(self.modes.table(self.root.get("regions"), "regions"))
@@ -144,7 +143,7 @@ class ChartReader:
         above: Mode | None,
     ) -> None:
         index = len(self.raw)
-        table = self.modes._like(table, self.templates)
+        table = self.modes.like(table)
         kind = self._kind(entry, table)
         if kind == "history":
             is_region, region = False, self.raw[parent].region
@@ -206,13 +205,9 @@ class ChartReader:
         if "priority" in raw.table.entries and not raw.is_region:
             span = raw.table.entries["priority"].span
             self.problems.error("form", span, "a mode has no priority: regions inside a mode do")
-        body = raw.table
         position = sum(1 for r in self.raw if r.region == raw.region and r.number is not None)
-        self.modes.completing = raw.kind != "atomic"
-        named = Entry(name, entry.span, body)
-        made = self.modes.inner_mode(named, body, self.root, position, raw.region, key, above)
-        self.modes.completing = False
-        return made
+        site = Site(key, raw.region, position, above, raw.kind != "atomic")
+        return self.modes.mode(Entry(name, entry.span, raw.table), site)
 
     def _node(self, index: int) -> Node:
         raw = self.raw[index]
@@ -267,22 +262,17 @@ class ChartReader:
         return given
 
     def _as_region(self, chart: Chart, node: Node) -> Region:
-        leaves = chart.leaves(node.region)
         modes = {}
-        numbers: dict[int, str] = {}
-        for leaf in leaves:
+        for leaf in chart.leaves(node.region):
             mode = self.raw[leaf.index].mode
             assert mode is not None
             modes[mode.name] = mode
-            if mode.number in numbers:
-                label = f"number {mode.number} is that of mode `{numbers[mode.number]}`"
-                free = next(n for n in range(len(numbers) + 1) if n not in numbers)
-                hint = f"another `number`, like {free}; without one, modes count from 0"
-                self.problems.error("duplicate", mode.span, label, hint)
-            numbers.setdefault(mode.number, mode.name)
+        check_numbers(modes.values(), self.problems)
         active = chart.first(node, ())
         initial = next(n for n in active if n.region == node.region and n.number is not None)
         start = self.raw[initial.index].mode
         assert start is not None
-        inactive = None if node.parent == ROOT else min(-1, *(n - 1 for n in numbers))
+        inactive = (
+            None if node.parent == ROOT else min(-1, *(mode.number - 1 for mode in modes.values()))
+        )
         return Region(node.region, modes, start.name, self.raw[node.index].span, inactive)

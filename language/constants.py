@@ -13,6 +13,7 @@ from language.lower import assigned
 from language.model import Automaton
 from language.number import rounded
 from language.operation import Assign, Block
+from language.operators import ARITHMETIC
 from language.parameter import constant_names, constant_of, owner, parameter_kinds, parameter_order
 from language.problem import Problems, SpecError
 from language.program import Constant
@@ -125,7 +126,8 @@ def exact_value(formula: Formula, automaton: Automaton) -> Fraction:
             case Power(base, exponent, _):
                 return value(base) ** exponent
             case Arithmetic(operator, left, right, _):
-                return _arithmetic(operator, value(left), value(right))
+                result: Fraction = ARITHMETIC[operator](value(left), value(right))
+                return result
             case _:
                 raise TypeError
 
@@ -135,15 +137,3 @@ def exact_value(formula: Formula, automaton: Automaton) -> Fraction:
         label = "a time is made of numbers, parameters and + - * /"
         problems.error("wait", formula.span, label)
         raise SpecError(problems.found) from None
-
-
-def _arithmetic(operator: str, left: Fraction, right: Fraction) -> Fraction:
-    match operator:
-        case "+":
-            return left + right
-        case "-":
-            return left - right
-        case "*":
-            return left * right
-        case _:
-            return left / right

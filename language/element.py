@@ -9,8 +9,9 @@ from typing import Literal, cast
 from language.declaration import Formula
 from language.document import Entry, Items, Node, Scalar, Table
 from language.model import Element
+from language.overlay import without
 from language.problem import Problems, Span
-from language.reader import Reader
+from language.reader import TEXT_KEYS, Reader
 
 ELEMENT_KEYS = {
     "elastic": ("twist", "rate", "torque", "stiffness", "damping", "gap", "angle_rate"),
@@ -53,7 +54,7 @@ class ElementReader(Reader):
                 if part not in table.entries:
                     self.problems.error("missing", entry.span, f"`{key}.{part}` is missing")
             far = {item.text: item.span for item in self.items(table.get("far"), f"{key}.far")}
-            parts = self._formulas(table, key, ("kind", "far"))
+            parts = self.formulas(without(table, "kind", "far", *TEXT_KEYS), key)
             element = cast(Literal["elastic", "inertia"], kind)
             found[entry.key] = Element(entry.key, element, parts, far, key, entry.span)
         return found
@@ -63,7 +64,8 @@ class ElementReader(Reader):
         found: dict[str, Mapping[str, Formula]] = {}
         for entry in self.named(node, "places"):
             key = f"places.{entry.key}"
-            found[entry.key] = self._formulas(self.table(entry.node, key, PLACE_KEYS), key, ())
+            table = self.table(entry.node, key, PLACE_KEYS)
+            found[entry.key] = self.formulas(without(table, *TEXT_KEYS), key)
         return found
 
     def outputs(self, node: Node | None) -> Outputs:
@@ -77,16 +79,6 @@ class ElementReader(Reader):
             spans[entry.key] = entry.node.span
             sources[entry.key] = self.text(entry.node, f"outputs.{entry.key}", entry.span)
         return Outputs(spans, sources)
-
-    def _formulas(self, table: Table, key: str, skipped: tuple[str, ...]) -> dict[str, Formula]:
-        found = {}
-        for entry in table:
-            if entry.key in ("about", "req", *skipped):
-                continue
-            formula = self.expression(entry.node, f"{key}.{entry.key}", entry.span)
-            if formula:
-                found[entry.key] = formula
-        return found
 
 
 def outputs_as_mapping(node: Node) -> Table:

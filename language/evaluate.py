@@ -21,6 +21,7 @@ from language.operation import (
     Unary,
     Value,
 )
+from language.operators import ARITHMETIC, RELATIONS
 
 Scalar = float | int | bool
 
@@ -115,18 +116,11 @@ EXACT: Mapping[NumberType, Elementary] = {
 }
 """By number type, before the rounding to it."""
 OPERATIONS: Mapping[str, Callable[[Scalar, Scalar], Scalar]] = {
-    "+": lambda a, b: a + b,
-    "-": lambda a, b: a - b,
-    "*": lambda a, b: a * b,
+    **ARITHMETIC,
     "/": divide,
     "and": lambda a, b: bool(a) and bool(b),
     "or": lambda a, b: bool(a) or bool(b),
-    "<": lambda a, b: a < b,
-    "<=": lambda a, b: a <= b,
-    ">": lambda a, b: a > b,
-    ">=": lambda a, b: a >= b,
-    "==": lambda a, b: a == b,
-    "!=": lambda a, b: a != b,
+    **RELATIONS,
 }
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import cast
 
@@ -87,6 +87,25 @@ class Reader:
         scalar = self.scalar(node, what, span)
         return scalar.text if scalar else ""
 
+    def kind_of(
+        self, entry: Entry, key: str, kinds: Mapping[str, tuple[str, ...]], does: str
+    ) -> tuple[str, Table] | None:
+        """Return which of some kinds a thing is, and its keys; None with the problem reported.
+
+        It has one key that names its kind, and beside it those that go with that kind.
+        """
+        told = len(self.problems.found)
+        beside = {key for keys in kinds.values() for key in keys}
+        table = self.table(entry.node, key, (*kinds, *beside))
+        given = [key for key in table.entries if key in kinds]
+        if len(given) == 1:
+            return given[0], self.table(table, given[0], (given[0], *kinds[given[0]]))
+        if len(self.problems.found) == told:
+            place = table.entries[given[1]].span if given else entry.span
+            label = f"`{entry.key}` {does} one thing"
+            self.problems.error("form", place, label, f"one of {', '.join(kinds)}")
+        return None
+
     def items(self, node: Node | None, what: str) -> list[Scalar]:
         """Return the scalars of a list."""
         if node is None:
@@ -152,6 +171,15 @@ class Reader:
         with self.problems.collecting():
             tree = parse_expression(scalar)
         return Formula(tree, key)
+
+    def formulas(self, node: Node | None, key: str) -> dict[str, Formula]:
+        """Return the expressions of a mapping by their names; one with a problem is left out."""
+        found = {}
+        for entry in self.named(node, key):
+            formula = self.expression(entry.node, f"{key}.{entry.key}", entry.span)
+            if formula:
+                found[entry.key] = formula
+        return found
 
     def quantity(self, node: Node | None, what: str, span: Span, unit: Unit | None) -> Quantity:
         """Return a literal in SI and its unit; a bare number is in `unit` where one is given."""

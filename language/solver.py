@@ -15,6 +15,7 @@ from typing import Any, Literal
 
 from language.evaluate import Scalar
 from language.operation import Binary, Call, Compare, Expr, Ref, Select, Unary, Value
+from language.operators import ARITHMETIC, RELATIONS
 from language.question import Extent, Point, Question
 
 EFFORT = 200_000
@@ -117,9 +118,9 @@ class _Terms:
             case Binary("or", left, right):
                 return z3.Or(self.of(left), self.of(right))
             case Binary(operator, left, right):
-                return self._arithmetic(operator, self.of(left), self.of(right))
+                return ARITHMETIC[operator](self.of(left), self.of(right))
             case Compare(operator, left, right):
-                return self._relation(operator, self.of(left), self.of(right))
+                return RELATIONS[operator](self.of(left), self.of(right))
             case Select(condition, then, other):
                 return z3.If(self.of(condition), self.of(then), self.of(other))
             case Call(function, arguments):
@@ -170,30 +171,6 @@ class _Terms:
         if extent.numbers:
             facts.append(z3.Or(*(term == number for number in extent.numbers)))
         return term, facts
-
-    def _arithmetic(self, operator: str, left: Any, right: Any) -> Any:
-        match operator:
-            case "+":
-                return left + right
-            case "-":
-                return left - right
-            case "*":
-                return left * right
-        return left / right
-
-    def _relation(self, operator: str, left: Any, right: Any) -> Any:
-        match operator:
-            case "<":
-                return left < right
-            case "<=":
-                return left <= right
-            case ">":
-                return left > right
-            case ">=":
-                return left >= right
-            case "==":
-                return left == right
-        return left != right
 
     def _call(self, function: str, arguments: tuple[Expr, ...]) -> Any:
         z3 = self.z3

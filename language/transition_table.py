@@ -16,9 +16,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from language.document import Entry, Node, Scalar, Table
-from language.mode import CHART_WAY_KEYS, TRANSITION_KEYS
 from language.problem import Problems, nearest
 from language.reader import Reader
+from language.transition_reader import CHART_WAY_KEYS, TRANSITION_KEYS
 
 KEY = "transition_table"
 COLUMN_KEYS = tuple(key for key in (*TRANSITION_KEYS, *CHART_WAY_KEYS) if key != "to")

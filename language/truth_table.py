@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from language.declaration import Formula
-from language.document import Entry, Node, Table
+from language.document import Entry, Table
 from language.problem import nearest
 from language.reader import Reader
 from language.truth import TruthRow, TruthTable
@@ -29,7 +28,7 @@ class TruthTableReader(Reader):
     def _table(self, entry: Entry) -> TruthTable:
         key = f"tables.{entry.key}"
         body = self.table(entry.node, key, ("if", "rows"))
-        conditions = self._formulas(body.get("if"), f"{key}.if")
+        conditions = self.formulas(body.get("if"), f"{key}.if")
         for what in ("if", "rows"):
             if not self.table(body.get(what), what).entries:
                 label = f"a truth table has at least one entry in `{what}`"
@@ -51,7 +50,7 @@ class TruthTableReader(Reader):
             hint = "one of `T`, `F` or `-` for each, with blanks between, in the order of `if`"
             self.problems.error("table", entry.span, label, hint)
             marks = ["-"] * width
-        results = self._formulas(entry.node, f"{key}.rows.{entry.key}")
+        results = self.formulas(entry.node, f"{key}.rows.{entry.key}")
         for written in self.table(entry.node, entry.key):
             if written.key not in self.discrete:
                 label = f"`{written.key}` is not a discrete variable"
@@ -59,11 +58,3 @@ class TruthTableReader(Reader):
                 self.problems.error("name", written.span, label, hint)
         name = " ".join(marks)
         return TruthRow(name, tuple(MARKS[mark] for mark in marks), results, entry.span)
-
-    def _formulas(self, node: Node | None, key: str) -> dict[str, Formula]:
-        found = {}
-        for entry in self.named(node, key):
-            formula = self.expression(entry.node, f"{key}.{entry.key}", entry.span)
-            if formula:
-                found[entry.key] = formula
-        return found

@@ -35,17 +35,17 @@ SIGNAL_KINDS: tuple[SignalKind, ...] = (
     "peak", "max", "min", "mean", "rms", "final", "settling", "frequency",
 )  # fmt: skip
 KEYS: dict[str, tuple[str, ...]] = {
-    "time": ("number",),
-    "count": (),
-    "delay": ("after", "number", "before", "within"),
-    "match": ("truth", "before", "within"),
-    **{kind: () for kind in SIGNAL_KINDS},
-    "settling": ("within",),
-    "frequency": ("by",),
-    "value": (),
-    "is": (),
+    "time": ("number", *WINDOW),
+    "count": WINDOW,
+    "delay": ("after", "number", "before", "within", *WINDOW),
+    "match": ("truth", "before", "within", *WINDOW),
+    **{kind: WINDOW for kind in SIGNAL_KINDS},
+    "settling": ("within", *WINDOW),
+    "frequency": ("by", *WINDOW),
+    "value": WINDOW,
+    "is": WINDOW,
 }
-"""What stands beside each kind of measure, and `from` and `until` but for `value` and `is`."""
+"""What stands beside each kind of measure; a window of `value` or `is` is refused by its reason."""
 VALUES = ("value", "is")
 MOST_EVENTS = 1_000_000
 
@@ -84,18 +84,10 @@ class MeasureReader(Reader):
         return SECOND if unit == "s" else NUMBER
 
     def _measure(self, entry: Entry) -> Measure | None:
-        told = len(self.problems.found)
-        every = {key for keys in KEYS.values() for key in keys}
-        table = self.table(entry.node, f"measures.{entry.key}", (*KEYS, *every, *WINDOW))
-        kinds = [key for key in table.entries if key in KEYS]
-        if len(kinds) != 1:
-            if len(self.problems.found) == told:
-                place = table.entries[kinds[1]].span if kinds else entry.span
-                label = f"`{entry.key}` measures one thing"
-                self.problems.error("form", place, label, f"one of {', '.join(KEYS)}")
+        found = self.kind_of(entry, f"measures.{entry.key}", KEYS, "measures")
+        if found is None:
             return None
-        kind = kinds[0]
-        own = self.table(table, kind, (kind, *KEYS[kind], *WINDOW))
+        kind, own = found
         scalar = self.scalar(own.get(kind), kind, entry.span)
         if scalar is None:
             return None

@@ -1,0 +1,106 @@
+"""Transition reader: the transitions of a mode, each with its guard."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Literal, cast
+
+from language.chart import Keeping
+from language.declaration import Formula
+from language.document import Entry, Items, Node, Scalar, Table
+from language.model import Rewind, Transition
+from language.problem import Problems, nearest
+from language.reader import Reader
+from language.site import Site
+from language.syntax import Truth
+
+TRANSITION_KEYS = ("to", "when", "wait", "priority", "reset", "memory", "rewind")
+CHART_WAY_KEYS = ("event", "raise", "history", "internal")
+Remembering = Literal["reset", "continue"]
+
+
+class TransitionReader(Reader):
+    """Reads transitions; `events` are those that the automaton declares."""
+
+    def __init__(self, problems: Problems, events: tuple[str, ...]) -> None:
+        """Report into `problems`."""
+        super().__init__(problems)
+        self.events = events
+
+    def transitions(self, node: Node | None, source: str, site: Site) -> Iterator[Transition]:
+        """Iterate over the transitions of the mode `source`; one without a guard is reported."""
+        for entry in self.named(node, "transitions"):
+            transition = self._transition(entry, source, site)
+            if transition:
+                yield transition
+
+    def _transition(self, entry: Entry, source: str, site: Site) -> Transition | None:
+        key = f"{site.key}.transitions.{entry.key}"
+        table = self.table(entry.node, key, (*TRANSITION_KEYS, *CHART_WAY_KEYS))
+        to, wait, priority = (table.get(part) for part in ("to", "wait", "priority"))
+        targets = self._words(to, "to") if to else (entry.key,)
+        events = self._events(table, "event")
+        when = self._guard(table, key, entry, bool(events) or site.holds_modes)
+        waited = self.expression(wait, f"{key}.wait", entry.span) if wait else None
+        rank = self.whole(priority, "priority", 0, 0, 1000) if priority else None
+        memory = self.choice(table.get("memory"), "memory", ("reset", "continue"), "reset")
+        history = self.choice(table.get("history"), "history", ("shallow", "deep"), "")
+        internal = self.choice(table.get("internal"), "internal", ("true", "false"), "false")
+        if when is None:
+            return None
+        return Transition(
+            name=entry.key,
+            source=source,
+            target=targets[0] if targets else source,
+            when=when,
+            wait=waited,
+            priority=rank,
+            reset=self.formulas(table.get("reset"), f"{key}.reset"),
+            key=key,
+            span=to.span if to else entry.span,
+            region=site.region,
+            memory=cast(Remembering, memory),
+            rewind=self._rewind(table.get("rewind"), f"{key}.rewind"),
+            targets=targets,
+            events=events,
+            raises=self._events(table, "raise"),
+            history=cast(Keeping, history),
+            internal=internal == "true",
+            completes="when" not in table.entries and not events,
+        )
+
+    def _words(self, node: Node | None, what: str) -> tuple[str, ...]:
+        """Return the names of a list, or the only one."""
+        if isinstance(node, Items):
+            return tuple(item.text for item in self.items(node, what))
+        word = self.text(node, what, node.span) if node else ""
+        return (word,) if word else ()
+
+    def _events(self, table: Table, what: str) -> tuple[str, ...]:
+        """Return the names of events, which are declared."""
+        node = table.get(what)
+        found = self._words(node, what)
+        for item in node.nodes if isinstance(node, Items) else (node,):
+            if isinstance(item, Scalar) and item.text not in self.events:
+                label = f"there is no event `{item.text}`"
+                hint = nearest(item.text, self.events) or "events are declared under `events`"
+                self.problems.error("name", item.span, label, hint)
+        return found
+
+    def _guard(self, table: Table, key: str, entry: Entry, optional: bool) -> Formula | None:
+        """Return the guard; an event needs none, nor does the end of a mode with modes inside."""
+        node = table.get("when")
+        if node is None and optional:
+            return Formula(Truth(True, entry.span), f"{key}.when")
+        return self.expression(node, f"{key}.when", entry.span)
+
+    def _rewind(self, node: Node | None, key: str) -> Rewind | None:
+        """Read how far back a transition reaches, and to what."""
+        if node is None:
+            return None
+        table = self.table(node, key, ("until", "within"))
+        parts = [
+            self.expression(table.get(part), f"{key}.{part}", node.span)
+            for part in ("until", "within")
+        ]
+        return Rewind(parts[0], parts[1], node.span) if parts[0] and parts[1] else None
