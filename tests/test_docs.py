@@ -77,6 +77,19 @@ def test_the_architecture_page_is_short_enough_to_be_read() -> None:
     assert len((ROOT / "docs" / "ARCHITECTURE.md").read_text().splitlines()) <= 120
 
 
+def test_every_file_that_the_architecture_page_names_is_in_the_package_it_says() -> None:
+    page = (ROOT / "docs" / "ARCHITECTURE.md").read_text()
+    missing: list[str] = []
+    for section in page.split("\n## Inside ")[1:]:
+        head, *lines = section.partition("\n## ")[0].splitlines()
+        for line in lines:
+            row = re.match(r"\| `([\w/]+/)`", line)
+            folders = [row[1]] if row else re.findall(r"`(\w+/)`", head)
+            named = re.findall(r"`([\w/]+\.(?:py|yaml|lark))`", line)
+            missing += [n for n in named if not any((ROOT / f / n).exists() for f in folders)]
+    assert missing == []
+
+
 def test_what_is_shipped_is_replayed_as_the_page_on_recordings_says(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
