@@ -122,12 +122,6 @@ def plan_of(system: System, scenario: Scenario, assembly: Assembly) -> Plan:
     events = [int(time / tick) for time in schedule.events if time <= schedule.horizon]
     instants = np.unique(np.concatenate([np.array([0, end, *events]), *grids.values()]))
     rows = _ticks(schedule.rows, tick, end)
-    happens = np.zeros(len(instants), dtype=np.uint32)
-    for bit, name in enumerate(assembly.happenings):
-        happens[np.searchsorted(instants, grids[name])] |= np.uint32(1 << bit)
-    row_at = np.full(len(instants), NEVER, dtype=np.int64)
-    at = np.isin(rows, instants, assume_unique=True)
-    row_at[np.searchsorted(instants, rows[at])] = np.flatnonzero(at)
     noise = {
         name: noise_of(scenario.seed, name, len(grids[name]))
         for name, sensor in assembly.sensors.items()
@@ -140,8 +134,8 @@ def plan_of(system: System, scenario: Scenario, assembly: Assembly) -> Plan:
     return Plan(
         instants=_times(instants, tick),
         inputs=input_values(system, scenario, assembly, instants, tick),
-        happens=happens,
-        row_at=row_at,
+        happens=_happens(instants, [grids[name] for name in assembly.happenings]),
+        row_at=_row_at(instants, rows),
         rows=_times(rows, tick),
         row_gaps=np.searchsorted(instants, rows),
         flows={
@@ -154,6 +148,22 @@ def plan_of(system: System, scenario: Scenario, assembly: Assembly) -> Plan:
         courses={c.name: _course_table(system, scenario, c) for c in assembly.courses},
         exact=tuple(int(instant) * tick for instant in instants),
     )
+
+
+def _happens(instants: Wholes, grids: Sequence[Wholes]) -> NDArray[np.uint32]:
+    """Return what happens at each instant: a bit of each grid that has it."""
+    found = np.zeros(len(instants), dtype=np.uint32)
+    for bit, grid in enumerate(grids):
+        found[np.searchsorted(instants, grid)] |= np.uint32(1 << bit)
+    return found
+
+
+def _row_at(instants: Wholes, rows: Wholes) -> Wholes:
+    """Return the number of the row at each instant, NEVER where there is none."""
+    found = np.full(len(instants), NEVER, dtype=np.int64)
+    at = np.isin(rows, instants, assume_unique=True)
+    found[np.searchsorted(instants, rows[at])] = np.flatnonzero(at)
+    return found
 
 
 def noise_of(seed: int, sensor: str, count: int) -> Reals:

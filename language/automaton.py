@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from fractions import Fraction
-from typing import Literal, cast
+from typing import cast
 
-from language.chart_reader import CHART_KEYS, ChartReader, is_chart
+from language.chart_reader import CHART_KEYS, ChartReader, ReadModes, is_chart
 from language.chart_target import mode_paths
-from language.declaration import Fitting, Formula, Kind, Parameter, Range
 from language.document import Document, Entry, Node, Scalar, Table
 from language.element import ElementReader
 from language.event import event_inputs
@@ -19,14 +18,14 @@ from language.names import check_file_name
 from language.number import NUMBERS, NumberType
 from language.observer import METHODS
 from language.overlay import lay, without
+from language.parameter_reader import ParameterReader
 from language.problem import Problems, nearest
 from language.project import Project, expanded
-from language.reader import Reader, about_of
+from language.reader import Reader
 from language.region import with_regions
-from language.table import TableReader, section
 from language.transition_table import with_transition_tables
 from language.truth_table import TruthTableReader
-from language.units import NO_UNIT, SECOND, Unit, fits, parse_unit
+from language.units import SECOND, fits
 from language.values import with_value
 from language.variable import VariableReader
 
@@ -41,10 +40,6 @@ KEYS = (
     *(*COMMON_KEYS, *LOGIC_KEYS, *CHART_KEYS, *DECISION_KEYS, *LAID_KEYS),
     *(*CLOCK_KEYS, *FAULT_KEYS, *RECORDING_KEYS),
 )
-FITTING_KEYS = ("neutral", "starts", "per", "form")
-FORMS = ("constant", "constant_or_random_walk")
-Per = Literal["model", "recording"]
-Form = Literal["constant", "constant_or_random_walk"]
 DEFAULT_STEP = Fraction(1, 1000)
 """Major step of a continuous automaton that gives none."""
 
@@ -66,7 +61,7 @@ def read_automaton(
     tree = with_instances(document.root, project, problems)
     tree, model = _with_model(tree, project, values or {}, problems)
     _find_recording_map(tree, project, problems)
-    return _AutomatonReader(problems).read(document, tree, model)
+    return _AutomatonReader(document, tree, model, problems).read()
 
 
 def _find_recording_map(tree: Table, project: Project, problems: Problems) -> None:
@@ -134,39 +129,43 @@ def _set_values(
 class _AutomatonReader(Reader):
     """The sections of an automaton, one method each."""
 
-    def read(self, document: Document, tree: Table, model: Automaton | None) -> Automaton:
-        tree = self.table(tree, f"automaton {document.name}", KEYS)
-        tree = with_transition_tables(tree, self.problems)
-        self.at = document.name_span
-        check_file_name(document.name, document.name_span, self.problems)
+    def __init__(
+        self, document: Document, tree: Table, model: Automaton | None, problems: Problems
+    ) -> None:
+        super().__init__(problems)
+        self.name, self.at = document.name, document.name_span
         self.model = model
-        self.declared = (section(tree, "inputs"), section(tree, "states"))
-        period = self._time(tree.get("period"), "period")
-        self.sampled = period is not None
-        numbers = self._numbers(tree)
-        own = {e.key: self._parameter(e) for e in self.named(tree.get("parameters"), "parameters")}
-        modes = ModeReader(self.problems, model, tree)
-        read = ChartReader(modes).read(self.at) if is_chart(tree) else None
-        chart, *beside = read.regions if read else modes.regions(self.at)
-        places = mode_paths(read.tree) if read else chart.modes
+        known = self.table(tree, f"automaton {document.name}", KEYS)
+        self.tree = with_transition_tables(known, problems)
+        check_file_name(document.name, document.name_span, problems)
+        self.period = self._time("period")
+        self.sampled = self.period is not None
+
+    def read(self) -> Automaton:
+        tree, model = self.tree, self.model
+        numbers = self._numbers()
+        own = ParameterReader(self.problems, tree).parameters()
+        modes = self._modes()
+        main, *beside = modes.regions
+        places = mode_paths(modes.tree) if modes.tree else main.modes
         laid_on = ElementReader(self.problems)
         variables = VariableReader(self.problems, model, self.sampled, tree, places)
         outputs = laid_on.outputs(tree.get("outputs"))
-        events = event_inputs(read.tree, tree.get("events")) if read else {}
+        events = event_inputs(modes.tree, tree.get("events")) if modes.tree else {}
         automaton = Automaton(
-            name=document.name,
-            period=period,
-            step=self._time(tree.get("step"), "step") or DEFAULT_STEP,
+            name=self.name,
+            period=self.period,
+            step=self._time("step") or DEFAULT_STEP,
             method=self.choice(tree.get("method"), "method", METHODS, "rk4"),
             model=model,
             parameters={**(model.parameters if model else {}), **own},
             inputs={**variables.inputs(tree.get("inputs")), **events},
             states=variables.states(tree.get("states")),
             discrete=variables.discrete(tree.get("discrete")),
-            modes=with_regions(chart.modes, tuple(beside)),
-            initial=chart.initial,
+            modes=with_regions(main.modes, tuple(beside)),
+            initial=main.initial,
             outputs=outputs.spans,
-            span=document.name_span,
+            span=self.at,
             sources=outputs.sources,
             elements=laid_on.elements(tree.get("elements")),
             places=laid_on.places(tree.get("places")),
@@ -174,35 +173,44 @@ class _AutomatonReader(Reader):
             numbers=numbers,
             faults=variables.faults,
             fault_mode=variables.fault_mode,
-            recording_map=self._recording_map(tree.get("recording_map")),
+            recording_map=self._recording_map(),
             tables=TruthTableReader(self.problems).tables(tree),
-            superstates=read.superstates if read else (),
-            tree=read.tree if read else None,
+            superstates=modes.superstates,
+            tree=modes.tree,
         )
-        self._check_sections(tree)
+        self._check_sections()
         return automaton
 
-    def _numbers(self, tree: Table) -> NumberType:
+    def _modes(self) -> ReadModes:
+        """Return the modes: of a chart with their tree, else as they stand."""
+        reader = ModeReader(self.problems, self.model, self.tree)
+        if is_chart(self.tree):
+            return ChartReader(reader).read(self.at)
+        return ReadModes(reader.regions(self.at))
+
+    def _numbers(self) -> NumberType:
         """A sampled automaton says what it computes in; a continuous one has float64 by default."""
-        node = tree.get("numbers")
+        node = self.tree.get("numbers")
         if node is None and self.sampled:
             self.scalar(node, "numbers", self.at)
         return cast(NumberType, self.choice(node, "numbers", NUMBERS, "float64"))
 
-    def _recording_map(self, node: Node | None) -> Scalar | None:
+    def _recording_map(self) -> Scalar | None:
         """The map by which recordings are read where no other is given."""
+        node = self.tree.get("recording_map")
         return self.scalar(node, "recording_map", self.at) if node else None
 
-    def _check_sections(self, tree: Table) -> None:
+    def _check_sections(self) -> None:
         first = ("flow", "terms", "step", "method")
         for key in first if self.sampled else ("model", *FAULT_KEYS):
-            node = tree.get(key)
+            node = self.tree.get(key)
             if node is not None:
                 other = "continuous" if self.sampled else "sampled"
                 label = f"`{key}` belongs to a {other} automaton"
-                self.problems.error("form", tree.entries[key].span, label)
+                self.problems.error("form", self.tree.entries[key].span, label)
 
-    def _time(self, node: Node | None, what: str) -> Fraction | None:
+    def _time(self, what: str) -> Fraction | None:
+        node = self.tree.get(what)
         if node is None:
             return None
         value, unit = self.quantity(node, what, node.span, None)
@@ -213,88 +221,3 @@ class _AutomatonReader(Reader):
         else:
             return value
         return Fraction(1, 1000)
-
-    def _parameter(self, entry: Entry) -> Parameter:
-        own_keys = ("value", "unit", "range", "tunable", "derived", "type", "values", "table")
-        keys = (*own_keys, *FITTING_KEYS)
-        table = self.table(entry.node, f"parameters.{entry.key}", keys)
-        if "table" in table.entries:
-            return self._table_parameter(entry, table)
-        type_, values = self.typing(table, entry.key)
-        key = f"parameters.{entry.key}"
-        unit_node = table.get("unit")
-        unit: Unit | None = self.unit(unit_node) if unit_node else None
-        tunable = self.choice(table.get("tunable"), "tunable", ("true", "false"), "false") == "true"
-        kind: Kind = "tunable" if tunable else "fixed"
-        value, derived = None, None
-        if "derived" in table.entries:
-            kind = "derived"
-            derived = self._derived(table, key, entry)
-        elif type_ != "real":
-            node, what = table.get("value"), f"{key}.value"
-            value = self.value(node, what, entry.span, NO_UNIT, type_, values)
-        else:
-            value, own = self.quantity(table.get("value"), f"{key}.value", entry.span, unit)
-            unit = unit or own
-        unit = unit or parse_unit("1")
-        limits = self.range(table.get("range"), unit)
-        if limits and value is not None and not limits[0] <= value <= limits[1]:
-            span = cast(Scalar, table.get("value")).span
-            self.problems.error("range", span, f"the value of `{entry.key}` is outside its range")
-        if type_ == "int":
-            limits = self.whole_range(limits, table.get("range"))
-        fitting = self._fitting(table, unit, limits)
-        place = (entry.key, kind, unit, value, derived, limits, key, entry.span)
-        return Parameter(*place, fitting, type_, values, about=about_of(table))
-
-    def _derived(self, table: Table, key: str, entry: Entry) -> Formula | None:
-        for other in ("value", "tunable", "range", "type"):
-            if other in table.entries:
-                label = f"a derived parameter has no `{other}`"
-                self.problems.error("form", table.entries[other].span, label)
-        return self.expression(table.get("derived"), f"{key}.derived", entry.span)
-
-    def _table_parameter(self, entry: Entry, table: Table) -> Parameter:
-        key = f"parameters.{entry.key}"
-        for other in ("value", "derived", "unit", "type", "values", *FITTING_KEYS):
-            if other in table.entries:
-                label = f"a table has no `{other}` beside it"
-                self.problems.error("form", table.entries[other].span, label)
-        tunable = self.choice(table.get("tunable"), "tunable", ("true", "false"), "false")
-        kind: Kind = "tunable" if tunable == "true" else "fixed"
-        body = self.table(table.get("table"), f"{key}.table", ("over", "unit", "points"))
-        unit = self.unit(body.get("unit"))
-        limits = self.range(table.get("range"), unit)
-        reader = TableReader(self.problems)
-        reader.declared = self.declared
-        made = reader.lookup_table(body, f"{key}.table.points", limits)
-        return Parameter(
-            entry.key,
-            kind,
-            unit,
-            None,
-            None,
-            limits,
-            key,
-            entry.span,
-            table=made,
-            about=about_of(body),
-        )
-
-    def _fitting(self, table: Table, unit: Unit, limits: Range | None) -> Fitting:
-        node = table.get("neutral")
-        neutral: Fraction | Literal["absent"] | None = None
-        if isinstance(node, Scalar) and node.text == "absent":
-            neutral = "absent"
-        elif node is not None:
-            neutral, _ = self.quantity(node, "neutral", node.span, unit)
-            if limits and not limits[0] <= neutral <= limits[1]:
-                self.problems.error("range", node.span, "the neutral value is outside the range")
-        items = self.items(table.get("starts"), "starts")
-        starts = [self.quantity(item, "starts", item.span, unit)[0] for item in items]
-        for item, start in zip(items, starts, strict=True):
-            if limits and not limits[0] <= start <= limits[1]:
-                self.problems.error("range", item.span, "this start is outside the range")
-        per = self.choice(table.get("per"), "per", ("model", "recording"), "model")
-        form = self.choice(table.get("form"), "form", FORMS, "constant")
-        return Fitting(neutral, tuple(starts), cast(Per, per), cast(Form, form))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import cast
 
@@ -57,12 +57,12 @@ def _tables(node: YamlNode | None) -> Iterator[Table]:
 
 
 @dataclass(frozen=True)
-class ReadChart:
-    """What was read: the chart and the regions beside it, the superstates, the tree."""
+class ReadModes:
+    """What was read: the chart and the regions beside it; superstates and tree of a chart."""
 
     regions: tuple[Region, ...]
-    superstates: tuple[Mode, ...]
-    tree: Chart
+    superstates: tuple[Mode, ...] = ()
+    tree: Chart | None = None
 
 
 class ChartReader:
@@ -75,20 +75,26 @@ class ChartReader:
         self.raw: list[RawNode] = []
         self.broken = False
 
-    def read(self, at: Span) -> ReadChart:
+    def read(self, at: Span) -> ReadModes:
         """Return the chart of an automaton. Raises SpecError where there is no tree."""
         signals = self._signals()
-        top = Table({}, at)
-        self.raw.append(RawNode("", "", "parallel", NOWHERE, "", False, at, top))
+        self._read_tree(at)
+        chart = self._chart(signals)
+        regions = tuple(self._as_region(chart, node) for node in chart.regions)
+        return ReadModes(regions, self._superstates(), chart)
+
+    def _read_tree(self, at: Span) -> None:
+        """Read all nodes below a root, in the order of their numbers, and what is initial."""
+        self.raw.append(RawNode("", "", "parallel", NOWHERE, "", False, at, Table({}, at)))
         entries = list(self.modes.table(self.root.get("regions"), "regions"))
         for entry in entries:
             check_region_name(entry.key, entry.span, self.problems)
         if "modes" in self.root.entries:
             kept = {k: e for k, e in self.root.entries.items() if k in ("modes", "initial")}
-            self._region(Entry(CHART, at, Table(kept, at)), ROOT, "", None)
+            self._region(Entry(CHART, at, Table(kept, at)), ROOT, "")
         entries.sort(key=lambda entry: entry.key != CHART)
         for entry in entries:
-            self._region(entry, ROOT, "", None)
+            self._region(entry, ROOT, "")
         self.raw[ROOT].last = len(self.raw) - 1
         if len(self.raw) == 1:
             self.problems.error("missing", at, "a chart has at least one mode in `modes`")
@@ -97,28 +103,29 @@ class ChartReader:
         set_initials(self.raw, self.modes)
         if len(self.problems.found) > known or self.broken:
             self.problems.stop_if_any()
+
+    def _chart(self, signals: Mapping[str, Signal]) -> Chart:
         nodes = tuple(self._node(index) for index in range(len(self.raw)))
         bare = Chart(nodes, signals, "outer_first", 1, {})
-        modes_of = {n: raw.mode for n, raw in enumerate(self.raw) if raw.mode is not None}
-        ways = ways_of(bare, modes_of, self.problems)
-        modes = [raw.mode for raw in self.raw if raw.mode is not None]
-        chart = dataclasses.replace(
+        modes = {n: raw.mode for n, raw in enumerate(self.raw) if raw.mode is not None}
+        return dataclasses.replace(
             bare,
-            ways=ways,
+            ways=ways_of(bare, modes, self.problems),
             order=cast(Order, self._order()),
-            micro_steps=self._micro_steps(signals, modes),
+            micro_steps=self._micro_steps(signals, modes.values()),
         )
-        regions = tuple(self._as_region(chart, node) for node in chart.regions)
-        outer = tuple(
+
+    def _superstates(self) -> tuple[Mode, ...]:
+        """Return the modes with modes inside; what they hold was handed down to those."""
+        return tuple(
             dataclasses.replace(
                 raw.mode, equations={}, flow={}, update={}, observer=None, run=None, invariants={}
             )
             for raw in self.raw
             if raw.mode is not None and raw.number is None
         )
-        return ReadChart(regions, outer, chart)
 
-    def _region(self, entry: Entry, parent: int, prefix: str, above: Mode | None) -> None:
+    def _region(self, entry: Entry, parent: int, prefix: str) -> None:
         """Read a region: a node that its parent is always in, with what is inside it."""
         is_root = parent == ROOT
         path = f"{prefix}{entry.key}"
@@ -174,7 +181,7 @@ class ChartReader:
         prefix = "" if path == CHART else f"{path}."
         if raw.kind == "parallel":
             for entry in self.modes.named(raw.table.get("regions"), f"{key}.regions"):
-                self._region(entry, index, prefix, None)
+                self._region(entry, index, prefix)
         elif raw.kind == "compound":
             base = "" if key == f"regions.{CHART}" else f"{key}."
             for entry in self.modes.named(raw.table.get("modes"), f"{key}.modes"):
@@ -247,7 +254,7 @@ class ChartReader:
         allowed = ("outer_first", "inner_first")
         return self.modes.choice(self.root.get("order"), "order", allowed, "outer_first")
 
-    def _micro_steps(self, signals: Mapping[str, Signal], modes: list[Mode]) -> int:
+    def _micro_steps(self, signals: Mapping[str, Signal], modes: Iterable[Mode]) -> int:
         """One, or as many as modes where one tick may have several events to take."""
         raised = any(way.raises for mode in modes for way in mode.transitions)
         several = raised or sum(signal.is_input for signal in signals.values()) > 1

@@ -65,7 +65,6 @@ def parts_block(
     keep: Block = (*evaluate, *record_block(histories, whole_known), Assign(AGE.name, real(0.0)))
     record = {"record": keep} if histories else {}
     watch = tuple((mode.number, _watch(automaton, mode)) for mode in automaton.modes.values())
-    begins = begun(waits)
     return {
         "derive": derive_block(automaton),
         "init": (
@@ -73,18 +72,7 @@ def parts_block(
             *enter_initial(automaton, "memory.mode"),
             Assign("memory.faults", whole(0)),
         ),
-        "start": (
-            *initial_ops(automaton, known, field.prefix),
-            *enter_initial(automaton, "memory.mode"),
-            *(wait.load for wait in waits),
-            *forgotten(automaton),
-            *(op for r in automaton.all_regions for op in of_mode(begins, r.modes[r.initial])),
-            *((Assign(AGE.name, real(0.0)),) if histories else ()),
-            Assign("memory.time", real(0.0)),
-            Assign("memory.started", Value(True)),
-            *entered(field, automaton.modes[automaton.initial], first_entry(automaton)),
-            *fill,
-        ),
+        "start": (*_start(field, known, waits, histories), *fill),
         "equations": evaluate,
         **record,
         "watch": (*_silenced(automaton), *now, Choose("memory.mode", watch), Run("load")),
@@ -93,6 +81,23 @@ def parts_block(
         "dense": (Choose(field.mode, tuple((m.number, _dense(m)) for m in modes)),),
         "peek": (Run("point"), *ends),
     }
+
+
+def _start(field: Field, known: Names, waits: Waits, histories: tuple[History, ...]) -> Block:
+    """What a run begins with, at time 0 and in the initial mode."""
+    automaton = field.automaton
+    begins = begun(waits)
+    return (
+        *initial_ops(automaton, known, field.prefix),
+        *enter_initial(automaton, "memory.mode"),
+        *(wait.load for wait in waits),
+        *forgotten(automaton),
+        *(op for r in automaton.all_regions for op in of_mode(begins, r.modes[r.initial])),
+        *((Assign(AGE.name, real(0.0)),) if histories else ()),
+        Assign("memory.time", real(0.0)),
+        Assign("memory.started", Value(True)),
+        *entered(field, automaton.modes[automaton.initial], first_entry(automaton)),
+    )
 
 
 def _silenced(automaton: Automaton) -> Block:

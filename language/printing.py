@@ -99,6 +99,19 @@ def _cited(key: str) -> str:
 
 
 def _program_lines(program: Program) -> Iterator[str]:
+    yield from _mode_lines(program)
+    yield from _event_lines(program)
+    yield from _name_lines(program)
+    for function in program.functions:
+        several = len(function.parameters) > 1
+        yield f"function {function.name}" + (f" of {function.parameters}" if several else "")
+        yield from block_lines(function.body, 1)
+    for name, block in program.blocks.items():
+        yield f"block {name}"
+        yield from block_lines(block, 1)
+
+
+def _mode_lines(program: Program) -> Iterator[str]:
     yield f"program {program.name}"
     yield f"numbers {program.number}"
     yield f"period {program.period}" if program.period else f"major step {program.major_step}"
@@ -109,6 +122,9 @@ def _program_lines(program: Program) -> Iterator[str]:
             yield f"region {region.name} mode {mode.number} {mode.name}"
     for mode in program.run_modes:
         yield f"run mode {mode.number} {mode.name}"
+
+
+def _event_lines(program: Program) -> Iterator[str]:
     for t in program.transitions:
         wait = f" wait {t.wait} s = {t.ticks} ticks" if t.wait else ""
         back = f" rewind {t.rewind} ticks" if t.rewind else ""
@@ -120,6 +136,9 @@ def _program_lines(program: Program) -> Iterator[str]:
         yield f"invariant {info.name} of mode {info.mode} of {info.region}: {info.variable}"
     for bit, fault in enumerate(program.faults):
         yield f"fault {bit} {fault}"
+
+
+def _name_lines(program: Program) -> Iterator[str]:
     for constant in program.constants:
         stamps = f" from {', '.join(constant.depends_on)}" if constant.depends_on else ""
         limits = f" in {constant.range[0]!r} .. {constant.range[1]!r}" if constant.range else ""
@@ -133,10 +152,3 @@ def _program_lines(program: Program) -> Iterator[str]:
         yield f"default input.{name} = {value!r}"
     for wire in program.outputs:
         yield f"output {wire.name} = {wire.source}"
-    for function in program.functions:
-        several = len(function.parameters) > 1
-        yield f"function {function.name}" + (f" of {function.parameters}" if several else "")
-        yield from block_lines(function.body, 1)
-    for name, block in program.blocks.items():
-        yield f"block {name}"
-        yield from block_lines(block, 1)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -11,6 +12,10 @@ from modewright.commands.options import Json
 from modewright.console import announce, console, working
 from modewright.exits import PROBLEMS
 from modewright.files import make_folder, require_writable, write_files
+
+if TYPE_CHECKING:
+    from expectation.coverage import Coverage
+    from modewright.tests import TestRun
 
 
 def test(
@@ -39,38 +44,63 @@ def test(
     modewright test tip_out_is_detected --junit build/tests.xml
     modewright test --coverage --graphs build
     """
-    from expectation.coverage import Coverage, coverage as covered, together
-    from modewright import show_tests
-    from modewright.covered import coverage_json, covered_graph, lines_of
-    from modewright.show import print_json
+    from expectation.coverage import coverage as covered, together
+    from modewright.show_tests import lines_of
     from modewright.tests import run_tests
 
     require_writable(junit)
-    runs = []
+    runs: list[TestRun] = []
     parts: list[Coverage] = []
     with working("running tests"):
         for run in run_tests(tests or (), compiled=not interpreted):
             runs.append(run)
             parts += covered(run.test) if coverage or graphs else ()
-            for line in show_tests.lines_of(run) if not as_json else ():
-                _tell(line)
+            _tell(() if as_json else lines_of(run))
     sums = together(parts)
-    files = {junit: show_tests.junit(runs)} if junit else {}
-    if graphs:
-        make_folder(graphs)
-        files |= {graphs / f"{c.name}.svg": covered_graph(c).svg().encode() for c in sums}
-    write_files(files)
+    pictures = _write(runs, sums, junit, graphs)
     if as_json:
-        told = {"tests": [show_tests.test_json(run) for run in runs]}
-        print_json(told | ({"coverage": [coverage_json(c) for c in sums]} if sums else {}))
+        _print_json(runs, sums)
     else:
-        for line in (line for each in sums for line in lines_of(each)):
-            _tell(line)
-        _tell(show_tests.summary(runs))
-        announce([path for path in files if path != junit])
+        _tell_end(runs, sums)
+        announce(pictures)
     if not all(run.passed for run in runs):
         raise typer.Exit(PROBLEMS)
 
 
-def _tell(line: str) -> None:
-    console().print(line, soft_wrap=True, highlight=False, markup=False)
+def _write(
+    runs: Sequence[TestRun], sums: Sequence[Coverage], junit: Path | None, graphs: Path | None
+) -> list[Path]:
+    """Write the results and the pictures that are wanted; return the files of the pictures."""
+    from modewright import show_tests
+    from modewright.covered import covered_graph
+
+    results = {junit: show_tests.junit(runs)} if junit else {}
+    pictures = {}
+    if graphs:
+        make_folder(graphs)
+        pictures = {graphs / f"{c.name}.svg": covered_graph(c).svg().encode() for c in sums}
+    write_files(results | pictures)
+    return list(pictures)
+
+
+def _print_json(runs: Sequence[TestRun], sums: Sequence[Coverage]) -> None:
+    from modewright.covered import coverage_json
+    from modewright.show import print_json
+    from modewright.show_tests import test_json
+
+    told = {"tests": [test_json(run) for run in runs]}
+    print_json(told | ({"coverage": [coverage_json(c) for c in sums]} if sums else {}))
+
+
+def _tell_end(runs: Sequence[TestRun], sums: Sequence[Coverage]) -> None:
+    from modewright.covered import lines_of
+    from modewright.show_tests import summary
+
+    for each in sums:
+        _tell(lines_of(each))
+    _tell([summary(runs)])
+
+
+def _tell(lines: Iterable[str]) -> None:
+    for line in lines:
+        console().print(line, soft_wrap=True, highlight=False, markup=False)

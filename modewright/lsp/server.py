@@ -31,7 +31,8 @@ def language_server() -> LanguageServer:
 
     desk = Desk(publish)
     _answer_changes(server, desk)
-    _answer_questions(server, desk)
+    _answer_while_writing(server, desk)
+    _answer_about_names(server, desk)
     return server
 
 
@@ -65,7 +66,7 @@ def _answer_changes(server: LanguageServer, desk: Desk) -> None:
             desk.changed(uri, number, world.texts[path])
 
 
-def _answer_questions(server: LanguageServer, desk: Desk) -> None:
+def _answer_while_writing(server: LanguageServer, desk: Desk) -> None:
     @server.feature(types.TEXT_DOCUMENT_HOVER)
     def hovered(params: types.HoverParams) -> types.Hover | None:
         return hover(*desk.world(params.text_document.uri), params.position)
@@ -88,14 +89,20 @@ def _answer_questions(server: LanguageServer, desk: Desk) -> None:
     @server.feature(types.TEXT_DOCUMENT_FORMATTING)
     def laid_out(params: types.DocumentFormattingParams) -> list[types.TextEdit]:
         world, path = desk.world(params.text_document.uri)
-        text = world.texts.get(path, "")
-        try:
-            made = formatted(text)
-        except SpecError:
-            return []
-        everything = types.Range(types.Position(0, 0), types.Position(text.count("\n") + 1, 0))
-        return [] if made == text else [types.TextEdit(everything, made)]
+        return _layout(world.texts.get(path, ""))
 
+
+def _layout(text: str) -> list[types.TextEdit]:
+    """Return the edit that formats a text; none where it is formatted or cannot be."""
+    try:
+        made = formatted(text)
+    except SpecError:
+        return []
+    everything = types.Range(types.Position(0, 0), types.Position(text.count("\n") + 1, 0))
+    return [] if made == text else [types.TextEdit(everything, made)]
+
+
+def _answer_about_names(server: LanguageServer, desk: Desk) -> None:
     @server.feature(types.TEXT_DOCUMENT_DEFINITION)
     def defined(params: types.DefinitionParams) -> list[types.Location]:
         return definition(*desk.world(params.text_document.uri), params.position)
