@@ -240,6 +240,15 @@ class Reader:
         text = self.choice(scalar, what, known, known[0] if known else "")
         return Fraction(known.index(text) if text in known else 0)
 
+    def default(
+        self, table: Table, key: str, unit: Unit, kind: Type, names: Sequence[str]
+    ) -> Fraction | None:
+        """Return the `default` of an input of some type; None where there is none."""
+        node = table.get("default")
+        if node is None:
+            return None
+        return self.value(node, f"{key}.default", node.span, unit, kind, names)
+
     def whole_range(self, limits: Range | None, node: Node | None) -> Range | None:
         """Return the range of whole numbers; one with a fraction or past 32 bits is reported."""
         if limits is None or node is None:

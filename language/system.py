@@ -125,11 +125,7 @@ class _SystemReader(Reader):
         table = self.table(entry.node, f"inputs.{entry.key}", SYSTEM_INPUT_KEYS)
         kind, values = self.typing(table, entry.key)
         unit = self.unit(table.get("unit"))
-        default: Fraction | None = None
-        node = table.get("default")
-        if node is not None:
-            what = f"inputs.{entry.key}.default"
-            default = self.value(node, what, node.span, unit, kind, values)
+        default = self.default(table, f"inputs.{entry.key}", unit, kind, values)
         return SystemInput(entry.key, unit, default, entry.span, kind, values)
 
     def _instance(self, entry: Entry) -> Instance:

@@ -86,23 +86,12 @@ def block_writes(block: Block) -> Iterator[str]:
 
 def expr_names(expr: Expr) -> Iterator[str]:
     """Yield the variables and constants that an expression reads, and `call <function>`."""
-    stack = [expr]
-    while stack:
-        match stack.pop():
-            case Ref(name):
+    for part in parts(expr):
+        match part:
+            case Ref(name) | Item(name, _):
                 yield name
-            case Item(name, index):
-                yield name
-                stack.append(index)
-            case Unary(_, operand):
-                stack.append(operand)
-            case Binary(_, left, right) | Compare(_, left, right):
-                stack += (right, left)
-            case Select(condition, then, other):
-                stack += (other, then, condition)
-            case Call(function, arguments):
+            case Call(function, _):
                 yield f"call {function}"
-                stack += reversed(arguments)
 
 
 def parts(expr: Expr) -> Iterator[Expr]:

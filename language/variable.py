@@ -51,18 +51,14 @@ class VariableReader(Reader):
 
     def _input(self, entry: Entry) -> Input:
         keys = ("unit", "range", "default", "type", "values", *LIMIT_KEYS)
-        table = self.table(entry.node, f"inputs.{entry.key}", keys)
+        key = f"inputs.{entry.key}"
+        table = self.table(entry.node, key, keys)
         kind, values = self.typing(table, entry.key)
         unit = self.unit(table.get("unit"))
-        default: Fraction | None = None
-        node = table.get("default")
-        if node is not None:
-            what = f"inputs.{entry.key}.default"
-            default = self.value(node, what, node.span, unit, kind, values)
+        default = self.default(table, key, unit, kind, values)
         limits = self.range(table.get("range"), unit)
         if kind == "int":
             limits = self.whole_range(limits, table.get("range"))
-        key = f"inputs.{entry.key}"
         span = entry.span
         outside = self.limits(table, unit, kind, values, limits)
         about = about_of(table)
