@@ -13,6 +13,7 @@ the whole domain, at the zeros of sin and cos too.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from language.operation import (
@@ -24,6 +25,7 @@ from language.operation import (
     Ref,
     Select,
     Unary,
+    Value,
     add,
     divide,
     multiply,
@@ -114,9 +116,36 @@ class Body:
         return Function(name, tuple(self.ops), tuple(self.locals), about, parameters)
 
 
-def nearest(x: Expr) -> Expr:
-    """Return the whole number nearest to x, ties to even."""
-    return subtract(add(x, ROUND), ROUND)
+@dataclass(frozen=True)
+class Circle:
+    """What sin, cos and tan of a number type are made of.
+
+    `reduced` gives quadrant, head and tail of x, `kernels` sin and cos of head + tail; below
+    `tiny` sin and tan of x are x. `bound` is that of |x| [rad].
+    """
+
+    reduced: Callable[[Body], tuple[Ref, Ref, Ref]]
+    kernels: Callable[[Body, Ref, Ref], tuple[Ref, Ref]]
+    tiny: Value
+    bound: str
+
+
+@dataclass(frozen=True)
+class Lambert:
+    """The numbers of tanh in one type: x - tanh x = x z above(z) / below(z), z = x^2.
+
+    From `full` on tanh x rounds to 1, below `tiny` it is x.
+    """
+
+    above: tuple[float, ...]
+    below: tuple[float, ...]
+    full: Value
+    tiny: Value
+
+
+def nearest(x: Expr, rounding: Value = ROUND) -> Expr:
+    """Return the whole number nearest to x, ties to even; `rounding` is that of its type."""
+    return subtract(add(x, rounding), rounding)
 
 
 def within(x: Expr, low: Expr, high: Expr) -> Expr:
@@ -165,17 +194,26 @@ def reduced(body: Body) -> tuple[Ref, Ref, Ref]:
     where |coarse| >= |fine|; else coarse - fine has at most 52 bits. Near a multiple of pi/2 the
     rest of x may be as small as 2^-60.5 (x = 45.553...); head + tail has it to 2^-110.
     """
-    bounded = body.let("bounded", within(X, real(-ANGLE), real(ANGLE)))
-    quarters = body.let("quarters", nearest(multiply(bounded, PER_QUARTER)))
-    # quarters / 4 - 3/8 is never near a tie: it rounds to the floor of quarters / 4.
-    turns = body.let("turns", nearest(subtract(multiply(real(0.25), quarters), real(0.375))))
-    quadrant = body.let("quadrant", subtract(quarters, multiply(real(4.0), turns)))
+    bounded, quarters, quadrant = quartered(body, ANGLE, PER_QUARTER, ROUND)
     coarse = body.let("coarse", subtract(bounded, multiply(quarters, QUARTER[0])))
     fine = body.let("fine", multiply(quarters, QUARTER[1]))
     head = body.let("head", subtract(coarse, fine))
     lost = body.let("lost", subtract(subtract(coarse, head), fine))
     tail = body.let("tail", subtract(lost, multiply(quarters, QUARTER[2])))
     return quadrant, head, tail
+
+
+def quartered(
+    body: Body, bound: float, per_quarter: Value, rounding: Value
+) -> tuple[Ref, Ref, Ref]:
+    """Return x within its bound, the whole number of quarter turns next to it, and its quadrant."""
+    bounded = body.let("bounded", within(X, real(-bound), real(bound)))
+    quarters = body.let("quarters", nearest(multiply(bounded, per_quarter), rounding))
+    # quarters / 4 - 3/8 is never near a tie: it rounds to the floor of quarters / 4.
+    past = subtract(multiply(real(0.25), quarters), real(0.375))
+    turns = body.let("turns", nearest(past, rounding))
+    quadrant = body.let("quadrant", subtract(quarters, multiply(real(4.0), turns)))
+    return bounded, quarters, quadrant
 
 
 def kernels(body: Body, head: Ref, tail: Ref) -> tuple[Ref, Ref]:
@@ -208,41 +246,48 @@ def by_quadrant(quadrant: Expr, *values: Expr) -> Expr:
     return result
 
 
-def sine() -> Function:
-    """sin x, x clamped to [-1e5, 1e5] rad; x itself where tiny, so that sin -0.0 is -0.0."""
+CIRCLE = Circle(reduced, kernels, TINY, "1e5")
+
+
+def sine(circle: Circle = CIRCLE) -> Function:
+    """sin x, x clamped; x itself where tiny, so that sin -0.0 is -0.0."""
     body = Body()
-    quadrant, head, tail = reduced(body)
-    sin, cos = kernels(body, head, tail)
+    quadrant, head, tail = circle.reduced(body)
+    sin, cos = circle.kernels(body, head, tail)
     turned = by_quadrant(quadrant, sin, cos, Unary("-", sin), Unary("-", cos))
-    body.let("y", Select(Compare("<", Call("abs", (X,)), TINY), X, turned))
-    return body.function("sin", "sine; |x| <= 1e5 rad, clamped; error < 0.85 ULP")
+    body.let("y", Select(Compare("<", Call("abs", (X,)), circle.tiny), X, turned))
+    return body.function("sin", f"sine; |x| <= {circle.bound} rad, clamped; error < 0.85 ULP")
 
 
-def cosine() -> Function:
-    """cos x, x clamped to [-1e5, 1e5] rad."""
+def cosine(circle: Circle = CIRCLE) -> Function:
+    """cos x, x clamped."""
     body = Body()
-    quadrant, head, tail = reduced(body)
-    sin, cos = kernels(body, head, tail)
+    quadrant, head, tail = circle.reduced(body)
+    sin, cos = circle.kernels(body, head, tail)
     body.let("y", by_quadrant(quadrant, cos, Unary("-", sin), Unary("-", cos), sin))
-    return body.function("cos", "cosine; |x| <= 1e5 rad, clamped; error < 0.85 ULP")
+    return body.function("cos", f"cosine; |x| <= {circle.bound} rad, clamped; error < 0.85 ULP")
 
 
-def hyperbolic_tangent() -> Function:
+LAMBERT = Lambert(LAMBERT_ABOVE, LAMBERT_BELOW, TANH_FULL, TINY)
+
+
+def hyperbolic_tangent(numbers: Lambert = LAMBERT) -> Function:
     """tanh x by Lambert's fraction below 0.625, above as 1 - 2 / (e^2x + 1) (Cody & Waite 1980).
 
     Formed of |x| and given the sign of x; x itself where tiny, so that tanh -0.0 is -0.0.
     """
     body = Body()
+    full = numbers.full
     size = body.let("size", Call("abs", (X,)))
-    bounded = body.let("bounded", Select(Compare(">", size, TANH_FULL), TANH_FULL, size))
+    bounded = body.let("bounded", Select(Compare(">", size, full), full, size))
     square = body.let("square", multiply(bounded, bounded))
-    above = body.let("above", horner(LAMBERT_ABOVE, square))
-    below = body.let("below", horner(LAMBERT_BELOW, square))
+    above = body.let("above", horner(numbers.above, square))
+    below = body.let("below", horner(numbers.below, square))
     low = subtract(bounded, divide(multiply(multiply(bounded, square), above), below))
     power = Call("exp", (add(bounded, bounded),))
     high = subtract(real(1.0), divide(real(2.0), add(power, real(1.0))))
     split = Compare("<", bounded, TANH_SPLIT)
     magnitude = body.let("magnitude", Select(split, low, high))
     signed = Select(Compare("<", X, real(0.0)), Unary("-", magnitude), magnitude)
-    body.let("y", Select(Compare("<", size, TINY), X, signed))
+    body.let("y", Select(Compare("<", size, numbers.tiny), X, signed))
     return body.function("tanh", "hyperbolic tangent; every x; error < 1.4 ULP")

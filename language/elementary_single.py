@@ -7,16 +7,13 @@ in ULP of the exact result, were measured at every float32 of the domain (tests/
 
 from __future__ import annotations
 
-from language.elementary import Body, X, by_quadrant, horner, within
+from language.elementary import Body, Circle, Lambert, X, horner, nearest, quartered, within
 from language.operation import (
     Call,
     Compare,
-    Expr,
     Ref,
     Select,
-    Unary,
     add,
-    divide,
     multiply,
     real,
     subtract,
@@ -65,23 +62,17 @@ COS_SERIES = (0.04166664555668831, -0.0013887288514524698, 2.4428207325399853e-0
 
 TANH_FULL = real(10.0)
 """tanh x rounds to 1 from x = 9.02 on."""
-TANH_SPLIT = real(0.625)
 LAMBERT_ABOVE = (315.0, 14.0)
 LAMBERT_BELOW = (945.0, 420.0, 15.0)
 """x - tanh x = x z above(z) / below(z), z = x^2, within 2^-30 of x up to 0.625: Lambert's
 continued fraction x/(1 + z/(3 + z/(5 + z/(7 + z/9))))."""
 
 
-def nearest(x: Expr) -> Expr:
-    """Return the whole number nearest to x, ties to even."""
-    return subtract(add(x, ROUND), ROUND)
-
-
 def exponential() -> Function:
     """e^x = 2^k e^r, k whole, |r| <= ln 2 / 2, as in elementary.py; x is clamped to [-87, 88]."""
     body = Body()
     bounded = body.let("bounded", within(X, EXP_LOWEST, EXP_HIGHEST))
-    power = nearest(multiply(bounded, PER_LN_2))
+    power = nearest(multiply(bounded, PER_LN_2), ROUND)
     # The comparison is for NaN: pow2 gets a whole number always.
     exponent = body.let("exponent", Select(Compare(">", bounded, EXP_LOWEST), power, real(-126.0)))
     head = body.let("head", subtract(bounded, multiply(exponent, LN_2[0])))
@@ -100,11 +91,7 @@ def reduced(body: Body) -> tuple[Ref, Ref, Ref]:
     `coarse`, `fine` and `finer` are exact. Two differences with their rounding errors (Dekker's
     fast two-sum) leave head + tail within 2^-56 of the rest of x, which is 2^-30 or more.
     """
-    bounded = body.let("bounded", within(X, real(-ANGLE), real(ANGLE)))
-    quarters = body.let("quarters", nearest(multiply(bounded, PER_QUARTER)))
-    # quarters / 4 - 3/8 is never near a tie: it rounds to the floor of quarters / 4.
-    turns = body.let("turns", nearest(subtract(multiply(real(0.25), quarters), real(0.375))))
-    quadrant = body.let("quadrant", subtract(quarters, multiply(real(4.0), turns)))
+    bounded, quarters, quadrant = quartered(body, ANGLE, PER_QUARTER, ROUND)
     coarse = body.let("coarse", subtract(bounded, multiply(quarters, QUARTER[0])))
     fine = body.let("fine", multiply(quarters, QUARTER[1]))
     finer = body.let("finer", multiply(quarters, QUARTER[2]))
@@ -132,54 +119,8 @@ def kernels(body: Body, head: Ref, tail: Ref) -> tuple[Ref, Ref]:
     return sine, cosine
 
 
-def sine() -> Function:
-    """sin x, x clamped to [-1000, 1000] rad; x itself where tiny, so that sin -0.0 is -0.0."""
-    body = Body()
-    quadrant, head, tail = reduced(body)
-    sin, cos = kernels(body, head, tail)
-    turned = by_quadrant(quadrant, sin, cos, Unary("-", sin), Unary("-", cos))
-    body.let("y", Select(Compare("<", Call("abs", (X,)), TINY), X, turned))
-    return body.function("sin", "sine; |x| <= 1000 rad, clamped; error < 0.85 ULP")
-
-
-def cosine() -> Function:
-    """cos x, x clamped to [-1000, 1000] rad."""
-    body = Body()
-    quadrant, head, tail = reduced(body)
-    sin, cos = kernels(body, head, tail)
-    body.let("y", by_quadrant(quadrant, cos, Unary("-", sin), Unary("-", cos), sin))
-    return body.function("cos", "cosine; |x| <= 1000 rad, clamped; error < 0.85 ULP")
-
-
-def hyperbolic_tangent() -> Function:
-    """tanh x as in elementary.py: Lambert's fraction below 0.625, above 1 - 2 / (e^2x + 1)."""
-    body = Body()
-    size = body.let("size", Call("abs", (X,)))
-    bounded = body.let("bounded", Select(Compare(">", size, TANH_FULL), TANH_FULL, size))
-    square = body.let("square", multiply(bounded, bounded))
-    above = body.let("above", horner(LAMBERT_ABOVE, square))
-    below = body.let("below", horner(LAMBERT_BELOW, square))
-    low = subtract(bounded, divide(multiply(multiply(bounded, square), above), below))
-    power = Call("exp", (add(bounded, bounded),))
-    high = subtract(real(1.0), divide(real(2.0), add(power, real(1.0))))
-    split = Compare("<", bounded, TANH_SPLIT)
-    magnitude = body.let("magnitude", Select(split, low, high))
-    signed = Select(Compare("<", X, real(0.0)), Unary("-", magnitude), magnitude)
-    body.let("y", Select(Compare("<", size, TINY), X, signed))
-    return body.function("tanh", "hyperbolic tangent; every x; error < 1.4 ULP")
-
-
-def tangent() -> Function:
-    """tan x as in tangent.py: sin / cos of the reduced argument, -cos / sin in odd quadrants."""
-    body = Body()
-    quadrant, head, tail = reduced(body)
-    sin, cos = kernels(body, head, tail)
-    even, odd = divide(sin, cos), Unary("-", divide(cos, sin))
-    turned = by_quadrant(quadrant, even, odd, even, odd)
-    body.let("y", Select(Compare("<", Call("abs", (X,)), TINY), X, turned))
-    return body.function("tan", "tangent; |x| <= 1000 rad, clamped; error < 2.4 ULP")
-
-
+CIRCLE = Circle(reduced, kernels, TINY, "1000")
+LAMBERT = Lambert(LAMBERT_ABOVE, LAMBERT_BELOW, TANH_FULL, TINY)
 ARC = ArcNumbers(
     series=(
         -0.33333301544189453,

@@ -12,11 +12,11 @@ from language.tangent import angle_of, tangent
 
 MADE = (sine(), cosine(), exponential(), hyperbolic_tangent(), tangent(), angle_of())
 MADE_SINGLE = (
-    of_single.sine(),
-    of_single.cosine(),
+    sine(of_single.CIRCLE),
+    cosine(of_single.CIRCLE),
     of_single.exponential(),
-    of_single.hyperbolic_tangent(),
-    of_single.tangent(),
+    hyperbolic_tangent(of_single.LAMBERT),
+    tangent(of_single.CIRCLE),
     angle_of(of_single.ARC),
 )
 FUNCTIONS: Mapping[str, Function] = {function.name: function for function in MADE}

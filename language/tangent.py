@@ -6,7 +6,7 @@ import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from language.elementary import TINY, Body, by_quadrant, horner, kernels, reduced
+from language.elementary import CIRCLE, Body, Circle, X, by_quadrant, horner
 from language.operation import (
     Call,
     Compare,
@@ -87,16 +87,15 @@ PIECES = ("series", "centre", "upper")
 RISE, RUN = Ref("work.rise"), Ref("work.run")
 
 
-def tangent() -> Function:
+def tangent(circle: Circle = CIRCLE) -> Function:
     """tan x = sin / cos of the reduced argument, -cos / sin in odd quadrants."""
     body = Body()
-    quadrant, head, tail = reduced(body)
-    sin, cos = kernels(body, head, tail)
+    quadrant, head, tail = circle.reduced(body)
+    sin, cos = circle.kernels(body, head, tail)
     even, odd = divide(sin, cos), Unary("-", divide(cos, sin))
     turned = by_quadrant(quadrant, even, odd, even, odd)
-    x = Ref("work.x")
-    body.let("y", Select(Compare("<", Call("abs", (x,)), TINY), x, turned))
-    return body.function("tan", "tangent; |x| <= 1e5 rad, clamped; error < 2.4 ULP")
+    body.let("y", Select(Compare("<", Call("abs", (X,)), circle.tiny), X, turned))
+    return body.function("tan", f"tangent; |x| <= {circle.bound} rad, clamped; error < 2.4 ULP")
 
 
 def angle_of(numbers: ArcNumbers = DOUBLE, error: str = "1.5") -> Function:
