@@ -88,15 +88,29 @@ class Predictor:
         self.page = columns.page
         self._library = _loaded(library)
 
-    def advance(
-        self, page: Reals, inputs: Reals, mode: int, substeps: int, states: Reals
-    ) -> tuple[Reals, Reals]:
-        """Return the states `substeps` major steps later, and what is then seen."""
-        to, seen = np.empty(len(self.states)), np.empty(len(self.seen))
-        self._library.modewright_advance(
-            _at(page), _at(inputs), mode, substeps, _at(states), _at(to), _at(seen)
-        )
-        return to, seen
+    def differences(
+        self,
+        page: Reals,
+        inputs: Reals,
+        mode: int,
+        substeps: int,
+        states: Reals,
+        sizes: Reals,
+        pushes: Reals,
+    ) -> tuple[Reals, Reals, Reals]:
+        """Return how the states `substeps` major steps later (states, states) and what is then
+        seen (seen, states) change with the states, and these states with the inputs held until
+        then (states, inputs): by central differences of `sizes` (states,) and `pushes` (inputs,).
+        """
+        count = len(self.states)
+        ahead, shown = np.empty((count, count)), np.empty((count, len(self.seen)))
+        moved = np.empty((len(self.inputs), count))
+        given = [np.ascontiguousarray(a, dtype=np.float64) for a in (states, sizes, pushes)]
+        self._library.modewright_differences(
+            _at(page), _at(inputs), mode, substeps, *(_at(a) for a in given),
+            _at(ahead), _at(shown), _at(moved),
+        )  # fmt: skip
+        return ahead.T, shown.T, moved.T
 
     def gains(
         self,
@@ -198,11 +212,11 @@ def built(program: Program, columns: Columns) -> Iterator[Path]:
 def _loaded(path: Path) -> Any:
     library = ctypes.CDLL(str(path))
     pointer, whole = ctypes.c_void_p, ctypes.c_long
-    library.modewright_advance.argtypes = [
+    library.modewright_differences.argtypes = [
         *(pointer, pointer, ctypes.c_int, whole),
-        *(pointer, pointer, pointer),
+        *(pointer, pointer, pointer, pointer, pointer, pointer),
     ]
-    library.modewright_advance.restype = None
+    library.modewright_differences.restype = None
     library.modewright_gains.argtypes = [
         *(pointer, pointer, pointer, pointer, pointer),
         *(whole, whole, ctypes.c_double, pointer, pointer),

@@ -7,20 +7,16 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.free_run import Compared, Programs, free_run
-from engine.interpreter import Interpreter, Stepper
+from diagnosis.free_run import Compared
+from diagnosis.reference import Reference
 from engine.recording import Channel, Recording, cut, pieces
-from language.experiment import RecordingMap
-from language.load import program_of
-from language.model import Automaton
-from language.program import Program
 
 Values = NDArray[np.float64]
 
@@ -40,8 +36,6 @@ CLEARLY_AGAINST = 0.15
 """How much better the reversed signal has to fit: half a period of a sweep looks alike."""
 CLEARER = 0.02
 """How much better than without a lag the correlation has to be, to believe in the lag."""
-LONGEST_STEP, STABLE = 0.004, 3.0
-"""Longest major step [s], and how far it stays below the largest stable one."""
 LONGEST_PIECE, SHORTEST_PIECE = Fraction(10), Fraction(4)
 MOST_SIMULATED = Fraction(24)
 """Longest and shortest piece, and longest time of all, that is simulated for this [s]."""
@@ -77,21 +71,10 @@ class Relation:
         return self.lag if self.is_clear and self.improvement > CLEARER else 0.0
 
 
-def relations(
-    recordings: Sequence[Recording],
-    mapping: RecordingMap,
-    automaton: Automaton,
-    build: Callable[[Program], Stepper] = Interpreter,
-    made: Programs | None = None,
-) -> list[Relation]:
-    """Return how the outputs of each piece go with a simulation under the recorded inputs.
-
-    Programs `made` by an earlier call for the same automaton are not made again.
-    """
+def relations(recordings: Sequence[Recording], reference: Reference) -> list[Relation]:
+    """Return how the outputs of each piece go with a simulation under the recorded inputs."""
     found: list[Relation] = []
     left = MOST_SIMULATED
-    automaton = _coarse(automaton)
-    made = {} if made is None else made
     each = min(LONGEST_PIECE, max(SHORTEST_PIECE, MOST_SIMULATED / max(1, len(recordings))))
     for recording in recordings:
         for piece in pieces(recording):
@@ -99,24 +82,11 @@ def relations(
                 return found
             part = _thinned(lively(piece, each))
             left -= part.end - part.start
-            run = free_run(automaton, part, mapping, build, made)
-            for name, compared in run.compared.items():
+            for name, compared in reference.run(part).compared.items():
                 relation = relation_of(part.name, name, compared)
                 if relation:
                     found.append(relation)
     return found
-
-
-def _coarse(automaton: Automaton) -> Automaton:
-    """Return an automaton with as long a major step as is stable and sees motion of 4 Hz."""
-    motion = program_of(automaton).motion
-    limits = [limit.step for limit in motion.limits] if motion else []
-    if not limits:
-        return automaton
-    most = min(LONGEST_STEP, min(limits) / STABLE)
-    return dataclasses.replace(
-        automaton, step=max(automaton.step, Fraction(round(most * 1e6), 10**6))
-    )
 
 
 def lively(piece: Recording, longest: Fraction) -> Recording:

@@ -63,12 +63,12 @@ def evidence(model: Estimate, base: Estimate, series: Sequence[Series]) -> Evide
     if not np.isfinite(model.cost):
         return Evidence(-np.inf, -np.inf, (-np.inf,) * len(series))
     shrink = 1.0 / inflation(model, series)
-    count = float(np.sum(model.outcome.counts()))
+    count = float(np.sum(model.outcome.counts))
     more = _free(model, len(series)) - _free(base, len(series))
     price = 0.5 * more * np.log(max(count * shrink, 2.0))
     train = shrink * (base.cost - model.cost) - price
     before, after = _left_out(base, series), _left_out(model, series)
-    each = shrink * _gained(before, after, model.outcome.counts())
+    each = shrink * _gained(before, after, model.outcome.counts)
     return Evidence(float(train), float(np.sum(each)), tuple(float(one) for one in each))
 
 
@@ -131,7 +131,7 @@ def _without(model: Estimate, series: Sequence[Series], fold: int) -> Outcome:
     Where not even a tenth of it does, the model stays where it is.
     """
     assert model.normal is not None
-    scale = model.outcome.variances()
+    scale = model.outcome.variances
     there = stepped(model.candidate, model.point, model.normal.without(fold), 0.0)
     limit = _kept_cost(model, model.outcome, model.point, fold, scale)
     for part in PARTS:
@@ -153,7 +153,7 @@ def _kept_cost(model: Estimate, outcome: Outcome, point: Point, fold: int, scale
 
 def _squares(outcome: Outcome, fold: int, others: bool) -> Reals:
     """Return the sums of squares (recordings, seen) of a fold, or of all others."""
-    squares = outcome.squares()
+    squares = outcome.squares
     found = np.zeros((len(squares), squares[0].shape[1]))
     for block in outcome.blocks:
         if (block.fold != fold) == others:

@@ -65,7 +65,7 @@ class _Weights:
     """Innovations over their standard deviations; those far out count less (Huber 1964)."""
 
     def __init__(self, model: Estimate, innovations: Sequence[Reals]) -> None:
-        size = np.sqrt(model.outcome.variances())
+        size = np.sqrt(model.outcome.variances)
         limits = model.outcome.limits
         self.weights = [
             np.where(np.isfinite(e), 1.0 / np.sqrt(np.maximum(np.abs(e) / limits, 1.0)), 0.0) / size

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import numpy as np
-from matplotlib import mlab
 from numpy.typing import NDArray
 
 from diagnosis.channel_check import ChannelCheck, check_channel
 from diagnosis.needs import EFFECTS, NEEDS
+from diagnosis.spectrum import spectrum
 from engine.recording import Channel, Recording, pieces
 from language.map import column_dimension
 from language.units import NUMBER, fits, parse_unit
@@ -24,6 +24,8 @@ STEP_SIZE = 0.15
 """Least size of a step, in the range of the signal."""
 REVERSED = 0.02
 """How far beyond 0 a signal has to go on both sides to reverse, in its largest value."""
+LONGEST_WINDOW = 512
+"""Samples of a window of a spectrum."""
 ABOVE_NOISE = 10.0
 """Power over that of the noise from which a frequency is excited."""
 SPEEDS, POSITIONS = ("rad/s", "m/s"), ("rad", "m")
@@ -168,10 +170,7 @@ def _band(values: Values, rate: float, floor: float) -> float:
     """Return the highest frequency [Hz] at which there is clearly more than noise."""
     if len(values) < 64 or not rate:
         return 0.0
-    length = min(len(values), 512)
-    power, frequencies = map(
-        np.asarray, mlab.psd(values, length, rate, mlab.detrend_mean, noverlap=length // 2)
-    )
+    frequencies, power = spectrum(values, rate, LONGEST_WINDOW)
     excited = frequencies[1:][power[1:] > ABOVE_NOISE * 2.0 * floor**2 / rate]
     return float(excited.max()) if len(excited) else 0.0
 

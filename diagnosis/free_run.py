@@ -61,7 +61,7 @@ class FreeRun:
 
 
 Programs = dict[tuple[tuple[str, ...], ...], Mapping[str, Program]]
-"""Programs made for free runs, by the states that were recorded and the inputs that vary."""
+"""Programs made for free runs, by the inputs, those of start values as well, and which vary."""
 
 
 def free_run(
@@ -100,17 +100,27 @@ def free_run(
         every=automaton.step,
         span=mapping.span,
     )
-    system = around(_startable(automaton, known))
-    varying = [name for name, stimulus in scenario.inputs.items() if stimulus.varies]
-    kind = (tuple(known), tuple(varying))
-    made = {} if made is None else made
-    if kind not in made:
-        made[kind] = programs_of(system, scenario)
-    trajectory = simulate(system, scenario, build, programs=made[kind])
+    trajectory = _simulated(_startable(automaton, known), scenario, build, made)
     compared = {
         channel.column.name: _compared(automaton, channel, trajectory, start) for channel in outputs
     }
     return FreeRun(trajectory, start, compared)
+
+
+def _simulated(
+    automaton: Automaton,
+    scenario: Scenario,
+    build: Callable[[Program], Stepper],
+    made: Programs | None,
+) -> Trajectory:
+    """Return what an automaton does, by Programs that were `made` before if there are such."""
+    system = around(automaton)
+    varying = [name for name, stimulus in scenario.inputs.items() if stimulus.varies]
+    kind = (tuple(automaton.inputs), tuple(varying))
+    made = {} if made is None else made
+    if kind not in made:
+        made[kind] = programs_of(system, scenario)
+    return simulate(system, scenario, build, programs=made[kind])
 
 
 def _startable(automaton: Automaton, names: Collection[str]) -> Automaton:
@@ -149,7 +159,7 @@ def _compared(
 ) -> Compared:
     output = channel.column.compare or ""
     first = bisect_left(channel.times, start)
-    times = np.array([float(time - start) for time in channel.times[first:]])
+    times = channel.seconds[first:] - float(start)
     until = int(np.searchsorted(times, trajectory.times[-1], side="right"))
     signal = trajectory.signals[f"{automaton.name}.{output}"]
     return Compared(

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
+from codegen.predictor import Predictor
 
 Reals = NDArray[np.float64]
 LARGEST = 1e12
@@ -27,23 +28,20 @@ class Linear:
 
 
 def linearised(
-    advance: Callable[[Reals, Reals], tuple[Reals, Reals]], at: Reals, inputs: Reals, sizes: Reals
+    predictor: Predictor,
+    page: Reals,
+    mode: int,
+    substeps: int,
+    states: Reals,
+    inputs: Reals,
+    sizes: Reals,
 ) -> Linear | None:
-    """Return the model near states `at` by central differences of `sizes` (states,).
+    """Return the model over one sample near `states` (states,) in a mode under `inputs`.
 
-    `advance` gives the states a sample after some states under inputs, and what is then seen. None
-    where they leave all bounds within the sample.
+    By central differences of `sizes` (states,). None where they leave all bounds in the sample.
     """
-    with np.errstate(invalid="ignore", over="ignore"):
-        steps = np.diag(np.maximum(sizes, SMALLEST))
-        pairs = [(advance(at + step, inputs), advance(at - step, inputs)) for step in steps]
-        width = 2.0 * np.diag(steps)
-        ahead = np.array([high[0] - low[0] for high, low in pairs]).T / width
-        shown = np.array([high[1] - low[1] for high, low in pairs]).T / width
-        pushes = np.diag(np.maximum(PUSH * np.abs(inputs), PUSH))
-        ends = [(advance(at, inputs + push)[0], advance(at, inputs - push)[0]) for push in pushes]
-        moved = np.array([high - low for high, low in ends]).reshape(len(inputs), len(at))
-        b = moved.T / (2.0 * np.diag(pushes))
-    if not np.max(np.abs(np.hstack([ahead, b]))) < LARGEST:
+    steps, pushes = np.maximum(sizes, SMALLEST), np.maximum(PUSH * np.abs(inputs), PUSH)
+    phi, shown, b = predictor.differences(page, inputs, mode, substeps, states, steps, pushes)
+    if not np.max(np.abs(np.hstack([phi, b]))) < LARGEST:
         return None
-    return Linear(ahead, shown @ np.linalg.pinv(ahead), b)
+    return Linear(phi, shown @ np.linalg.pinv(phi), b)

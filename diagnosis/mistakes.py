@@ -202,7 +202,7 @@ def _costs(model: Estimate, series: Sequence[Series]) -> Reals:
             continue
         quick = _quick(outcome.innovations[0], float(one.period))
         spread = np.log(np.maximum(np.nanmean(quick**2, axis=0), 1e-300))
-        found.append(float(np.sum(0.5 * outcome.counts() * spread)))
+        found.append(float(np.sum(0.5 * outcome.counts * spread)))
     return np.array(found)
 
 

@@ -67,19 +67,22 @@ def _known(changes: Reals) -> Reals:
 def normal_of(candidate: Candidate, outcome: Outcome, columns: Columns) -> Normal:
     """Return the normal equations of an outcome, of all coordinates of a candidate."""
     count, blocks = len(candidate.uncertain), outcome.blocks
-    scale = 1.0 / outcome.variances()
+    scale = 1.0 / outcome.variances
+    each = []
+    for r, innovation in enumerate(outcome.innovations):
+        known = np.isfinite(innovation)
+        far = np.maximum(np.abs(innovation) / outcome.limits, 1.0)
+        changes = np.array([columns[name][r] for name in candidate.names])
+        jacobian = changes.reshape(count, *innovation.shape) * known
+        each.append((jacobian, np.where(known, scale / far, 0.0), np.where(known, innovation, 0.0)))
     a = np.zeros((len(blocks), count, count))
     g = np.zeros((len(blocks), count))
     for place, block in enumerate(blocks):
-        r, part = block.recording, block.part
-        innovation = outcome.innovations[r][part]
-        known = np.isfinite(innovation)
-        far = np.maximum(np.abs(innovation) / outcome.limits, 1.0)
-        each = [columns[name][r][part] * known for name in candidate.names]
-        jacobian = np.array(each).reshape(count, innovation.size)
-        weighted = jacobian * np.where(known, scale / far, 0.0).reshape(-1)
-        a[place] = weighted @ jacobian.T
-        g[place] = weighted @ np.where(known, innovation, 0.0).reshape(-1)
+        jacobian, weight, innovation = (one[..., block.part, :] for one in each[block.recording])
+        changes = jacobian.reshape(count, innovation.size)
+        weighted = changes * weight.reshape(-1)
+        a[place] = weighted @ changes.T
+        g[place] = weighted @ innovation.reshape(-1)
     of, fold = [np.array([getattr(b, name) for b in blocks]) for name in ("recording", "fold")]
     return Normal(a, g, is_own(candidate), of, fold)
 

@@ -128,5 +128,5 @@ def _innovations(model: Estimate, record: Series, point: Point) -> Reals | None:
     run = predicted(model.candidate, [record], [values], model.gains, model.noises.limits)
     if not run.is_whole:
         return None
-    size = np.sqrt(model.outcome.variances())
+    size = np.sqrt(model.outcome.variances)
     return np.asarray((run.innovations[0] / size).reshape(-1), dtype=np.float64)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -81,7 +82,7 @@ class Outcome:
     limits: Reals = field(repr=False)
     is_whole: bool = True
 
-    @property
+    @cached_property
     def blocks(self) -> list[Block]:
         """The recordings, each cut into `FOLDS` blocks."""
         found = []
@@ -95,10 +96,11 @@ class Outcome:
         """Return sum over channels of N/2 log(mean square), the negative log likelihood [nats]."""
         if not self.is_whole:
             return np.inf
-        return float(np.sum(0.5 * self.counts() * np.log(self.variances())))
+        return float(np.sum(0.5 * self.counts * np.log(self.variances)))
 
+    @cached_property
     def squares(self) -> list[Reals]:
-        """Return the squares that count (Huber 1964), (samples, seen) for each recording."""
+        """The squares that count (Huber 1964), (samples, seen) for each recording."""
         found = []
         for e in self.innovations:
             near = np.minimum(np.abs(e), self.limits)
@@ -109,15 +111,17 @@ class Outcome:
         """Return the standard deviation of the innovations by their median (seen,)."""
         return MAD * np.nanmedian(np.abs(np.concatenate(self.innovations)), axis=0)
 
+    @cached_property
     def counts(self) -> Reals:
-        """Return how many innovations each channel has (seen,)."""
+        """How many innovations each channel has (seen,)."""
         found: Reals = np.sum([np.sum(np.isfinite(e), axis=0) for e in self.innovations], axis=0)
         return found
 
+    @cached_property
     def variances(self) -> Reals:
-        """Return the mean square innovation of each channel (seen,)."""
-        squares = np.sum([np.nansum(one, axis=0) for one in self.squares()], axis=0)
-        found: Reals = np.maximum(squares / np.maximum(self.counts(), 1.0), 1e-300)
+        """The mean square innovation of each channel (seen,)."""
+        squares = np.sum([np.nansum(one, axis=0) for one in self.squares], axis=0)
+        found: Reals = np.maximum(squares / np.maximum(self.counts, 1.0), 1e-300)
         return found
 
 
@@ -204,11 +208,8 @@ def near(
     candidate: Candidate, page: Reals, mode: int, states: Reals, inputs: Reals
 ) -> Linear | None:
     """Return a candidate over one sample, linearised in a mode near a point; None if unstable."""
-
-    def advance(at: Reals, under: Reals) -> tuple[Reals, Reals]:
-        return candidate.predictor.advance(page, under, mode, candidate.recipe.substeps, at)
-
-    return linearised(advance, states, inputs, SMALL * candidate.spans)
+    substeps, sizes = candidate.recipe.substeps, SMALL * candidate.spans
+    return linearised(candidate.predictor, page, mode, substeps, states, inputs, sizes)
 
 
 def _turns(candidate: Candidate, linear: Linear) -> NDArray[np.bool_]:

@@ -13,6 +13,7 @@ from diagnosis.disagreement import disagreements
 from diagnosis.excitation import Excitation, excitation
 from diagnosis.finding import Finding, by_severity
 from diagnosis.outlier import outliers, pauses, without_huge
+from diagnosis.reference import Reference
 from diagnosis.remedy import cured, milliseconds, remedies
 from engine.interpreter import Interpreter, Stepper
 from engine.recording import Recording, pieces
@@ -59,39 +60,51 @@ def check_recordings(
     `mistakes` finds wrong clocks and signs, or returns None where it cannot: what a simulation
     tells of clocks is a hint, no more.
     """
-    channels, findings = [], []
-    for recording in recordings:
-        findings += [*outliers(recording, automaton), *pauses(recording)]
-    leapt = {finding.recording for finding in findings if finding.kind == "leap"}
-    far = {(finding.recording, finding.channel) for finding in findings}
+    strange = [f for one in recordings for f in (*outliers(one, automaton), *pauses(one))]
     recordings = [without_huge(recording) for recording in recordings]
-    for recording in recordings:
-        for channel in recording.channels.values():
-            check = check_channel(recording, channel)
-            channels.append(check)
-            findings += findings_of(check, channel.column.compare is not None)
+    channels, findings = _each(recordings, strange)
     excited = excitation(recordings, channels)
-    findings = [f for f in findings if f.kind not in ("dropped", "gap") or f.recording not in leapt]
+    far = {(finding.recording, finding.channel) for finding in strange}
     findings += [
         finding
         for finding in _missing(recordings, channels, mapping, automaton)
         if (finding.recording, finding.channel) not in far
     ]
     findings += _too_little(recordings, channels, excited)
-    found: list[Relation] = []
+    reference = None
     if automaton is not None and automaton.period is None:
-        for recording in recordings:
-            findings += milliseconds(recording, mapping, automaton, build)
-    broken = {f.recording for f in findings if f.kind in BROKEN}
+        reference = Reference(automaton, mapping, build)
+        findings += [f for one in recordings for f in milliseconds(one, reference)]
+    broken = {finding.recording for finding in findings if finding.kind in BROKEN}
     whole = [one for one in recordings if "" not in broken and one.name not in broken]
+    found: list[Relation] = []
     if automaton is None and whole:
         findings += alike(whole)
-    if automaton is not None and automaton.period is None and whole:
-        found = relations(whole, mapping, automaton, build)
-        odd = disagreements(found, automaton, mapping, whole)
-        odd = cured(odd, remedies(found, whole, mapping, automaton, build, odd))
+    if reference is not None and whole:
+        found = relations(whole, reference)
+        odd = disagreements(found, reference.automaton, mapping, whole)
+        odd = cured(odd, remedies(found, whole, reference, odd))
         findings += _compared(odd, whole, mistakes)
     return RecordingCheck(tuple(channels), by_severity(findings), excited, tuple(found))
+
+
+def _each(
+    recordings: Sequence[Recording], strange: Sequence[Finding]
+) -> tuple[list[ChannelCheck], list[Finding]]:
+    """Return the facts of each channel, and what was found beside what was `strange` before.
+
+    Where stamps leap, gaps are no news.
+    """
+    leapt = {finding.recording for finding in strange if finding.kind == "leap"}
+    channels, findings = [], list(strange)
+    for recording in recordings:
+        for channel in recording.channels.values():
+            check = check_channel(recording, channel)
+            channels.append(check)
+            findings += findings_of(check, channel.column.compare is not None)
+    return channels, [
+        one for one in findings if one.kind not in ("dropped", "gap") or one.recording not in leapt
+    ]
 
 
 def _compared(

@@ -9,12 +9,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.gridspec import SubplotSpec
 from numpy.typing import NDArray
-from scipy.signal import welch
 
 from diagnosis.channel_check import ChannelCheck
 from diagnosis.excitation import Excitation, SignalExcitation
 from diagnosis.finding import told
 from diagnosis.recording_check import RecordingCheck
+from diagnosis.spectrum import spectrum
 from engine.band import PALETTE
 from engine.plot import Picture
 from engine.recording import Channel, Recording
@@ -26,6 +26,8 @@ MOST_CHANNELS = 6
 """Most channels drawn: the picture stays on one page."""
 MOST_POINTS = 4000
 """Most points of a curve; beyond, the smallest and largest of each stretch are drawn."""
+LONGEST_WINDOW = 1024
+"""Samples of a window of a spectrum."""
 MOST_FINDINGS = 5
 LONGEST_LINE = 200
 BLUE, RED, GREEN, YELLOW, _, PURPLE, GREY = PALETTE
@@ -185,7 +187,7 @@ def _spectrum(axis: Axes, recordings: Sequence[Recording], check: RecordingCheck
         if len(channel.array) < 64:
             continue
         values = (channel.array - channel.array.mean()) / _factor(channel)
-        frequencies, power = welch(values, one.rate, nperseg=min(len(values), 1024))
+        frequencies, power = spectrum(values, one.rate, LONGEST_WINDOW)
         axis.loglog(frequencies[1:], np.sqrt(power[1:]) + 1e-12, color="#cc7a00", lw=0.9, alpha=0.8)
     noise = max(facts[0].noise, facts[0].quantum / np.sqrt(12.0)) / facts[0].factor
     if noise:

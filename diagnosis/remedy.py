@@ -7,7 +7,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,14 +15,12 @@ import numpy as np
 from diagnosis.consistency import SHORTEST_PIECE, Relation, lively, relations
 from diagnosis.disagreement import FACTORS, MOST
 from diagnosis.finding import Finding
-from diagnosis.free_run import Programs
-from engine.interpreter import Stepper
+from diagnosis.reference import Reference
 from engine.recording import Channel, Recording, pieces
-from language.experiment import Column, RecordingMap
+from language.experiment import Column
 from language.map import column_dimension
 from language.model import Automaton
 from language.problem import SpecError
-from language.program import Program
 from language.units import fits, parse_unit
 
 NEAR_ONE = 1.6
@@ -35,6 +33,9 @@ FACTORS_TRIED = (
 """Factors as in `FACTORS`; some of these are too near to others to be told without a trial."""
 FAR = 0.7
 """Distance from the model (the logarithm of a gain of 2) that a remedy has to make up for."""
+LARGEST_GAIN = 6.0
+"""Gains that an output may have, or their inverse, once its unit is right: a simulation that starts
+with a speed in a wrong unit is a wild one."""
 SURE = 0.9
 """Correlation from which what the gain says of a unit needs no trial."""
 LONGEST_STEP, MOST_STEPS = 0.5, 200
@@ -78,9 +79,7 @@ class Remedy:
 def remedies(
     found: Sequence[Relation],
     recordings: Sequence[Recording],
-    mapping: RecordingMap,
-    automaton: Automaton,
-    build: Callable[[Program], Stepper],
+    reference: Reference,
     known: Sequence[Finding] = (),
 ) -> list[Finding]:
     """Return the remedies of recordings that do not go with the model as they are.
@@ -102,16 +101,12 @@ def remedies(
     ]
     odd = sorted(odd, key=lambda one: -max(_distance(r) for r in by_name[one.name]))
     told: dict[str, Remedy] = {}
-    made: Programs = {}
-
-    def run(recording: Recording) -> list[Relation]:
-        return relations([recording], mapping, automaton, build, made)
-
     for recording in odd[:MOST_TRIED]:
         part = lively(pieces(recording)[0], SHORTEST_PIECE)
         most = max(_distance(r) for r in by_name[recording.name]) - FAR
-        best = _best(part, list(dict.fromkeys(told.values())), most, run)
-        best = best or _best(part, _possible(recording, automaton), most, run)
+        best = _best(part, list(dict.fromkeys(told.values())), most, reference)
+        possible = _possible(recording, reference.automaton, by_name[recording.name])
+        best = best or _best(part, possible, most, reference)
         if best is not None:
             told[recording.name] = best
     alike = set(told.values())
@@ -120,12 +115,7 @@ def remedies(
     return [remedy.finding(name) for name, remedy in told.items()]
 
 
-def milliseconds(
-    recording: Recording,
-    mapping: RecordingMap,
-    automaton: Automaton,
-    build: Callable[[Program], Stepper],
-) -> list[Finding]:
+def milliseconds(recording: Recording, reference: Reference) -> list[Finding]:
     """Return whether the time of a recording is one of milliseconds.
 
     That is sure where the recording then goes with the model; else it is asked.
@@ -138,13 +128,15 @@ def milliseconds(
         ),
         default=0.0,
     )
-    steps = usual / float(automaton.step)
+    steps = usual / float(reference.automaton.step)
     if usual < LONGEST_STEP or steps < MOST_STEPS:
         return []
-    text = f"a sample each {usual:.4g} s is one in {steps:.4g} steps of `{automaton.name}`"
+    text = (
+        f"a sample each {usual:.4g} s is one in {steps:.4g} steps of `{reference.automaton.name}`"
+    )
     try:
         part = lively(pieces(_faster(recording))[0], SHORTEST_PIECE)
-        after = relations([part], mapping, automaton, build)
+        after = relations([part], reference)
     except (SpecError, ArithmeticError):
         after = []
     is_sure = bool(after) and all(_is_right(relation) for relation in after)
@@ -165,13 +157,13 @@ def _best(
     recording: Recording,
     possible: Sequence[Remedy],
     most: float,
-    run: Callable[[Recording], list[Relation]],
+    reference: Reference,
 ) -> Remedy | None:
     """Return the remedy after which all outputs go with the model; the one nearest to it."""
     distances = {}
     for remedy in possible:
         try:
-            after = run(remedy.of(recording))
+            after = relations([remedy.of(recording)], reference)
         except (SpecError, ArithmeticError):
             continue
         if after and all(_is_right(relation) for relation in after):
@@ -180,8 +172,15 @@ def _best(
     return min(near, key=lambda one: distances[one], default=None)
 
 
-def _possible(recording: Recording, automaton: Automaton) -> list[Remedy]:
-    """Return what can be tried with the columns that are used."""
+def _possible(
+    recording: Recording, automaton: Automaton, known: Sequence[Relation]
+) -> list[Remedy]:
+    """Return what can be tried with the columns that are used.
+
+    Of an output it is `known` about how large it is: a factor that does not make up for that is
+    not tried.
+    """
+    gains = {relation.channel: relation.gain for relation in known}
     used = {
         name: channel.column
         for name, channel in recording.channels.items()
@@ -192,6 +191,7 @@ def _possible(recording: Recording, automaton: Automaton) -> list[Remedy]:
         for name, column in used.items()
         for factor, unit, reason in FACTORS_TRIED
         if not unit or fits(parse_unit(unit).dimension, column_dimension(column))
+        if abs(math.log(abs(gains.get(name, factor)) / factor)) < math.log(LARGEST_GAIN)
     ]
     found += [
         Remedy(one, other=two)

@@ -126,14 +126,14 @@ def turned(estimate: Estimate, series: Sequence[Series]) -> Estimate:
     own = [k for k, one in enumerate(uncertain) if one.per_recording and len(one.starts) > 1]
     if not own or not np.isfinite(estimate.cost):
         return estimate
-    variances = estimate.outcome.variances()
+    variances = estimate.outcome.variances
     best, lowest = estimate.point.own.copy(), np.full(len(series), np.inf)
     for k in own:
         for start in uncertain[k].starts:
             trial = best.copy()
             trial[:, k] = uncertain[k].coordinate(start)
             outcome = outcome_at(estimate, series, Point(estimate.point.shared, trial))
-            each = np.array([np.nansum(one / variances) for one in outcome.squares()])
+            each = np.array([np.nansum(one / variances) for one in outcome.squares])
             better = each < lowest
             best[better, k], lowest[better] = trial[better, k], each[better]
     point = Point(estimate.point.shared, best)

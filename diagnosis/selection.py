@@ -97,14 +97,7 @@ def selected(
             model = better
             base = base if accepted else better
         rounds.append(tried)
-        likely = [*known, *tried] if known else tried
-        layers = list({t.layer.id: t.layer for t in likely if t.promised > 0.0}.values())[:NEXT]
-        enough = (
-            t
-            for t in tried
-            if t.evidence and counted(t.evidence, left_out) > max(needed, thresholds.of(t.layer))
-        )
-        best = next(enough, None)
+        best = _enough(tried, needed, thresholds, left_out)
         if best is None or best.estimate is None or best.evidence is None:
             break
         gained = counted(best.evidence, left_out)
@@ -113,9 +106,29 @@ def selected(
         before = [*accepted, best]
         accepted, model = swapped(bench, best.estimate, before, rounds[0], units, tell)
         rounds[0] = _refuted(rounds[0], before, accepted)
+        layers = _likely([*known, *tried])
     kept, model = _still_needed(bench, base, model, accepted, units, thresholds, tell)
     first = tuple(rounds[0]) if rounds else ()
     return Selection(base, model, kept, first, _rivals(first, kept))
+
+
+def _enough(
+    tried: Sequence[Tried], needed: float, thresholds: Thresholds, left_out: float
+) -> Tried | None:
+    """Return the best candidate that gains what is needed."""
+    return next(
+        (
+            t
+            for t in tried
+            if t.evidence and counted(t.evidence, left_out) > max(needed, thresholds.of(t.layer))
+        ),
+        None,
+    )
+
+
+def _likely(tried: Sequence[Tried]) -> list[Layer]:
+    """Return the layers that are looked at again beside an accepted one."""
+    return list({t.layer.id: t.layer for t in tried if t.promised > 0.0}.values())[:NEXT]
 
 
 def _near_best(known: Sequence[Tried]) -> list[Layer]:

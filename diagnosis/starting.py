@@ -35,7 +35,7 @@ def settled_at_start(series: Series) -> Series:
 
 def started(model: Estimate, series: Sequence[Series]) -> tuple[Series, ...]:
     """Return recordings with the first inputs with which a model foresees them best."""
-    variances = model.outcome.variances()
+    variances = model.outcome.variances
     found = []
     for r, one in enumerate(series):
         alone = Point(model.point.shared, model.point.own[r : r + 1])
@@ -43,7 +43,7 @@ def started(model: Estimate, series: Sequence[Series]) -> tuple[Series, ...]:
         trials = [one, *_others(one, model.noises.inputs)]
         for trial in trials:
             outcome = outcome_at(model, [trial], alone)
-            squares = np.nansum(outcome.squares()[0], axis=0)
+            squares = np.nansum(outcome.squares[0], axis=0)
             costs.append(0.5 * float(np.sum(squares / variances)) if outcome.is_whole else np.inf)
         best = int(np.argmin(costs))
         found.append(trials[best] if costs[best] < costs[0] - CLEARLY else one)

@@ -62,6 +62,7 @@ class ChannelReader:
         samples = self.file.read(name)
         found: list[Fraction | None] = []
         last: Fraction | None = None
+        rounded = -math.inf
         factor = self.mapping.time_unit.factor
         for k in range(len(samples.values)):
             if self.is_full:
@@ -73,9 +74,11 @@ class ChannelReader:
             elif name == self.mapping.time or text:
                 label = f"the time stamp `{text}` is not a number" if text else "no time stamp"
                 self.problems.error("time", samples.place(k), label)
-            if value is not None and last is not None and value <= last:
-                self._unsorted(text, last, samples.place(k))
-            last = value if value is not None else last
+            if value is not None:
+                number = samples.values[k] or 0.0
+                if last is not None and number <= rounded and value <= last:
+                    self._unsorted(text, last, samples.place(k))
+                last, rounded = value, number
             found.append(value)
         return found
 
@@ -185,4 +188,4 @@ def _exact(text: str) -> Fraction | None:
     whole, _, part = text.partition(".")
     is_plain = "e" not in text and "E" not in text
     value = Fraction(int(whole + part), 10 ** len(part)) if is_plain else Fraction(text)
-    return value if abs(value) < LATEST_TIME else None
+    return value if abs(value.numerator) < LATEST_TIME * value.denominator else None

@@ -29,11 +29,12 @@ class Course:
         self.varies = stimulus.varies
         self._starts = [piece.start for piece in stimulus.pieces]
         self._formulas = formulas
+        self._latest = 0
 
     def at(self, time: Fraction, since: Fraction | None = None) -> float | bool:
         """Return the value at a time; `since` picks the piece active then: the limit from below."""
         within = time if since is None else since
-        number = max(0, bisect_right(self._starts, within) - 1)
+        number = self._number(within)
         piece = self.pieces[number]
         if piece.formula:
             return self._formulas(piece_block(self.name, number), float(max(time, Fraction(0))))
@@ -41,6 +42,13 @@ class Course:
         if piece.slope:
             exact += piece.slope * (max(time, Fraction(0)) - piece.start)
         return bool(exact) if self.truth else exact.numerator / exact.denominator
+
+    def _number(self, time: Fraction) -> int:
+        """Return the place of the piece that is active at a time: most often that of before."""
+        starts, latest = self._starts, self._latest
+        if not starts[latest] <= time or (latest + 1 < len(starts) and starts[latest + 1] <= time):
+            self._latest = max(0, bisect_right(starts, time) - 1)
+        return self._latest
 
     def events(self) -> list[Fraction]:
         """Return when pieces start, after time 0."""

@@ -203,10 +203,10 @@ def test_thresholds_are_those_of_an_effect_at_all_its_places(bench: Bench) -> No
     assert (found.text, found.most, Thresholds().text) == ("25 to 30", 30.0, "75")
 
 
-def test_an_effect_that_brings_modes_has_to_gain_three_times_the_usual() -> None:
+def test_an_effect_that_brings_modes_has_to_gain_twice_the_usual() -> None:
     gap = next(effect for effect in shipped_effects() if effect.name == "backlash")
     layer = Layer(gap, "half_shaft", "half_shaft")
-    assert Thresholds().of(layer) == 3.0 * USUAL
+    assert Thresholds().of(layer) == 2.0 * USUAL
     assert Thresholds({"backlash": 60.0}).of(layer) == 60.0
     assert SIMULATED.of(layer) == SIMULATED.usual
 

@@ -1,0 +1,45 @@
+"""Reference: the automaton that recordings are checked against, alone under their inputs."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import cached_property
+
+from diagnosis.free_run import FreeRun, Programs, free_run
+from engine.interpreter import Interpreter, Stepper
+from engine.recording import Recording
+from language.experiment import RecordingMap
+from language.load import program_of
+from language.model import Automaton
+from language.program import Program
+
+LONGEST_STEP, STABLE = 0.004, 3.0
+"""Longest major step [s], and how far it stays below the largest stable one."""
+
+
+@dataclass(frozen=True)
+class Reference:
+    """An automaton with the map of its recordings; `build` makes what runs its Programs."""
+
+    automaton: Automaton
+    mapping: RecordingMap
+    build: Callable[[Program], Stepper] = Interpreter
+    _made: Programs = field(default_factory=dict, repr=False)
+
+    @cached_property
+    def coarse(self) -> Automaton:
+        """The automaton with as long a major step as is stable and sees motion of 4 Hz."""
+        motion = program_of(self.automaton).motion
+        limits = [limit.step for limit in motion.limits] if motion else []
+        if not limits:
+            return self.automaton
+        most = min(LONGEST_STEP, min(limits) / STABLE)
+        step = max(self.automaton.step, Fraction(round(most * 1e6), 10**6))
+        return dataclasses.replace(self.automaton, step=step)
+
+    def run(self, recording: Recording) -> FreeRun:
+        """Simulate the coarse automaton under recorded inputs. Raises SpecError."""
+        return free_run(self.coarse, recording, self.mapping, self.build, self._made)
