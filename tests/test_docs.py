@@ -42,6 +42,22 @@ def test_the_test_on_its_page_has_no_problem(tmp_path: Path) -> None:
     assert mw.check(str(spec)) == []
 
 
+def test_the_excerpts_on_the_language_page_have_no_unknown_key(tmp_path: Path) -> None:
+    """Names that an excerpt leaves out are missing in it; whole files have no problem at all."""
+    page = (ROOT / "docs" / "language.md").read_text()
+    found: dict[str, set[str]] = {}
+    for text in re.findall(r"```yaml\n(.*?)```", page, re.DOTALL):
+        is_named = re.match(r"(language|system|scenario|variant|map|effect|calibration): ", text)
+        head = "" if text.startswith("language") else "language: 1\n"
+        head += "" if is_named else "automaton: a\nperiod: 1 ms\nnumbers: float64\n"
+        spec = tmp_path / "spec.yaml"
+        spec.write_text(head + re.sub(r"^(period|numbers): .*\n", "", text, flags=re.M))
+        found[text.partition("\n")[0]] = {problem.kind for problem in mw.check(str(spec))}
+    assert not {kind for kinds in found.values() for kind in kinds} - {"name", "missing", "run"}
+    whole = ("system: ", "variant: drive", "map: ", "effect: ", "calibration: ")
+    assert not set().union(*(found[first] for first in found if first.startswith(whole)))
+
+
 def test_every_command_in_the_readme_exists() -> None:
     used = set(re.findall(r"`modewright (\w+) ", README))
     assert used == set(re.findall(r"\| `modewright (\w+)", README))
