@@ -6,8 +6,8 @@ import math
 from pathlib import Path
 from typing import Any
 
+from engine.arrow import arrow_for
 from engine.recorded_file import RecordedFile, Samples, require_size, unreadable
-from language.missing import ToolMissing
 from language.problem import Source, Span
 from language.project import shown
 
@@ -16,16 +16,10 @@ def read_parquet(path: Path) -> RecordedFile:
     """Read a Parquet file. Raises SpecError, ToolMissing (no pyarrow)."""
     source = Source(shown(path))
     require_size(path, source)
+    arrow = arrow_for("a Parquet file")
     try:
-        import pyarrow
-        import pyarrow.parquet
-    except ImportError:
-        raise ToolMissing(
-            "a Parquet file needs the package `pyarrow`: pip install 'modewright[parquet]'"
-        ) from None
-    try:
-        table = pyarrow.parquet.read_table(path)
-    except (OSError, pyarrow.ArrowException) as error:
+        table = arrow.parquet.read_table(path)
+    except (OSError, arrow.ArrowException) as error:
         first = str(error).splitlines()[0]
         raise unreadable(source, f"understood as Parquet: {first}") from None
 

@@ -13,13 +13,12 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 
+from engine.arrow import arrow_for
 from engine.trajectory import TIME, Event, Trajectory, Values, heads
-from language.missing import ToolMissing
 from language.problem import Problems, Source, Span, SpecError
 from language.project import shown
 
@@ -161,7 +160,7 @@ def _column(path: Path, rows: Sequence[Sequence[str]], position: int) -> Values:
 
 
 def _parquet(trajectory: Trajectory) -> bytes:
-    arrow = _arrow()
+    arrow = arrow_for("Parquet", "; or write .csv")
     columns = [trajectory.times, *trajectory.signals.values()]
     kept = {b"modewright": json.dumps(_side(trajectory), allow_nan=False).encode()}
     table = arrow.table(dict(zip(heads(trajectory), columns, strict=True)), metadata=kept)
@@ -172,7 +171,7 @@ def _parquet(trajectory: Trajectory) -> bytes:
 
 
 def _read_parquet(path: Path) -> Trajectory:
-    arrow = _arrow()
+    arrow = arrow_for("Parquet", "; or write .csv")
     try:
         table = arrow.parquet.read_table(path)
         side = json.loads((table.schema.metadata or {}).get(b"modewright", b"{}"))
@@ -186,18 +185,6 @@ def _read_parquet(path: Path) -> Trajectory:
     names, units = _names_and_units(path, table.column_names)
     columns = [column.to_numpy() for column in table.columns]
     return _trajectory(path, names, units, columns, side)
-
-
-def _arrow() -> ModuleType:
-    try:
-        import pyarrow
-        import pyarrow.parquet
-    except ImportError:
-        raise ToolMissing(
-            "Parquet needs the package `pyarrow`: pip install 'modewright[parquet]'; or write .csv"
-        ) from None
-    found: ModuleType = pyarrow
-    return found
 
 
 def _refused(path: Path, kind: str, label: str, help: str = "", line: int = 1) -> SpecError:

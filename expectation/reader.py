@@ -11,7 +11,7 @@ from expectation.expected import Condition, Expectation, Place, Subject, Test, T
 from expectation.places import require_mode_output
 from expectation.recording import recording
 from language.declaration import Formula
-from language.document import Document, Entry, Node, Scalar, Table
+from language.document import Document, Entry, Node, Scalar, Table, require_kind
 from language.event_name import EventName, read_event
 from language.experiment import Scenario, System
 from language.model import CHART
@@ -44,9 +44,7 @@ def read_test(document: Document, project: Project, problems: Problems | None = 
     """Read a test with its system and scenario. Raises SpecError with all problems."""
     document = expanded(document, project)
     problems = problems if problems is not None else Problems()
-    if document.kind != "test":
-        label = f"`{document.name}` is a {document.kind}, not a test"
-        problems.error("form", document.name_span, label)
+    require_kind(document, "test", problems)
     problems.stop_if_any()
     test = _TestReader(problems, project).read(document)
     problems.stop_if_any()

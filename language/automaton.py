@@ -8,7 +8,7 @@ from typing import cast
 
 from language.chart_reader import CHART_KEYS, ChartReader, ReadModes, is_chart
 from language.chart_target import mode_paths
-from language.document import Document, Entry, Node, Scalar, Table
+from language.document import Document, Entry, Node, Scalar, Table, require_kind
 from language.element import ElementReader
 from language.event import event_inputs
 from language.instance import with_instances
@@ -54,9 +54,7 @@ def read_automaton(
     Problems of form are reported and reading goes on; SpecError where there is nothing to read.
     """
     document = expanded(document, project, problems)
-    if document.kind != "automaton":
-        label = f"`{document.name}` is a {document.kind}, not an automaton"
-        problems.error("form", document.name_span, label)
+    require_kind(document, "automaton", problems)
     problems.stop_if_any()
     tree = with_instances(document.root, project, problems)
     tree, model = _with_model(tree, project, values or {}, problems)

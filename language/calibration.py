@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from language.document import Document, Entry, Scalar, Table
+from language.document import Document, Entry, Scalar, Table, require_kind
 from language.problem import Problems, Span, nearest
 from language.reader import Reader
 from language.tree import put
@@ -41,10 +41,7 @@ class Calibration:
 
 def read_calibration(document: Document, problems: Problems) -> Calibration:
     """Read a calibration; its names are looked up by who uses it. Raises SpecError."""
-    if document.kind != "calibration":
-        label = f"`{document.name}` is a {document.kind}, not a calibration"
-        problems.error("form", document.name_span, label)
-        problems.stop_if_any()
+    require_kind(document, "calibration", problems)
     return _CalibrationReader(problems).read(document)
 
 

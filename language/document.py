@@ -85,6 +85,15 @@ class Document:
     source: Source = field(repr=False)
 
 
+def require_kind(document: Document, kind: str, problems: Problems) -> None:
+    """Report a document of another kind, and stop. Raises SpecError."""
+    if document.kind != kind:
+        article = "an" if kind[0] in "aeiou" else "a"
+        label = f"`{document.name}` is a {document.kind}, not {article} {kind}"
+        problems.error("form", document.name_span, label)
+        problems.stop_if_any()
+
+
 def read_text(path: Path, shown: str | None = None) -> tuple[Source, str]:
     """Read a file as UTF-8 text. Raises SpecError for a missing, huge or binary file."""
     name = shown or str(path)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
-from language.document import Document, Entry, Items, Node, Scalar, Table
+from language.document import Document, Entry, Items, Node, Scalar, Table, require_kind
 from language.names import check_name
 from language.parse import parse_balance, parse_expression
 from language.passage import EFFECT, Path, changed
@@ -92,10 +92,7 @@ class Laying:
 
 def read_effect(document: Document, problems: Problems) -> Effect:
     """Read an effect; what is wrong with it on its own is reported. Raises SpecError."""
-    if document.kind != "effect":
-        label = f"`{document.name}` is a {document.kind}, not an effect"
-        problems.error("form", document.name_span, label)
-        problems.stop_if_any()
+    require_kind(document, "effect", problems)
     return _EffectReader(problems).read(document)
 
 

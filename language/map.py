@@ -5,7 +5,7 @@ from __future__ import annotations
 from fractions import Fraction
 from typing import Literal, cast
 
-from language.document import Document, Entry, Items, Node, Scalar, Table
+from language.document import Document, Entry, Items, Node, Scalar, Table, require_kind
 from language.experiment import EVERY_FILE, Column, RecordingMap, Window
 from language.literal import constant
 from language.problem import Problems, Span
@@ -23,9 +23,7 @@ def read_map(document: Document, project: Project) -> RecordingMap:
     """Read a map. Raises SpecError with all problems."""
     document = expanded(document, project)
     problems = Problems()
-    if document.kind != "map":
-        label = f"`{document.name}` is a {document.kind}, not a map"
-        problems.error("form", document.name_span, label)
+    require_kind(document, "map", problems)
     problems.stop_if_any()
     found = map_of(document.root, document.name, document.name_span, problems)
     problems.stop_if_any()

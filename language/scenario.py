@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from fractions import Fraction
 from pathlib import Path
 
-from language.document import Document, Scalar, Table
+from language.document import Document, Scalar, Table, require_kind
 from language.experiment import RecordingMap, Scenario, System
 from language.inside import RECORDINGS, exists, require_inside
 from language.literal import constant
@@ -33,9 +33,7 @@ def read_scenario(document: Document, project: Project, system: System) -> Scena
     """Read a scenario for a system. Raises SpecError with all problems."""
     document = expanded(document, project)
     problems = Problems()
-    if document.kind != "scenario":
-        label = f"`{document.name}` is a {document.kind}, not a scenario"
-        problems.error("form", document.name_span, label)
+    require_kind(document, "scenario", problems)
     problems.stop_if_any()
     scenario = _ScenarioReader(problems, project, system).read(document)
     problems.stop_if_any()

@@ -8,7 +8,7 @@ from fractions import Fraction
 from pathlib import Path
 
 from language.connection import ConnectionReader
-from language.document import Document, Entry, Scalar
+from language.document import Document, Entry, Scalar, require_kind
 from language.experiment import Connection, Instance, System, SystemInput
 from language.graph import chain, circle, topological
 from language.load import automaton_of
@@ -40,9 +40,7 @@ def read_system(document: Document, project: Project, overrides: Overrides | Non
     problems = Problems()
     if document.kind == "automaton":
         return around(automaton_of(plain, project, overrides))
-    if document.kind != "system":
-        label = f"`{document.name}` is a {document.kind}, not a system"
-        problems.error("form", document.name_span, label)
+    require_kind(document, "system", problems)
     problems.stop_if_any()
     system = _SystemReader(problems, project, dict(overrides or {})).read(document)
     problems.stop_if_any()

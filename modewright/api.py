@@ -15,7 +15,7 @@ from engine.recording import Recording, read_recording
 from engine.replay import Replay, replay as replay_recording, used_columns
 from engine.simulate import simulate as simulate_system
 from engine.trajectory import Trajectory
-from language.document import Document, Scalar
+from language.document import Document, Scalar, require_kind
 from language.experiment import RecordingMap, Scenario, System
 from language.limit import require_ranges
 from language.load import automaton_of, command_line_value, program_of
@@ -212,10 +212,7 @@ def _estimator(
     if variant:
         over = read_document(project.path_of(variant))
         problems = Problems()
-        if over.kind != "variant":
-            label = f"`{over.name}` is a {over.kind}, not a variant"
-            problems.error("form", over.name_span, label)
-        problems.stop_if_any()
+        require_kind(over, "variant", problems)
         document = layered(document, over, project, problems)
     document = with_calibrations(document, calibrations, "--calibration")
     automaton = automaton_of(document, project, _scalars(values))

@@ -174,7 +174,7 @@ def difference_json(found: RunDifference) -> dict[str, Any]:
         "within": found.is_within,
         "span": list(found.span),
         "samples": found.samples,
-        "signals": [_finite(vars(item)) for item in found.signals],
+        "signals": [finite(vars(item)) for item in found.signals],
         "mode_windows": [vars(window) for window in found.windows],
         "transitions": [vars(sequence) for sequence in found.sequences],
         "only_a": list(found.only_a),
@@ -191,7 +191,8 @@ def _sequence_line(sequence: ModeSequence) -> str:
     return f"{sequence.instance or 'automaton'}: {counts}, {told}"
 
 
-def _finite(values: Mapping[str, Any]) -> dict[str, Any]:
+def finite(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return values for JSON, which has neither infinities nor NaN: they are null."""
     return {
         name: None if isinstance(value, float) and not math.isfinite(value) else value
         for name, value in values.items()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
@@ -15,6 +14,7 @@ from diagnosis.channel_check import ChannelCheck
 from diagnosis.excitation import Excitation
 from diagnosis.finding import told
 from diagnosis.recording_check import RecordingCheck
+from modewright.show import finite
 
 STYLES = {"error": "red", "warning": "yellow", "note": "dim"}
 MOST_CHANNELS = 24
@@ -79,20 +79,13 @@ def check_json(check: RecordingCheck) -> dict[str, Any]:
     excited = check.excitation
     return {
         "usable": check.is_usable,
-        "channels": [_finite(asdict(one)) for one in check.channels],
+        "channels": [finite(asdict(one)) for one in check.channels],
         "findings": [asdict(one) for one in check.findings],
         "duration": excited.duration,
-        "inputs": [_finite(asdict(one)) for one in excited.inputs],
-        "speeds": [_finite(asdict(one)) for one in excited.speeds],
+        "inputs": [finite(asdict(one)) for one in excited.inputs],
+        "speeds": [finite(asdict(one)) for one in excited.speeds],
         "effects": {
             e.effect: {"testable": e.is_testable, "needs": e.lacking} for e in excited.effects
         },
-        "relations": [_finite(asdict(one)) for one in check.relations],
-    }
-
-
-def _finite(table: dict[str, Any]) -> dict[str, Any]:
-    return {
-        key: None if isinstance(value, float) and not math.isfinite(value) else value
-        for key, value in table.items()
+        "relations": [finite(asdict(one)) for one in check.relations],
     }

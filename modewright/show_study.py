@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
@@ -11,6 +10,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from modewright.show import finite
 from sweep.summary import Line, Rate, Summary
 
 
@@ -34,15 +34,8 @@ def summary_json(summary: Summary) -> dict[str, Any]:
         "expected": summary.expected,
         "counts": dict(summary.counts),
         "confidence": summary.confidence,
-        "measures": [_plain(asdict(line)) for line in summary.lines],
-        "rates": [_plain(asdict(rate)) for rate in summary.rates],
-    }
-
-
-def _plain(data: Mapping[str, Any]) -> dict[str, Any]:
-    return {
-        key: None if isinstance(value, float) and not math.isfinite(value) else value
-        for key, value in data.items()
+        "measures": [finite(asdict(line)) for line in summary.lines],
+        "rates": [finite(asdict(rate)) for rate in summary.rates],
     }
 
 

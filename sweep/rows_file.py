@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from types import ModuleType
 from typing import Any
 
-from language.missing import ToolMissing
+from engine.arrow import arrow_for
 from sweep.block import Row
 from sweep.manifest import Manifest
 
@@ -47,12 +47,4 @@ def parquet_of(manifest: Manifest, rows: Sequence[Row], mark: bytes) -> bytes:
 
 def arrow_module() -> ModuleType:
     """Return pyarrow with its Parquet. Raises ToolMissing."""
-    try:
-        import pyarrow
-        import pyarrow.parquet
-    except ImportError:
-        raise ToolMissing(
-            "a study needs the package `pyarrow`: pip install 'modewright[parquet]'"
-        ) from None
-    found: ModuleType = pyarrow
-    return found
+    return arrow_for("a study")

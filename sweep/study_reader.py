@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from fractions import Fraction
 from typing import Any
 
-from language.document import Document, Entry, Items, Node, Scalar, Table
+from language.document import Document, Entry, Items, Node, Scalar, Table, require_kind
 from language.experiment import Scenario, System
 from language.problem import Problems, Span, nearest
 from language.project import Project, expanded
@@ -44,9 +44,7 @@ def read_study(
     """Read a study with its systems and scenarios. Raises SpecError with all problems."""
     document = expanded(document, project)
     problems = problems if problems is not None else Problems()
-    if document.kind != "study":
-        label = f"`{document.name}` is a {document.kind}, not a study"
-        problems.error("form", document.name_span, label)
+    require_kind(document, "study", problems)
     problems.stop_if_any()
     study = _StudyReader(problems, project, dict(overrides or {})).read(document)
     problems.stop_if_any()
