@@ -26,6 +26,7 @@ from language.program import Program
 from language.project import Project, read_document
 from language.scenario import read_scenario
 from language.system import read_system
+from tests.engine.runaway import RUNAWAY
 
 Alone = Callable[[str, str], tuple[System, Scenario]]
 
@@ -85,15 +86,6 @@ modes:
   below: {number: 0, transitions: {above: {when: z > top}}}
   above: {number: 1}
 outputs: [z, mode]
-"""
-RUNAWAY = """language: 1
-automaton: runaway
-step: 1 ms
-states: {x: {unit: 1/s, initial: 10 1/s}}
-flow: {x: der(x) = x^2}
-initial: only
-modes: {only: {number: 0}}
-outputs: [x]
 """
 
 

@@ -10,17 +10,9 @@ from typer.testing import CliRunner
 import modewright as mw
 from modewright.cli import app
 from modewright.exits import PROBLEMS
+from tests.engine.runaway import RUNAWAY
 from tests.language.making import project_of
 
-RUNAWAY = """language: 1
-automaton: runaway
-step: 1 ms
-states: {x: {unit: 1/s, initial: 10 1/s}}
-flow: {x: der(x) = x^2}
-initial: only
-modes: {only: {number: 0}}
-outputs: [x]
-"""
 BALL = """language: 1
 automaton: ball
 step: 1 ms
