@@ -39,7 +39,10 @@ LIBRARY: Mapping[str, str] = {"abs": "fabs", "sqrt": "sqrt", "floor": "floor"}
 SUFFIX: Mapping[NumberType, str] = {"float64": "", "float32": "f"}
 """What C adds to the name of a function for its form in a type: sqrt, sqrtf."""
 LOGIC: Mapping[str, str] = {"and": "&&", "or": "||"}
-CHAINS: Mapping[str, str] = {"+": "+-", "-": "+-", "*": "*/", "/": "*/"}
+CHAINS: Mapping[str, str] = {
+    **{"+": "+-", "-": "+-", "*": "*/", "/": "*/"},
+    **{"and": "and", "or": "or"},
+}
 """Operators of the left operand that C evaluates first without parentheses: (a + b) - c."""
 
 

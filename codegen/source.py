@@ -9,6 +9,7 @@ from typing import Any
 
 from codegen.comment import comment as safe
 from codegen.expression import SUFFIX, literal
+from codegen.gate import gated
 from codegen.mathematics import math_files
 from codegen.names import (
     REAL,
@@ -61,7 +62,7 @@ def c_files(program: Program) -> dict[str, str]:
     """
     if "step" not in program.blocks:
         raise ValueError(f"inputs of {program.name} vary inside a step: it has no C")
-    context = {**module_context(stepped(program)), "digest": digest(program)}
+    context = {**module_context(gated(stepped(program))), "digest": digest(program)}
     files = {
         f"{program.name}.h": render("module.h.jinja", context),
         f"{program.name}.c": render("module.c.jinja", context),

@@ -15,6 +15,7 @@ from language.operation import (
     Block,
     Branch,
     Choose,
+    Compare,
     Count,
     Expr,
     FaultBit,
@@ -22,6 +23,7 @@ from language.operation import (
     Op,
     Run,
     Store,
+    Unary,
     Value,
 )
 from language.program import Program, short
@@ -76,13 +78,12 @@ class Writer:
         declared = f"const {self.types[target]} " if target in self.local else ""
         yield from wrapped(f"{declared}{self.place(target)} = ", text, key)
 
-    def _branch(self, condition: object, then: Block, other: Block) -> Iterator[str]:
-        test = c_expression(condition, self.place)  # type: ignore[arg-type]
-        yield f"if ({test}) {{"
+    def _branch(self, condition: Expr, then: Block, other: Block) -> Iterator[str]:
+        yield from tested("if", c_expression(condition, self.place))
         yield from self.lines(then)
         while len(other) == 1 and isinstance(other[0], Branch):
             inner = other[0]
-            yield f"}} else if ({c_expression(inner.condition, self.place)}) {{"
+            yield from tested("} else if", c_expression(inner.condition, self.place))
             yield from self.lines(inner.then)
             other = inner.other
         if other:
@@ -110,14 +111,11 @@ class Writer:
         yield from self.lines(inner)
         yield "}"
 
-    def _count(self, timer: str, condition: object, limit: int, key: str) -> Iterator[str]:
-        test = c_expression(condition, self.place)  # type: ignore[arg-type]
-        yield f"if ({test}) {{{_comment(key)}"
-        yield f"{INDENT}if ({timer} < {limit}U) {{"
-        yield f"{INDENT * 2}{timer}++;"
-        yield f"{INDENT}}}"
-        yield "} else {"
+    def _count(self, timer: str, condition: Expr, limit: int, key: str) -> Iterator[str]:
+        yield from tested("if", c_expression(opposite(condition), self.place), key)
         yield f"{INDENT}{timer} = 0U;"
+        yield f"}} else if ({timer} < {limit}U) {{"
+        yield f"{INDENT}{timer}++;"
         yield "}"
 
 
@@ -165,3 +163,34 @@ def wrapped(left: str, text: str, key: str) -> Iterator[str]:
     lines += [INDENT + line for line in rest]
     lines[-1] += ";"
     yield from (line.rstrip() for line in lines)
+
+
+def tested(opening: str, test: str, key: str = "") -> Iterator[str]:
+    """Yield `opening (test) {` with the key path cited, broken before `&&` where it is too long."""
+    line, comment = f"{opening} ({test}) {{", _comment(key)
+    if len(line) + len(comment) <= WIDTH:
+        yield line + comment
+        return
+    if key:
+        yield f"/* {safe(key)} */"
+    glued = re.sub("\1(&&|\\|\\|)\1", " \\1\1", line.replace(" ", "\1"))
+    pieces = textwrap.wrap(
+        glued,
+        width=WIDTH - 2 * len(INDENT),
+        subsequent_indent=INDENT,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    yield from (piece.replace("\1", " ") for piece in pieces)
+
+
+def opposite(condition: Expr) -> Expr:
+    """Return what is true where a condition is false; of an order, which NaN fails, by `not`."""
+    match condition:
+        case Unary("not", operand):
+            return operand
+        case Compare("==", left, right):
+            return Compare("!=", left, right)
+        case Compare("!=", left, right):
+            return Compare("==", left, right)
+    return Unary("not", condition)

@@ -904,8 +904,7 @@ void driveline_Step(driveline_Self *self, const driveline_Cal *cal, const drivel
         if (work->left > 0.0) {
             self->faults |= driveline_FAULT_zeno;
         }
-        work->event =
-            ((work->event || (in->T_em != self->before.T_em)) || (in->T_br != self->before.T_br)) ||
+        work->event = work->event || (in->T_em != self->before.T_em) || (in->T_br != self->before.T_br) ||
             (in->slope != self->before.slope);
         latch(self, in);
     } else {

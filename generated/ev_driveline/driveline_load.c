@@ -981,8 +981,7 @@ void driveline_load_Step(driveline_load_Self *self, const driveline_load_Cal *ca
         if (work->left > 0.0) {
             self->faults |= driveline_load_FAULT_zeno;
         }
-        work->event =
-            ((work->event || (in->T_em != self->before.T_em)) || (in->T_br != self->before.T_br)) ||
+        work->event = work->event || (in->T_em != self->before.T_em) || (in->T_br != self->before.T_br) ||
             (in->slope != self->before.slope);
         latch(self, in);
     } else {

@@ -5,6 +5,7 @@
 #include "estimator_float32.h"
 
 #include <float.h>
+#include <math.h>
 
 #include "ha_mathf.h"
 
@@ -317,6 +318,34 @@ typedef struct {
     float pull_theta_b;
     float order;
 } Work;
+
+static inline void latch_apart(estimator_float32_Self *self, const estimator_float32_In *in)
+{
+    if ((in->y_em >= (-400.0F)) && (in->y_em <= 2400.0F)) {
+        self->latched.y_em = in->y_em; /* inputs.y_em */
+    } else {
+        self->faults |= estimator_float32_FAULT_range_y_em;
+        self->latched.y_em = ha_clipf(in->y_em, -400.0F, 2400.0F);
+    }
+    if ((in->y_w >= (-50.0F)) && (in->y_w <= 300.0F)) {
+        self->latched.y_w = in->y_w; /* inputs.y_w */
+    } else {
+        self->faults |= estimator_float32_FAULT_range_y_w;
+        self->latched.y_w = ha_clipf(in->y_w, -50.0F, 300.0F);
+    }
+    if (fabsf(in->T_em) <= 400.0F) {
+        self->latched.T_em = in->T_em; /* inputs.T_em */
+    } else {
+        self->faults |= estimator_float32_FAULT_range_T_em;
+        self->latched.T_em = ha_clipf(in->T_em, -400.0F, 400.0F);
+    }
+    if ((in->T_br >= 0.0F) && (in->T_br <= 3000.0F)) {
+        self->latched.T_br = in->T_br; /* inputs.T_br */
+    } else {
+        self->faults |= estimator_float32_FAULT_range_T_br;
+        self->latched.T_br = ha_clipf(in->T_br, 0.0F, 3000.0F);
+    }
+}
 
 static inline void rates_drive_contact(const estimator_float32_Self *self, Work *work)
 {
@@ -990,7 +1019,7 @@ static inline void predict_drive(estimator_float32_Self *self)
         + (solved_drive_Gamma_w_w_T_em * self->before.T_em)
         + (solved_drive_Gamma_w_w_T_br * self->before.T_br) + (solved_drive_G_w_w_w_em * f_w_em)
         + (solved_drive_G_w_w_w_w * f_w_w);
-    if ((predicted_theta_d >= (-0.5F)) && (predicted_theta_d <= 0.5F)) {
+    if (fabsf(predicted_theta_d) <= 0.5F) {
         self->state.theta_d = predicted_theta_d;
     } else {
         self->faults |= estimator_float32_FAULT_range_theta_d;
@@ -1017,7 +1046,7 @@ static inline void correct_drive(estimator_float32_Self *self, const estimator_f
     const float new_theta_d =
         self->state.theta_d + ((solved_drive_L_theta_d_y_em * self->innovation.y_em)
         + (solved_drive_L_theta_d_y_w * self->innovation.y_w));
-    if ((new_theta_d >= (-0.5F)) && (new_theta_d <= 0.5F)) {
+    if (fabsf(new_theta_d) <= 0.5F) {
         self->state.theta_d = new_theta_d;
     } else {
         self->faults |= estimator_float32_FAULT_range_theta_d;
@@ -1096,14 +1125,14 @@ static inline void run_gap(estimator_float32_Self *self, Work *work)
         self->state.w_em = ha_clipf(new_w_em, -400.0F, 2400.0F);
     }
     const float new_theta_d = self->state.theta_d;
-    if ((new_theta_d >= (-0.5F)) && (new_theta_d <= 0.5F)) {
+    if (fabsf(new_theta_d) <= 0.5F) {
         self->state.theta_d = new_theta_d;
     } else {
         self->faults |= estimator_float32_FAULT_range_theta_d;
         self->state.theta_d = ha_clipf(new_theta_d, -0.5F, 0.5F);
     }
     const float new_theta_b = self->state.theta_b;
-    if ((new_theta_b >= (-0.2F)) && (new_theta_b <= 0.2F)) {
+    if (fabsf(new_theta_b) <= 0.2F) {
         self->state.theta_b = new_theta_b;
     } else {
         self->faults |= estimator_float32_FAULT_range_theta_b;
@@ -1138,7 +1167,7 @@ static inline void predict_coast(estimator_float32_Self *self)
         + (solved_coast_Gamma_w_w_T_em * self->before.T_em)
         + (solved_coast_Gamma_w_w_T_br * self->before.T_br) + (solved_coast_G_w_w_w_em * f_w_em)
         + (solved_coast_G_w_w_w_w * f_w_w);
-    if ((predicted_theta_d >= (-0.5F)) && (predicted_theta_d <= 0.5F)) {
+    if (fabsf(predicted_theta_d) <= 0.5F) {
         self->state.theta_d = predicted_theta_d;
     } else {
         self->faults |= estimator_float32_FAULT_range_theta_d;
@@ -1165,7 +1194,7 @@ static inline void correct_coast(estimator_float32_Self *self, const estimator_f
     const float new_theta_d =
         self->state.theta_d + ((solved_coast_L_theta_d_y_em * self->innovation.y_em)
         + (solved_coast_L_theta_d_y_w * self->innovation.y_w));
-    if ((new_theta_d >= (-0.5F)) && (new_theta_d <= 0.5F)) {
+    if (fabsf(new_theta_d) <= 0.5F) {
         self->state.theta_d = new_theta_d;
     } else {
         self->faults |= estimator_float32_FAULT_range_theta_d;
@@ -1201,12 +1230,10 @@ static inline void equations_drive(estimator_float32_Self *self)
 
 static inline void jump_drive(estimator_float32_Self *self)
 {
-    if (self->equation.T_hs <= 0.0F) { /* estimator_float32 modes.drive.transitions.gap.when */
-        if (self->timer.drive_gap < 2U) {
-            self->timer.drive_gap++;
-        }
-    } else {
+    if (!(self->equation.T_hs <= 0.0F)) { /* estimator_float32 modes.drive.transitions.gap.when */
         self->timer.drive_gap = 0U;
+    } else if (self->timer.drive_gap < 2U) {
+        self->timer.drive_gap++;
     }
     if (self->timer.drive_gap > 1U) {
         self->timer.drive_gap = 0U;
@@ -1232,19 +1259,17 @@ static inline void equations_gap(estimator_float32_Self *self)
 
 static inline void jump_gap(estimator_float32_Self *self)
 {
-    if (self->run_mode == estimator_float32_RUN_drive_contact) { /* estimator_float32 modes.gap.transitions.drive.when */
-        if (self->timer.gap_drive < 2U) {
-            self->timer.gap_drive++;
-        }
-    } else {
+    /* estimator_float32 modes.gap.transitions.drive.when */
+    if (self->run_mode != estimator_float32_RUN_drive_contact) {
         self->timer.gap_drive = 0U;
+    } else if (self->timer.gap_drive < 2U) {
+        self->timer.gap_drive++;
     }
-    if (self->run_mode == estimator_float32_RUN_coast_contact) { /* estimator_float32 modes.gap.transitions.coast.when */
-        if (self->timer.gap_coast < 2U) {
-            self->timer.gap_coast++;
-        }
-    } else {
+    /* estimator_float32 modes.gap.transitions.coast.when */
+    if (self->run_mode != estimator_float32_RUN_coast_contact) {
         self->timer.gap_coast = 0U;
+    } else if (self->timer.gap_coast < 2U) {
+        self->timer.gap_coast++;
     }
     if (self->timer.gap_drive > 1U) {
         self->timer.gap_drive = 0U;
@@ -1271,12 +1296,10 @@ static inline void equations_coast(estimator_float32_Self *self)
 
 static inline void jump_coast(estimator_float32_Self *self)
 {
-    if (self->equation.T_hs >= 0.0F) { /* estimator_float32 modes.coast.transitions.gap.when */
-        if (self->timer.coast_gap < 2U) {
-            self->timer.coast_gap++;
-        }
-    } else {
+    if (!(self->equation.T_hs >= 0.0F)) { /* estimator_float32 modes.coast.transitions.gap.when */
         self->timer.coast_gap = 0U;
+    } else if (self->timer.coast_gap < 2U) {
+        self->timer.coast_gap++;
     }
     if (self->timer.coast_gap > 1U) {
         self->timer.coast_gap = 0U;
@@ -1295,29 +1318,15 @@ static inline void compare_stamps(estimator_float32_Self *self, const estimator_
 
 static inline void latch(estimator_float32_Self *self, const estimator_float32_In *in)
 {
-    if ((in->y_em >= (-400.0F)) && (in->y_em <= 2400.0F)) {
+    if ((in->y_em >= (-400.0F)) && (in->y_em <= 2400.0F) && (in->y_w >= (-50.0F))
+        && (in->y_w <= 300.0F) && (fabsf(in->T_em) <= 400.0F) && (in->T_br >= 0.0F)
+        && (in->T_br <= 3000.0F)) {
         self->latched.y_em = in->y_em; /* inputs.y_em */
-    } else {
-        self->faults |= estimator_float32_FAULT_range_y_em;
-        self->latched.y_em = ha_clipf(in->y_em, -400.0F, 2400.0F);
-    }
-    if ((in->y_w >= (-50.0F)) && (in->y_w <= 300.0F)) {
         self->latched.y_w = in->y_w; /* inputs.y_w */
-    } else {
-        self->faults |= estimator_float32_FAULT_range_y_w;
-        self->latched.y_w = ha_clipf(in->y_w, -50.0F, 300.0F);
-    }
-    if ((in->T_em >= (-400.0F)) && (in->T_em <= 400.0F)) {
         self->latched.T_em = in->T_em; /* inputs.T_em */
-    } else {
-        self->faults |= estimator_float32_FAULT_range_T_em;
-        self->latched.T_em = ha_clipf(in->T_em, -400.0F, 400.0F);
-    }
-    if ((in->T_br >= 0.0F) && (in->T_br <= 3000.0F)) {
         self->latched.T_br = in->T_br; /* inputs.T_br */
     } else {
-        self->faults |= estimator_float32_FAULT_range_T_br;
-        self->latched.T_br = ha_clipf(in->T_br, 0.0F, 3000.0F);
+        latch_apart(self, in);
     }
 }
 
@@ -1329,7 +1338,7 @@ static inline void remember(estimator_float32_Self *self)
 
 static inline void start(estimator_float32_Self *self, const estimator_float32_In *in)
 {
-    if ((constant.alpha >= (-0.5F)) && (constant.alpha <= 0.5F)) {
+    if (fabsf(constant.alpha) <= 0.5F) {
         self->state.theta_d = constant.alpha; /* estimator_float32 states.theta_d.initial */
     } else {
         self->faults |= estimator_float32_FAULT_range_theta_d;
@@ -1347,7 +1356,7 @@ static inline void start(estimator_float32_Self *self, const estimator_float32_I
         self->faults |= estimator_float32_FAULT_range_w_w;
         self->state.w_w = ha_clipf(self->latched.y_w, -50.0F, 300.0F);
     }
-    if ((constant.alpha >= (-0.2F)) && (constant.alpha <= 0.2F)) {
+    if (fabsf(constant.alpha) <= 0.2F) {
         self->state.theta_b = constant.alpha; /* estimator_float32 states.theta_b.initial */
     } else {
         self->faults |= estimator_float32_FAULT_range_theta_b;

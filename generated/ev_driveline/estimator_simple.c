@@ -5,6 +5,7 @@
 #include "estimator_simple.h"
 
 #include <float.h>
+#include <math.h>
 
 #include "ha_math.h"
 
@@ -100,6 +101,40 @@ typedef struct {
     double reset_w_w;
 } Work;
 
+static inline void latch_apart(estimator_simple_Self *self, const estimator_simple_In *in)
+{
+    if ((in->y_em >= (-400.0)) && (in->y_em <= 2400.0)) {
+        self->latched.y_em = in->y_em; /* inputs.y_em */
+    } else {
+        self->faults |= estimator_simple_FAULT_range_y_em;
+        self->latched.y_em = ha_clip(in->y_em, -400.0, 2400.0);
+    }
+    if ((in->y_w >= (-50.0)) && (in->y_w <= 300.0)) {
+        self->latched.y_w = in->y_w; /* inputs.y_w */
+    } else {
+        self->faults |= estimator_simple_FAULT_range_y_w;
+        self->latched.y_w = ha_clip(in->y_w, -50.0, 300.0);
+    }
+    if (fabs(in->T_em) <= 400.0) {
+        self->latched.T_em = in->T_em; /* inputs.T_em */
+    } else {
+        self->faults |= estimator_simple_FAULT_range_T_em;
+        self->latched.T_em = ha_clip(in->T_em, -400.0, 400.0);
+    }
+    if ((in->T_br >= 0.0) && (in->T_br <= 3000.0)) {
+        self->latched.T_br = in->T_br; /* inputs.T_br */
+    } else {
+        self->faults |= estimator_simple_FAULT_range_T_br;
+        self->latched.T_br = ha_clip(in->T_br, 0.0, 3000.0);
+    }
+    if (fabs(in->T_req) <= 400.0) {
+        self->latched.T_req = in->T_req; /* inputs.T_req */
+    } else {
+        self->faults |= estimator_simple_FAULT_range_T_req;
+        self->latched.T_req = ha_clip(in->T_req, -400.0, 400.0);
+    }
+}
+
 static inline void predict_drive(estimator_simple_Self *self)
 {
     /* estimator_simple modes.drive.observer.f.w_em */
@@ -127,7 +162,7 @@ static inline void predict_drive(estimator_simple_Self *self)
         + (solved_drive_Gamma_w_w_T_em * self->before.T_em)
         + (solved_drive_Gamma_w_w_T_br * self->before.T_br) + (solved_drive_G_w_w_w_em * f_w_em)
         + (solved_drive_G_w_w_w_w * f_w_w);
-    if ((predicted_theta_d >= (-0.5)) && (predicted_theta_d <= 0.5)) {
+    if (fabs(predicted_theta_d) <= 0.5) {
         self->state.theta_d = predicted_theta_d;
     } else {
         self->faults |= estimator_simple_FAULT_range_theta_d;
@@ -154,7 +189,7 @@ static inline void correct_drive(estimator_simple_Self *self, const estimator_si
     const double new_theta_d =
         self->state.theta_d + ((solved_drive_L_theta_d_y_em * self->innovation.y_em)
         + (solved_drive_L_theta_d_y_w * self->innovation.y_w));
-    if ((new_theta_d >= (-0.5)) && (new_theta_d <= 0.5)) {
+    if (fabs(new_theta_d) <= 0.5) {
         self->state.theta_d = new_theta_d;
     } else {
         self->faults |= estimator_simple_FAULT_range_theta_d;
@@ -205,7 +240,7 @@ static inline void predict_coast(estimator_simple_Self *self)
         + (solved_coast_Gamma_w_w_T_em * self->before.T_em)
         + (solved_coast_Gamma_w_w_T_br * self->before.T_br) + (solved_coast_G_w_w_w_em * f_w_em)
         + (solved_coast_G_w_w_w_w * f_w_w);
-    if ((predicted_theta_d >= (-0.5)) && (predicted_theta_d <= 0.5)) {
+    if (fabs(predicted_theta_d) <= 0.5) {
         self->state.theta_d = predicted_theta_d;
     } else {
         self->faults |= estimator_simple_FAULT_range_theta_d;
@@ -232,7 +267,7 @@ static inline void correct_coast(estimator_simple_Self *self, const estimator_si
     const double new_theta_d =
         self->state.theta_d + ((solved_coast_L_theta_d_y_em * self->innovation.y_em)
         + (solved_coast_L_theta_d_y_w * self->innovation.y_w));
-    if ((new_theta_d >= (-0.5)) && (new_theta_d <= 0.5)) {
+    if (fabs(new_theta_d) <= 0.5) {
         self->state.theta_d = new_theta_d;
     } else {
         self->faults |= estimator_simple_FAULT_range_theta_d;
@@ -268,12 +303,10 @@ static inline void equations_drive(estimator_simple_Self *self)
 
 static inline void jump_drive(estimator_simple_Self *self)
 {
-    if (self->equation.T_hs <= 0.0) { /* estimator_simple modes.drive.transitions.gap.when */
-        if (self->timer.drive_gap < 2U) {
-            self->timer.drive_gap++;
-        }
-    } else {
+    if (!(self->equation.T_hs <= 0.0)) { /* estimator_simple modes.drive.transitions.gap.when */
         self->timer.drive_gap = 0U;
+    } else if (self->timer.drive_gap < 2U) {
+        self->timer.drive_gap++;
     }
     if (self->timer.drive_gap > 1U) {
         self->timer.drive_gap = 0U;
@@ -294,19 +327,15 @@ static inline void equations_gap(estimator_simple_Self *self)
 
 static inline void jump_gap(estimator_simple_Self *self, Work *work)
 {
-    if (self->latched.T_req > 0.0) { /* estimator_simple modes.gap.transitions.drive.when */
-        if (self->timer.gap_drive < 2U) {
-            self->timer.gap_drive++;
-        }
-    } else {
+    if (!(self->latched.T_req > 0.0)) { /* estimator_simple modes.gap.transitions.drive.when */
         self->timer.gap_drive = 0U;
+    } else if (self->timer.gap_drive < 2U) {
+        self->timer.gap_drive++;
     }
-    if (self->latched.T_req < 0.0) { /* estimator_simple modes.gap.transitions.coast.when */
-        if (self->timer.gap_coast < 2U) {
-            self->timer.gap_coast++;
-        }
-    } else {
+    if (!(self->latched.T_req < 0.0)) { /* estimator_simple modes.gap.transitions.coast.when */
         self->timer.gap_coast = 0U;
+    } else if (self->timer.gap_coast < 2U) {
+        self->timer.gap_coast++;
     }
     if (self->timer.gap_drive > 1U) {
         /* estimator_simple modes.gap.transitions.drive.reset.theta_b */
@@ -315,13 +344,13 @@ static inline void jump_gap(estimator_simple_Self *self, Work *work)
         work->reset_theta_d = constant.alpha;
         work->reset_w_em = self->latched.y_em; /* estimator_simple modes.gap.transitions.drive.reset.w_em */
         work->reset_w_w = self->latched.y_w; /* estimator_simple modes.gap.transitions.drive.reset.w_w */
-        if ((work->reset_theta_b >= (-0.2)) && (work->reset_theta_b <= 0.2)) {
+        if (fabs(work->reset_theta_b) <= 0.2) {
             self->state.theta_b = work->reset_theta_b;
         } else {
             self->faults |= estimator_simple_FAULT_range_theta_b;
             self->state.theta_b = ha_clip(work->reset_theta_b, -0.2, 0.2);
         }
-        if ((work->reset_theta_d >= (-0.5)) && (work->reset_theta_d <= 0.5)) {
+        if (fabs(work->reset_theta_d) <= 0.5) {
             self->state.theta_d = work->reset_theta_d;
         } else {
             self->faults |= estimator_simple_FAULT_range_theta_d;
@@ -350,13 +379,13 @@ static inline void jump_gap(estimator_simple_Self *self, Work *work)
         work->reset_theta_d = -constant.alpha;
         work->reset_w_em = self->latched.y_em; /* estimator_simple modes.gap.transitions.coast.reset.w_em */
         work->reset_w_w = self->latched.y_w; /* estimator_simple modes.gap.transitions.coast.reset.w_w */
-        if ((work->reset_theta_b >= (-0.2)) && (work->reset_theta_b <= 0.2)) {
+        if (fabs(work->reset_theta_b) <= 0.2) {
             self->state.theta_b = work->reset_theta_b;
         } else {
             self->faults |= estimator_simple_FAULT_range_theta_b;
             self->state.theta_b = ha_clip(work->reset_theta_b, -0.2, 0.2);
         }
-        if ((work->reset_theta_d >= (-0.5)) && (work->reset_theta_d <= 0.5)) {
+        if (fabs(work->reset_theta_d) <= 0.5) {
             self->state.theta_d = work->reset_theta_d;
         } else {
             self->faults |= estimator_simple_FAULT_range_theta_d;
@@ -399,13 +428,13 @@ static inline void update_gap(estimator_simple_Self *self)
         self->faults |= estimator_simple_FAULT_range_w_w;
         self->state.w_w = ha_clip(next_w_w, -50.0, 300.0);
     }
-    if ((next_theta_b >= (-0.2)) && (next_theta_b <= 0.2)) {
+    if (fabs(next_theta_b) <= 0.2) {
         self->state.theta_b = next_theta_b;
     } else {
         self->faults |= estimator_simple_FAULT_range_theta_b;
         self->state.theta_b = ha_clip(next_theta_b, -0.2, 0.2);
     }
-    if ((next_theta_d >= (-0.5)) && (next_theta_d <= 0.5)) {
+    if (fabs(next_theta_d) <= 0.5) {
         self->state.theta_d = next_theta_d;
     } else {
         self->faults |= estimator_simple_FAULT_range_theta_d;
@@ -425,12 +454,10 @@ static inline void equations_coast(estimator_simple_Self *self)
 
 static inline void jump_coast(estimator_simple_Self *self)
 {
-    if (self->equation.T_hs >= 0.0) { /* estimator_simple modes.coast.transitions.gap.when */
-        if (self->timer.coast_gap < 2U) {
-            self->timer.coast_gap++;
-        }
-    } else {
+    if (!(self->equation.T_hs >= 0.0)) { /* estimator_simple modes.coast.transitions.gap.when */
         self->timer.coast_gap = 0U;
+    } else if (self->timer.coast_gap < 2U) {
+        self->timer.coast_gap++;
     }
     if (self->timer.coast_gap > 1U) {
         self->timer.coast_gap = 0U;
@@ -448,35 +475,16 @@ static inline void compare_stamps(estimator_simple_Self *self, const estimator_s
 
 static inline void latch(estimator_simple_Self *self, const estimator_simple_In *in)
 {
-    if ((in->y_em >= (-400.0)) && (in->y_em <= 2400.0)) {
+    if ((in->y_em >= (-400.0)) && (in->y_em <= 2400.0) && (in->y_w >= (-50.0))
+        && (in->y_w <= 300.0) && (fabs(in->T_em) <= 400.0) && (in->T_br >= 0.0)
+        && (in->T_br <= 3000.0) && (fabs(in->T_req) <= 400.0)) {
         self->latched.y_em = in->y_em; /* inputs.y_em */
-    } else {
-        self->faults |= estimator_simple_FAULT_range_y_em;
-        self->latched.y_em = ha_clip(in->y_em, -400.0, 2400.0);
-    }
-    if ((in->y_w >= (-50.0)) && (in->y_w <= 300.0)) {
         self->latched.y_w = in->y_w; /* inputs.y_w */
-    } else {
-        self->faults |= estimator_simple_FAULT_range_y_w;
-        self->latched.y_w = ha_clip(in->y_w, -50.0, 300.0);
-    }
-    if ((in->T_em >= (-400.0)) && (in->T_em <= 400.0)) {
         self->latched.T_em = in->T_em; /* inputs.T_em */
-    } else {
-        self->faults |= estimator_simple_FAULT_range_T_em;
-        self->latched.T_em = ha_clip(in->T_em, -400.0, 400.0);
-    }
-    if ((in->T_br >= 0.0) && (in->T_br <= 3000.0)) {
         self->latched.T_br = in->T_br; /* inputs.T_br */
-    } else {
-        self->faults |= estimator_simple_FAULT_range_T_br;
-        self->latched.T_br = ha_clip(in->T_br, 0.0, 3000.0);
-    }
-    if ((in->T_req >= (-400.0)) && (in->T_req <= 400.0)) {
         self->latched.T_req = in->T_req; /* inputs.T_req */
     } else {
-        self->faults |= estimator_simple_FAULT_range_T_req;
-        self->latched.T_req = ha_clip(in->T_req, -400.0, 400.0);
+        latch_apart(self, in);
     }
 }
 
@@ -488,7 +496,7 @@ static inline void remember(estimator_simple_Self *self)
 
 static inline void start(estimator_simple_Self *self, const estimator_simple_In *in)
 {
-    if ((constant.alpha >= (-0.5)) && (constant.alpha <= 0.5)) {
+    if (fabs(constant.alpha) <= 0.5) {
         self->state.theta_d = constant.alpha; /* estimator_simple states.theta_d.initial */
     } else {
         self->faults |= estimator_simple_FAULT_range_theta_d;
@@ -506,7 +514,7 @@ static inline void start(estimator_simple_Self *self, const estimator_simple_In 
         self->faults |= estimator_simple_FAULT_range_w_w;
         self->state.w_w = ha_clip(self->latched.y_w, -50.0, 300.0);
     }
-    if ((constant.alpha >= (-0.2)) && (constant.alpha <= 0.2)) {
+    if (fabs(constant.alpha) <= 0.2) {
         self->state.theta_b = constant.alpha; /* estimator_simple states.theta_b.initial */
     } else {
         self->faults |= estimator_simple_FAULT_range_theta_b;

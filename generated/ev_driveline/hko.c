@@ -5,6 +5,7 @@
 #include "hko.h"
 
 #include <float.h>
+#include <math.h>
 
 #include "ha_math.h"
 
@@ -289,6 +290,46 @@ typedef struct {
     double k1_theta_b;
     double k1_T_l;
 } Work;
+
+static inline void latch_apart(hko_Self *self, const hko_In *in)
+{
+    if ((in->y_em >= (-400.0)) && (in->y_em <= 2400.0)) {
+        self->latched.y_em = in->y_em; /* inputs.y_em */
+    } else {
+        self->faults |= hko_FAULT_range_y_em;
+        if ((in->y_em - in->y_em) >= 0.0) {
+            self->latched.y_em = ha_clip(in->y_em, -400.0, 2400.0);
+        }
+    }
+    if ((in->y_w >= (-50.0)) && (in->y_w <= 300.0)) {
+        self->latched.y_w = in->y_w; /* inputs.y_w */
+    } else {
+        self->faults |= hko_FAULT_range_y_w;
+        if ((in->y_w - in->y_w) >= 0.0) {
+            self->latched.y_w = ha_clip(in->y_w, -50.0, 300.0);
+        }
+    }
+    if (fabs(in->T_em) <= 400.0) {
+        self->latched.T_em = in->T_em; /* inputs.T_em */
+    } else {
+        self->faults |= hko_FAULT_range_T_em;
+        if ((in->T_em - in->T_em) >= 0.0) {
+            self->latched.T_em = ha_clip(in->T_em, -400.0, 400.0);
+        } else {
+            self->latched.T_em = 0.0;
+        }
+    }
+    if ((in->T_br >= 0.0) && (in->T_br <= 3000.0)) {
+        self->latched.T_br = in->T_br; /* inputs.T_br */
+    } else {
+        self->faults |= hko_FAULT_range_T_br;
+        if ((in->T_br - in->T_br) >= 0.0) {
+            self->latched.T_br = ha_clip(in->T_br, 0.0, 3000.0);
+        } else {
+            self->latched.T_br = 0.0;
+        }
+    }
+}
 
 static inline void rates_drive_contact(const hko_Self *self, Work *work)
 {
@@ -903,21 +944,21 @@ static inline void run_drive(hko_Self *self, Work *work)
         self->state.w_em = ha_clip(work->new_w_em, -400.0, 2400.0);
     }
     work->new_theta_d = self->state.theta_d;
-    if ((work->new_theta_d >= (-0.5)) && (work->new_theta_d <= 0.5)) {
+    if (fabs(work->new_theta_d) <= 0.5) {
         self->state.theta_d = work->new_theta_d;
     } else {
         self->faults |= hko_FAULT_range_theta_d;
         self->state.theta_d = ha_clip(work->new_theta_d, -0.5, 0.5);
     }
     const double new_theta_b = self->state.theta_b;
-    if ((new_theta_b >= (-0.2)) && (new_theta_b <= 0.2)) {
+    if (fabs(new_theta_b) <= 0.2) {
         self->state.theta_b = new_theta_b;
     } else {
         self->faults |= hko_FAULT_range_theta_b;
         self->state.theta_b = ha_clip(new_theta_b, -0.2, 0.2);
     }
     work->new_T_l = self->state.T_l;
-    if ((work->new_T_l >= (-2000.0)) && (work->new_T_l <= 2000.0)) {
+    if (fabs(work->new_T_l) <= 2000.0) {
         self->state.T_l = work->new_T_l;
     } else {
         self->faults |= hko_FAULT_range_T_l;
@@ -1047,7 +1088,7 @@ static inline void correct_drive(hko_Self *self, const hko_In *in, Work *work)
         work->spread = ha_max(work->pc_w_em + solved_drive_R_y_em, solved_drive_R_y_em);
         work->gain_theta_d = work->pc_theta_d / work->spread;
         work->new_theta_d = self->state.theta_d + (work->gain_theta_d * work->residual);
-        if ((work->new_theta_d >= (-0.5)) && (work->new_theta_d <= 0.5)) {
+        if (fabs(work->new_theta_d) <= 0.5) {
             self->state.theta_d = work->new_theta_d;
         } else {
             self->faults |= hko_FAULT_range_theta_d;
@@ -1071,7 +1112,7 @@ static inline void correct_drive(hko_Self *self, const hko_In *in, Work *work)
         }
         work->gain_T_l = work->pc_T_l / work->spread;
         work->new_T_l = self->state.T_l + (work->gain_T_l * work->residual);
-        if ((work->new_T_l >= (-2000.0)) && (work->new_T_l <= 2000.0)) {
+        if (fabs(work->new_T_l) <= 2000.0) {
             self->state.T_l = work->new_T_l;
         } else {
             self->faults |= hko_FAULT_range_T_l;
@@ -1097,7 +1138,7 @@ static inline void correct_drive(hko_Self *self, const hko_In *in, Work *work)
         work->spread = ha_max(work->pc_w_w + solved_drive_R_y_w, solved_drive_R_y_w);
         work->gain_theta_d = work->pc_theta_d / work->spread;
         work->new_theta_d = self->state.theta_d + (work->gain_theta_d * work->residual);
-        if ((work->new_theta_d >= (-0.5)) && (work->new_theta_d <= 0.5)) {
+        if (fabs(work->new_theta_d) <= 0.5) {
             self->state.theta_d = work->new_theta_d;
         } else {
             self->faults |= hko_FAULT_range_theta_d;
@@ -1121,7 +1162,7 @@ static inline void correct_drive(hko_Self *self, const hko_In *in, Work *work)
         }
         work->gain_T_l = work->pc_T_l / work->spread;
         work->new_T_l = self->state.T_l + (work->gain_T_l * work->residual);
-        if ((work->new_T_l >= (-2000.0)) && (work->new_T_l <= 2000.0)) {
+        if (fabs(work->new_T_l) <= 2000.0) {
             self->state.T_l = work->new_T_l;
         } else {
             self->faults |= hko_FAULT_range_T_l;
@@ -1195,21 +1236,21 @@ static inline void rest_gap(hko_Self *self, Work *work)
         self->state.w_em = ha_clip(work->new_w_em, -400.0, 2400.0);
     }
     work->new_theta_d = self->state.theta_d;
-    if ((work->new_theta_d >= (-0.5)) && (work->new_theta_d <= 0.5)) {
+    if (fabs(work->new_theta_d) <= 0.5) {
         self->state.theta_d = work->new_theta_d;
     } else {
         self->faults |= hko_FAULT_range_theta_d;
         self->state.theta_d = ha_clip(work->new_theta_d, -0.5, 0.5);
     }
     const double new_theta_b = self->state.theta_b;
-    if ((new_theta_b >= (-0.2)) && (new_theta_b <= 0.2)) {
+    if (fabs(new_theta_b) <= 0.2) {
         self->state.theta_b = new_theta_b;
     } else {
         self->faults |= hko_FAULT_range_theta_b;
         self->state.theta_b = ha_clip(new_theta_b, -0.2, 0.2);
     }
     work->new_T_l = self->state.T_l;
-    if ((work->new_T_l >= (-2000.0)) && (work->new_T_l <= 2000.0)) {
+    if (fabs(work->new_T_l) <= 2000.0) {
         self->state.T_l = work->new_T_l;
     } else {
         self->faults |= hko_FAULT_range_T_l;
@@ -1510,7 +1551,7 @@ static inline void correct_gap(hko_Self *self, const hko_In *in, Work *work)
         work->spread = ha_max(work->pc_w_em + solved_gap_R_y_em, solved_gap_R_y_em);
         work->gain_theta_d = work->pc_theta_d / work->spread;
         work->new_theta_d = self->state.theta_d + (work->gain_theta_d * work->residual);
-        if ((work->new_theta_d >= (-0.5)) && (work->new_theta_d <= 0.5)) {
+        if (fabs(work->new_theta_d) <= 0.5) {
             self->state.theta_d = work->new_theta_d;
         } else {
             self->faults |= hko_FAULT_range_theta_d;
@@ -1534,7 +1575,7 @@ static inline void correct_gap(hko_Self *self, const hko_In *in, Work *work)
         }
         work->gain_T_l = work->pc_T_l / work->spread;
         work->new_T_l = self->state.T_l + (work->gain_T_l * work->residual);
-        if ((work->new_T_l >= (-2000.0)) && (work->new_T_l <= 2000.0)) {
+        if (fabs(work->new_T_l) <= 2000.0) {
             self->state.T_l = work->new_T_l;
         } else {
             self->faults |= hko_FAULT_range_T_l;
@@ -1560,7 +1601,7 @@ static inline void correct_gap(hko_Self *self, const hko_In *in, Work *work)
         work->spread = ha_max(work->pc_w_w + solved_gap_R_y_w, solved_gap_R_y_w);
         work->gain_theta_d = work->pc_theta_d / work->spread;
         work->new_theta_d = self->state.theta_d + (work->gain_theta_d * work->residual);
-        if ((work->new_theta_d >= (-0.5)) && (work->new_theta_d <= 0.5)) {
+        if (fabs(work->new_theta_d) <= 0.5) {
             self->state.theta_d = work->new_theta_d;
         } else {
             self->faults |= hko_FAULT_range_theta_d;
@@ -1584,7 +1625,7 @@ static inline void correct_gap(hko_Self *self, const hko_In *in, Work *work)
         }
         work->gain_T_l = work->pc_T_l / work->spread;
         work->new_T_l = self->state.T_l + (work->gain_T_l * work->residual);
-        if ((work->new_T_l >= (-2000.0)) && (work->new_T_l <= 2000.0)) {
+        if (fabs(work->new_T_l) <= 2000.0) {
             self->state.T_l = work->new_T_l;
         } else {
             self->faults |= hko_FAULT_range_T_l;
@@ -1627,21 +1668,21 @@ static inline void run_coast(hko_Self *self, Work *work)
         self->state.w_em = ha_clip(work->new_w_em, -400.0, 2400.0);
     }
     work->new_theta_d = self->state.theta_d;
-    if ((work->new_theta_d >= (-0.5)) && (work->new_theta_d <= 0.5)) {
+    if (fabs(work->new_theta_d) <= 0.5) {
         self->state.theta_d = work->new_theta_d;
     } else {
         self->faults |= hko_FAULT_range_theta_d;
         self->state.theta_d = ha_clip(work->new_theta_d, -0.5, 0.5);
     }
     const double new_theta_b = self->state.theta_b;
-    if ((new_theta_b >= (-0.2)) && (new_theta_b <= 0.2)) {
+    if (fabs(new_theta_b) <= 0.2) {
         self->state.theta_b = new_theta_b;
     } else {
         self->faults |= hko_FAULT_range_theta_b;
         self->state.theta_b = ha_clip(new_theta_b, -0.2, 0.2);
     }
     work->new_T_l = self->state.T_l;
-    if ((work->new_T_l >= (-2000.0)) && (work->new_T_l <= 2000.0)) {
+    if (fabs(work->new_T_l) <= 2000.0) {
         self->state.T_l = work->new_T_l;
     } else {
         self->faults |= hko_FAULT_range_T_l;
@@ -1771,7 +1812,7 @@ static inline void correct_coast(hko_Self *self, const hko_In *in, Work *work)
         work->spread = ha_max(work->pc_w_em + solved_coast_R_y_em, solved_coast_R_y_em);
         work->gain_theta_d = work->pc_theta_d / work->spread;
         work->new_theta_d = self->state.theta_d + (work->gain_theta_d * work->residual);
-        if ((work->new_theta_d >= (-0.5)) && (work->new_theta_d <= 0.5)) {
+        if (fabs(work->new_theta_d) <= 0.5) {
             self->state.theta_d = work->new_theta_d;
         } else {
             self->faults |= hko_FAULT_range_theta_d;
@@ -1795,7 +1836,7 @@ static inline void correct_coast(hko_Self *self, const hko_In *in, Work *work)
         }
         work->gain_T_l = work->pc_T_l / work->spread;
         work->new_T_l = self->state.T_l + (work->gain_T_l * work->residual);
-        if ((work->new_T_l >= (-2000.0)) && (work->new_T_l <= 2000.0)) {
+        if (fabs(work->new_T_l) <= 2000.0) {
             self->state.T_l = work->new_T_l;
         } else {
             self->faults |= hko_FAULT_range_T_l;
@@ -1821,7 +1862,7 @@ static inline void correct_coast(hko_Self *self, const hko_In *in, Work *work)
         work->spread = ha_max(work->pc_w_w + solved_coast_R_y_w, solved_coast_R_y_w);
         work->gain_theta_d = work->pc_theta_d / work->spread;
         work->new_theta_d = self->state.theta_d + (work->gain_theta_d * work->residual);
-        if ((work->new_theta_d >= (-0.5)) && (work->new_theta_d <= 0.5)) {
+        if (fabs(work->new_theta_d) <= 0.5) {
             self->state.theta_d = work->new_theta_d;
         } else {
             self->faults |= hko_FAULT_range_theta_d;
@@ -1845,7 +1886,7 @@ static inline void correct_coast(hko_Self *self, const hko_In *in, Work *work)
         }
         work->gain_T_l = work->pc_T_l / work->spread;
         work->new_T_l = self->state.T_l + (work->gain_T_l * work->residual);
-        if ((work->new_T_l >= (-2000.0)) && (work->new_T_l <= 2000.0)) {
+        if (fabs(work->new_T_l) <= 2000.0) {
             self->state.T_l = work->new_T_l;
         } else {
             self->faults |= hko_FAULT_range_T_l;
@@ -2002,19 +2043,19 @@ static inline void back_drive_0(hko_Self *self, Work *work)
             self->faults |= hko_FAULT_range_w_em;
             self->state.w_em = ha_clip(work->at_w_em, -400.0, 2400.0);
         }
-        if ((work->at_theta_d >= (-0.5)) && (work->at_theta_d <= 0.5)) {
+        if (fabs(work->at_theta_d) <= 0.5) {
             self->state.theta_d = work->at_theta_d;
         } else {
             self->faults |= hko_FAULT_range_theta_d;
             self->state.theta_d = ha_clip(work->at_theta_d, -0.5, 0.5);
         }
-        if ((work->at_theta_b >= (-0.2)) && (work->at_theta_b <= 0.2)) {
+        if (fabs(work->at_theta_b) <= 0.2) {
             self->state.theta_b = work->at_theta_b;
         } else {
             self->faults |= hko_FAULT_range_theta_b;
             self->state.theta_b = ha_clip(work->at_theta_b, -0.2, 0.2);
         }
-        if ((work->at_T_l >= (-2000.0)) && (work->at_T_l <= 2000.0)) {
+        if (fabs(work->at_T_l) <= 2000.0) {
             self->state.T_l = work->at_T_l;
         } else {
             self->faults |= hko_FAULT_range_T_l;
@@ -2073,19 +2114,17 @@ static inline void equations_gap(hko_Self *self, const hko_Cal *cal)
 
 static inline void jump_gap(hko_Self *self, Work *work)
 {
-    if (self->equation.T_acc > self->equation.T_sum) { /* hko modes.gap.transitions.watch_drive.when */
-        if (self->timer.gap_watch_drive < 6U) {
-            self->timer.gap_watch_drive++;
-        }
-    } else {
+    /* hko modes.gap.transitions.watch_drive.when */
+    if (!(self->equation.T_acc > self->equation.T_sum)) {
         self->timer.gap_watch_drive = 0U;
+    } else if (self->timer.gap_watch_drive < 6U) {
+        self->timer.gap_watch_drive++;
     }
-    if (self->equation.T_acc < (-self->equation.T_sum)) { /* hko modes.gap.transitions.watch_coast.when */
-        if (self->timer.gap_watch_coast < 6U) {
-            self->timer.gap_watch_coast++;
-        }
-    } else {
+    /* hko modes.gap.transitions.watch_coast.when */
+    if (!(self->equation.T_acc < (-self->equation.T_sum))) {
         self->timer.gap_watch_coast = 0U;
+    } else if (self->timer.gap_watch_coast < 6U) {
+        self->timer.gap_watch_coast++;
     }
     if (self->run_mode == hko_RUN_drive_contact) {
         self->timer.gap_watch_drive = 0U;
@@ -2101,7 +2140,7 @@ static inline void jump_gap(hko_Self *self, Work *work)
         self->run_mode = hko_RUN_coast_contact; /* hko modes.coast.runs */
     } else if (self->timer.gap_watch_drive > 5U) {
         work->reset_theta_b = constant.alpha; /* hko modes.gap.transitions.watch_drive.reset.theta_b */
-        if ((work->reset_theta_b >= (-0.2)) && (work->reset_theta_b <= 0.2)) {
+        if (fabs(work->reset_theta_b) <= 0.2) {
             self->state.theta_b = work->reset_theta_b;
         } else {
             self->faults |= hko_FAULT_range_theta_b;
@@ -2114,7 +2153,7 @@ static inline void jump_gap(hko_Self *self, Work *work)
         self->run_mode = hko_RUN_drive_contact; /* hko modes.drive.runs */
     } else if (self->timer.gap_watch_coast > 5U) {
         work->reset_theta_b = -constant.alpha; /* hko modes.gap.transitions.watch_coast.reset.theta_b */
-        if ((work->reset_theta_b >= (-0.2)) && (work->reset_theta_b <= 0.2)) {
+        if (fabs(work->reset_theta_b) <= 0.2) {
             self->state.theta_b = work->reset_theta_b;
         } else {
             self->faults |= hko_FAULT_range_theta_b;
@@ -2266,19 +2305,19 @@ static inline void back_coast_0(hko_Self *self, Work *work)
             self->faults |= hko_FAULT_range_w_em;
             self->state.w_em = ha_clip(work->at_w_em, -400.0, 2400.0);
         }
-        if ((work->at_theta_d >= (-0.5)) && (work->at_theta_d <= 0.5)) {
+        if (fabs(work->at_theta_d) <= 0.5) {
             self->state.theta_d = work->at_theta_d;
         } else {
             self->faults |= hko_FAULT_range_theta_d;
             self->state.theta_d = ha_clip(work->at_theta_d, -0.5, 0.5);
         }
-        if ((work->at_theta_b >= (-0.2)) && (work->at_theta_b <= 0.2)) {
+        if (fabs(work->at_theta_b) <= 0.2) {
             self->state.theta_b = work->at_theta_b;
         } else {
             self->faults |= hko_FAULT_range_theta_b;
             self->state.theta_b = ha_clip(work->at_theta_b, -0.2, 0.2);
         }
-        if ((work->at_T_l >= (-2000.0)) && (work->at_T_l <= 2000.0)) {
+        if (fabs(work->at_T_l) <= 2000.0) {
             self->state.T_l = work->at_T_l;
         } else {
             self->faults |= hko_FAULT_range_T_l;
@@ -2324,41 +2363,15 @@ static inline void compare_stamps(hko_Self *self, const hko_Cal *cal)
 
 static inline void latch(hko_Self *self, const hko_In *in)
 {
-    if ((in->y_em >= (-400.0)) && (in->y_em <= 2400.0)) {
+    if ((in->y_em >= (-400.0)) && (in->y_em <= 2400.0) && (in->y_w >= (-50.0))
+        && (in->y_w <= 300.0) && (fabs(in->T_em) <= 400.0) && (in->T_br >= 0.0)
+        && (in->T_br <= 3000.0)) {
         self->latched.y_em = in->y_em; /* inputs.y_em */
-    } else {
-        self->faults |= hko_FAULT_range_y_em;
-        if ((in->y_em - in->y_em) >= 0.0) {
-            self->latched.y_em = ha_clip(in->y_em, -400.0, 2400.0);
-        }
-    }
-    if ((in->y_w >= (-50.0)) && (in->y_w <= 300.0)) {
         self->latched.y_w = in->y_w; /* inputs.y_w */
-    } else {
-        self->faults |= hko_FAULT_range_y_w;
-        if ((in->y_w - in->y_w) >= 0.0) {
-            self->latched.y_w = ha_clip(in->y_w, -50.0, 300.0);
-        }
-    }
-    if ((in->T_em >= (-400.0)) && (in->T_em <= 400.0)) {
         self->latched.T_em = in->T_em; /* inputs.T_em */
-    } else {
-        self->faults |= hko_FAULT_range_T_em;
-        if ((in->T_em - in->T_em) >= 0.0) {
-            self->latched.T_em = ha_clip(in->T_em, -400.0, 400.0);
-        } else {
-            self->latched.T_em = 0.0;
-        }
-    }
-    if ((in->T_br >= 0.0) && (in->T_br <= 3000.0)) {
         self->latched.T_br = in->T_br; /* inputs.T_br */
     } else {
-        self->faults |= hko_FAULT_range_T_br;
-        if ((in->T_br - in->T_br) >= 0.0) {
-            self->latched.T_br = ha_clip(in->T_br, 0.0, 3000.0);
-        } else {
-            self->latched.T_br = 0.0;
-        }
+        latch_apart(self, in);
     }
 }
 
@@ -2395,12 +2408,10 @@ static inline void keep(hko_Self *self)
         self->past_T_l[self->newest] = self->state.T_l;
         self->past_T_em[self->newest] = self->latched.T_em;
         self->past_T_br[self->newest] = self->latched.T_br;
-        if (true) {
-            if (self->timer.past < 8U) {
-                self->timer.past++;
-            }
-        } else {
+        if (!true) {
             self->timer.past = 0U;
+        } else if (self->timer.past < 8U) {
+            self->timer.past++;
         }
         break;
     case hko_MODE_coast:
@@ -2412,12 +2423,10 @@ static inline void keep(hko_Self *self)
         self->past_T_l[self->newest] = self->state.T_l;
         self->past_T_em[self->newest] = self->latched.T_em;
         self->past_T_br[self->newest] = self->latched.T_br;
-        if (true) {
-            if (self->timer.past < 8U) {
-                self->timer.past++;
-            }
-        } else {
+        if (!true) {
             self->timer.past = 0U;
+        } else if (self->timer.past < 8U) {
+            self->timer.past++;
         }
         break;
     default:
@@ -2427,13 +2436,13 @@ static inline void keep(hko_Self *self)
 
 static inline void start(hko_Self *self, const hko_In *in, Work *work)
 {
-    if ((constant.alpha >= (-0.5)) && (constant.alpha <= 0.5)) {
+    if (fabs(constant.alpha) <= 0.5) {
         self->state.theta_d = constant.alpha; /* hko states.theta_d.initial */
     } else {
         self->faults |= hko_FAULT_range_theta_d;
         self->state.theta_d = ha_clip(constant.alpha, -0.5, 0.5);
     }
-    if ((constant.alpha >= (-0.2)) && (constant.alpha <= 0.2)) {
+    if (fabs(constant.alpha) <= 0.2) {
         self->state.theta_b = constant.alpha; /* hko states.theta_b.initial */
     } else {
         self->faults |= hko_FAULT_range_theta_b;
@@ -2452,7 +2461,7 @@ static inline void start(hko_Self *self, const hko_In *in, Work *work)
         self->state.w_w = ha_clip(self->latched.y_w, -50.0, 300.0);
     }
     work->new_T_l = 0.0; /* hko states.T_l.initial */
-    if ((work->new_T_l >= (-2000.0)) && (work->new_T_l <= 2000.0)) {
+    if (fabs(work->new_T_l) <= 2000.0) {
         self->state.T_l = work->new_T_l;
     } else {
         self->faults |= hko_FAULT_range_T_l;

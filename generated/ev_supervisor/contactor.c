@@ -21,12 +21,10 @@ static inline void equations_open(contactor_Self *self)
 
 static inline void jump_open(contactor_Self *self, const contactor_In *in)
 {
-    if (in->command) { /* contactor modes.open.transitions.shut.when */
-        if (self->timer.open_shut < 5U) {
-            self->timer.open_shut++;
-        }
-    } else {
+    if (!in->command) { /* contactor modes.open.transitions.shut.when */
         self->timer.open_shut = 0U;
+    } else if (self->timer.open_shut < 5U) {
+        self->timer.open_shut++;
     }
     if (self->timer.open_shut > 4U) {
         self->timer.open_shut = 0U;

@@ -5,6 +5,7 @@
 #include "supervisor.h"
 
 #include <float.h>
+#include <math.h>
 
 #include "ha_mathf.h"
 
@@ -80,6 +81,61 @@ typedef struct {
     float next_share;
     bool decided_permit;
 } Work;
+
+static inline void latch_apart(supervisor_Self *self, const supervisor_In *in)
+{
+    if ((in->key >= supervisor_key_parked) && (in->key <= supervisor_key_crank)) {
+        self->latched.key = in->key; /* inputs.key */
+    } else {
+        self->faults |= supervisor_FAULT_range_key;
+    }
+    if ((in->U_dc >= 0.0F) && (in->U_dc <= 500.0F)) {
+        self->latched.U_dc = in->U_dc; /* inputs.U_dc */
+    } else {
+        self->faults |= supervisor_FAULT_range_U_dc;
+        if ((in->U_dc - in->U_dc) >= 0.0F) {
+            self->latched.U_dc = ha_clipf(in->U_dc, 0.0F, 500.0F);
+        } else {
+            self->latched.U_dc = 0.0F;
+        }
+    }
+    if ((in->U_pack >= 0.0F) && (in->U_pack <= 500.0F)) {
+        self->latched.U_pack = in->U_pack; /* inputs.U_pack */
+    } else {
+        self->faults |= supervisor_FAULT_range_U_pack;
+        if ((in->U_pack - in->U_pack) >= 0.0F) {
+            self->latched.U_pack = ha_clipf(in->U_pack, 0.0F, 500.0F);
+        } else {
+            self->latched.U_pack = 0.0F;
+        }
+    }
+    if (fabsf(in->T_req) <= 400.0F) {
+        self->latched.T_req = in->T_req; /* inputs.T_req */
+    } else {
+        self->faults |= supervisor_FAULT_range_T_req;
+        if ((in->T_req - in->T_req) >= 0.0F) {
+            self->latched.T_req = ha_clipf(in->T_req, -400.0F, 400.0F);
+        } else {
+            self->latched.T_req = 0.0F;
+        }
+    }
+    if ((in->v >= (-20.0F)) && (in->v <= 80.0F)) {
+        self->latched.v = in->v; /* inputs.v */
+    } else {
+        self->faults |= supervisor_FAULT_range_v;
+        if ((in->v - in->v) >= 0.0F) {
+            self->latched.v = ha_clipf(in->v, -20.0F, 80.0F);
+        }
+    }
+    if ((in->temp >= 233.15F) && (in->temp <= 473.15F)) {
+        self->latched.temp = in->temp; /* inputs.temp */
+    } else {
+        self->faults |= supervisor_FAULT_range_temp;
+        if ((in->temp - in->temp) >= 0.0F) {
+            self->latched.temp = ha_clipf(in->temp, 233.15F, 473.15F);
+        }
+    }
+}
 
 static inline void equations_operation_standby(supervisor_Self *self)
 {
@@ -219,7 +275,7 @@ static inline void update_operation_drive_torque_creep(const supervisor_Self *se
 
 static inline void store_operation_drive_torque_creep(supervisor_Self *self, const Work *work)
 {
-    if ((work->next_T_cmd >= (-400.0F)) && (work->next_T_cmd <= 400.0F)) {
+    if (fabsf(work->next_T_cmd) <= 400.0F) {
         self->discrete.T_cmd = work->next_T_cmd;
     } else {
         self->faults |= supervisor_FAULT_range_T_cmd;
@@ -235,7 +291,7 @@ static inline void update_operation_drive_torque_pull(const supervisor_Self *sel
 
 static inline void store_operation_drive_torque_pull(supervisor_Self *self, const Work *work)
 {
-    if ((work->next_T_cmd >= (-400.0F)) && (work->next_T_cmd <= 400.0F)) {
+    if (fabsf(work->next_T_cmd) <= 400.0F) {
         self->discrete.T_cmd = work->next_T_cmd;
     } else {
         self->faults |= supervisor_FAULT_range_T_cmd;
@@ -251,7 +307,7 @@ static inline void update_operation_drive_torque_regen(const supervisor_Self *se
 
 static inline void store_operation_drive_torque_regen(supervisor_Self *self, const Work *work)
 {
-    if ((work->next_T_cmd >= (-400.0F)) && (work->next_T_cmd <= 400.0F)) {
+    if (fabsf(work->next_T_cmd) <= 400.0F) {
         self->discrete.T_cmd = work->next_T_cmd;
     } else {
         self->faults |= supervisor_FAULT_range_T_cmd;
@@ -294,12 +350,10 @@ static inline void store_operation_drive_derating_warm(supervisor_Self *self, co
 static inline void count_operation(supervisor_Self *self, const supervisor_In *in, const Work *work)
 {
     if (work->is_first) {
-        if (!in->hv_ok) { /* supervisor modes.operation.transitions.fault.when */
-            if (self->timer.operation_fault < 4U) {
-                self->timer.operation_fault++;
-            }
-        } else {
+        if (in->hv_ok) { /* supervisor modes.operation.transitions.fault.when */
             self->timer.operation_fault = 0U;
+        } else if (self->timer.operation_fault < 4U) {
+            self->timer.operation_fault++;
         }
     } else if (work->is_over) {
     } else if (!in->hv_ok) {
@@ -330,12 +384,11 @@ static inline void choose_operation_standby(const supervisor_Self *self, const s
 static inline void count_operation_precharge(supervisor_Self *self, const Work *work)
 {
     if (work->is_first) {
-        if (self->discrete.permit && self->equation.pre_closed) { /* supervisor modes.operation.modes.precharge.transitions.ready.when */
-            if (self->timer.operation_precharge_ready < 6U) {
-                self->timer.operation_precharge_ready++;
-            }
-        } else {
+        /* supervisor modes.operation.modes.precharge.transitions.ready.when */
+        if (!(self->discrete.permit && self->equation.pre_closed)) {
             self->timer.operation_precharge_ready = 0U;
+        } else if (self->timer.operation_precharge_ready < 6U) {
+            self->timer.operation_precharge_ready++;
         }
     } else if (work->is_over) {
     } else if (self->discrete.permit && self->equation.pre_closed) {
@@ -411,12 +464,11 @@ static inline void choose_operation_drive_torque_pull(const supervisor_Self *sel
 static inline void count_operation_drive_torque_regen(supervisor_Self *self, const supervisor_Cal *cal, const Work *work)
 {
     if (work->is_first) {
-        if ((self->latched.v < cal->v_creep) || (self->latched.T_req >= 0.0F)) { /* supervisor modes.operation.modes.drive.regions.torque.modes.regen.transitions.creep.when */
-            if (self->timer.operation_drive_torque_regen_creep < 3U) {
-                self->timer.operation_drive_torque_regen_creep++;
-            }
-        } else {
+        /* supervisor modes.operation.modes.drive.regions.torque.modes.regen.transitions.creep.when */
+        if (!((self->latched.v < cal->v_creep) || (self->latched.T_req >= 0.0F))) {
             self->timer.operation_drive_torque_regen_creep = 0U;
+        } else if (self->timer.operation_drive_torque_regen_creep < 3U) {
+            self->timer.operation_drive_torque_regen_creep++;
         }
     } else if (work->is_over) {
     } else if ((self->latched.v < cal->v_creep) || (self->latched.T_req >= 0.0F)) {
@@ -439,12 +491,11 @@ static inline void choose_operation_drive_torque_regen(const supervisor_Self *se
 static inline void count_operation_drive_derating_cool(supervisor_Self *self, const Work *work)
 {
     if (work->is_first) {
-        if (self->latched.temp > 333.15F) { /* supervisor modes.operation.modes.drive.regions.derating.modes.cool.transitions.warm.when */
-            if (self->timer.operation_drive_derating_cool_warm < 101U) {
-                self->timer.operation_drive_derating_cool_warm++;
-            }
-        } else {
+        /* supervisor modes.operation.modes.drive.regions.derating.modes.cool.transitions.warm.when */
+        if (!(self->latched.temp > 333.15F)) {
             self->timer.operation_drive_derating_cool_warm = 0U;
+        } else if (self->timer.operation_drive_derating_cool_warm < 101U) {
+            self->timer.operation_drive_derating_cool_warm++;
         }
     } else if (work->is_over) {
     } else if (self->latched.temp > 333.15F) {
@@ -467,12 +518,11 @@ static inline void choose_operation_drive_derating_cool(const supervisor_Self *s
 static inline void count_operation_drive_derating_warm(supervisor_Self *self, const Work *work)
 {
     if (work->is_first) {
-        if (self->latched.temp < 328.15F) { /* supervisor modes.operation.modes.drive.regions.derating.modes.warm.transitions.cool.when */
-            if (self->timer.operation_drive_derating_warm_cool < 501U) {
-                self->timer.operation_drive_derating_warm_cool++;
-            }
-        } else {
+        /* supervisor modes.operation.modes.drive.regions.derating.modes.warm.transitions.cool.when */
+        if (!(self->latched.temp < 328.15F)) {
             self->timer.operation_drive_derating_warm_cool = 0U;
+        } else if (self->timer.operation_drive_derating_warm_cool < 501U) {
+            self->timer.operation_drive_derating_warm_cool++;
         }
     } else if (work->is_over) {
     } else if (self->latched.temp < 328.15F) {
@@ -502,12 +552,10 @@ static inline void choose_fault(const supervisor_In *in, Work *work)
 static inline void count_main_open(supervisor_Self *self, const Work *work)
 {
     if (work->is_first) {
-        if (self->equation.main_command) { /* supervisor regions.main.modes.open.transitions.shut.when */
-            if (self->timer.main_open_shut < 5U) {
-                self->timer.main_open_shut++;
-            }
-        } else {
+        if (!self->equation.main_command) { /* supervisor regions.main.modes.open.transitions.shut.when */
             self->timer.main_open_shut = 0U;
+        } else if (self->timer.main_open_shut < 5U) {
+            self->timer.main_open_shut++;
         }
     } else if (work->is_over) {
     } else if (self->equation.main_command) {
@@ -536,12 +584,10 @@ static inline void choose_main_shut(const supervisor_Self *self, Work *work)
 static inline void count_pre_open(supervisor_Self *self, const Work *work)
 {
     if (work->is_first) {
-        if (self->equation.pre_command) { /* supervisor regions.pre.modes.open.transitions.shut.when */
-            if (self->timer.pre_open_shut < 3U) {
-                self->timer.pre_open_shut++;
-            }
-        } else {
+        if (!self->equation.pre_command) { /* supervisor regions.pre.modes.open.transitions.shut.when */
             self->timer.pre_open_shut = 0U;
+        } else if (self->timer.pre_open_shut < 3U) {
+            self->timer.pre_open_shut++;
         }
     } else if (work->is_over) {
     } else if (self->equation.pre_command) {
@@ -665,10 +711,20 @@ static inline void hear_chart(Work *work)
 {
     work->heard_chart = true;
     work->keeps = true;
-    if ((work->takes_operation_drive_torque != 0U) && (((work->low_chart <= work->high_chart) && (work->low_operation_drive_torque <= work->high_operation_drive_torque)) && (((work->low_operation_drive_torque <= work->low_chart) && (work->low_chart <= work->high_operation_drive_torque)) || ((work->low_chart <= work->low_operation_drive_torque) && (work->low_operation_drive_torque <= work->high_chart))))) {
+    if ((work->takes_operation_drive_torque != 0U) && ((work->low_chart <= work->high_chart)
+        && (work->low_operation_drive_torque <= work->high_operation_drive_torque)
+        && (((work->low_operation_drive_torque <= work->low_chart)
+        && (work->low_chart <= work->high_operation_drive_torque))
+        || ((work->low_chart <= work->low_operation_drive_torque)
+        && (work->low_operation_drive_torque <= work->high_chart))))) {
         work->keeps = false;
     }
-    if ((work->takes_operation_drive_derating != 0U) && (((work->low_chart <= work->high_chart) && (work->low_operation_drive_derating <= work->high_operation_drive_derating)) && (((work->low_operation_drive_derating <= work->low_chart) && (work->low_chart <= work->high_operation_drive_derating)) || ((work->low_chart <= work->low_operation_drive_derating) && (work->low_operation_drive_derating <= work->high_chart))))) {
+    if ((work->takes_operation_drive_derating != 0U) && ((work->low_chart <= work->high_chart)
+        && (work->low_operation_drive_derating <= work->high_operation_drive_derating)
+        && (((work->low_operation_drive_derating <= work->low_chart)
+        && (work->low_chart <= work->high_operation_drive_derating))
+        || ((work->low_chart <= work->low_operation_drive_derating)
+        && (work->low_operation_drive_derating <= work->high_chart))))) {
         work->keeps = false;
     }
     if (work->keeps) {
@@ -681,7 +737,13 @@ static inline void hear_operation_drive_torque(Work *work)
     work->heard_operation_drive_torque = true;
     work->keeps = true;
     if (work->keeps) {
-        if ((work->takes_chart != 0U) && (((work->low_operation_drive_torque <= work->high_operation_drive_torque) && (work->low_chart <= work->high_chart)) && (((work->low_chart <= work->low_operation_drive_torque) && (work->low_operation_drive_torque <= work->high_chart)) || ((work->low_operation_drive_torque <= work->low_chart) && (work->low_chart <= work->high_operation_drive_torque))))) {
+        if ((work->takes_chart != 0U)
+            && ((work->low_operation_drive_torque <= work->high_operation_drive_torque)
+            && (work->low_chart <= work->high_chart)
+            && (((work->low_chart <= work->low_operation_drive_torque)
+            && (work->low_operation_drive_torque <= work->high_chart))
+            || ((work->low_operation_drive_torque <= work->low_chart)
+            && (work->low_chart <= work->high_operation_drive_torque))))) {
             work->takes_chart = 0U;
         }
         work->takes_operation_drive_torque = work->wish_operation_drive_torque;
@@ -693,7 +755,13 @@ static inline void hear_operation_drive_derating(Work *work)
     work->heard_operation_drive_derating = true;
     work->keeps = true;
     if (work->keeps) {
-        if ((work->takes_chart != 0U) && (((work->low_operation_drive_derating <= work->high_operation_drive_derating) && (work->low_chart <= work->high_chart)) && (((work->low_chart <= work->low_operation_drive_derating) && (work->low_operation_drive_derating <= work->high_chart)) || ((work->low_operation_drive_derating <= work->low_chart) && (work->low_chart <= work->high_operation_drive_derating))))) {
+        if ((work->takes_chart != 0U)
+            && ((work->low_operation_drive_derating <= work->high_operation_drive_derating)
+            && (work->low_chart <= work->high_chart)
+            && (((work->low_chart <= work->low_operation_drive_derating)
+            && (work->low_operation_drive_derating <= work->high_chart))
+            || ((work->low_operation_drive_derating <= work->low_chart)
+            && (work->low_chart <= work->high_operation_drive_derating))))) {
             work->takes_chart = 0U;
         }
         work->takes_operation_drive_derating = work->wish_operation_drive_derating;
@@ -1223,7 +1291,7 @@ static inline void commit(supervisor_Self *self, Work *work)
         work->reset_T_cmd = 0.0F; /* supervisor modes.operation.modes.drive.exit.T_cmd */
     }
     if (work->exit_operation_drive) {
-        if ((work->reset_T_cmd >= (-400.0F)) && (work->reset_T_cmd <= 400.0F)) {
+        if (fabsf(work->reset_T_cmd) <= 400.0F) {
             self->discrete.T_cmd = work->reset_T_cmd;
         } else {
             self->faults |= supervisor_FAULT_range_T_cmd;
@@ -1386,7 +1454,7 @@ static inline void commit(supervisor_Self *self, Work *work)
         work->reset_pre_cmd = false; /* supervisor modes.fault.entry.pre_cmd */
     }
     if (work->enter_fault) {
-        if ((work->reset_T_cmd >= (-400.0F)) && (work->reset_T_cmd <= 400.0F)) {
+        if (fabsf(work->reset_T_cmd) <= 400.0F) {
             self->discrete.T_cmd = work->reset_T_cmd;
         } else {
             self->faults |= supervisor_FAULT_range_T_cmd;
@@ -1411,7 +1479,7 @@ static inline void commit(supervisor_Self *self, Work *work)
     if (work->enter_operation_standby) {
         self->discrete.main_cmd = work->reset_main_cmd;
         self->discrete.pre_cmd = work->reset_pre_cmd;
-        if ((work->reset_T_cmd >= (-400.0F)) && (work->reset_T_cmd <= 400.0F)) {
+        if (fabsf(work->reset_T_cmd) <= 400.0F) {
             self->discrete.T_cmd = work->reset_T_cmd;
         } else {
             self->faults |= supervisor_FAULT_range_T_cmd;
@@ -1424,7 +1492,7 @@ static inline void commit(supervisor_Self *self, Work *work)
     if (work->enter_operation_ready) {
         self->discrete.main_cmd = work->reset_main_cmd;
         self->discrete.pre_cmd = work->reset_pre_cmd;
-        if ((work->reset_T_cmd >= (-400.0F)) && (work->reset_T_cmd <= 400.0F)) {
+        if (fabsf(work->reset_T_cmd) <= 400.0F) {
             self->discrete.T_cmd = work->reset_T_cmd;
         } else {
             self->faults |= supervisor_FAULT_range_T_cmd;
@@ -1456,7 +1524,9 @@ static inline void micro_step(supervisor_Self *self, const supervisor_Cal *cal, 
 {
     select_transitions(self, cal, in, work);
     hear(self, work);
-    if (((((work->takes_chart != 0U) || (work->takes_operation_drive_torque != 0U)) || (work->takes_operation_drive_derating != 0U)) || (work->takes_main != 0U)) || (work->takes_pre != 0U)) {
+    if ((work->takes_chart != 0U) || (work->takes_operation_drive_torque != 0U)
+        || (work->takes_operation_drive_derating != 0U) || (work->takes_main != 0U)
+        || (work->takes_pre != 0U)) {
         if (work->is_over) {
             self->faults |= supervisor_FAULT_micro_step_limit;
             work->is_busy = false;
@@ -1505,56 +1575,18 @@ static inline void jump(supervisor_Self *self, const supervisor_Cal *cal, const 
 
 static inline void latch(supervisor_Self *self, const supervisor_In *in)
 {
-    if ((in->key >= supervisor_key_parked) && (in->key <= supervisor_key_crank)) {
+    if ((in->key >= supervisor_key_parked) && (in->key <= supervisor_key_crank)
+        && (in->U_dc >= 0.0F) && (in->U_dc <= 500.0F) && (in->U_pack >= 0.0F)
+        && (in->U_pack <= 500.0F) && (fabsf(in->T_req) <= 400.0F) && (in->v >= (-20.0F))
+        && (in->v <= 80.0F) && (in->temp >= 233.15F) && (in->temp <= 473.15F)) {
         self->latched.key = in->key; /* inputs.key */
-    } else {
-        self->faults |= supervisor_FAULT_range_key;
-    }
-    if ((in->U_dc >= 0.0F) && (in->U_dc <= 500.0F)) {
         self->latched.U_dc = in->U_dc; /* inputs.U_dc */
-    } else {
-        self->faults |= supervisor_FAULT_range_U_dc;
-        if ((in->U_dc - in->U_dc) >= 0.0F) {
-            self->latched.U_dc = ha_clipf(in->U_dc, 0.0F, 500.0F);
-        } else {
-            self->latched.U_dc = 0.0F;
-        }
-    }
-    if ((in->U_pack >= 0.0F) && (in->U_pack <= 500.0F)) {
         self->latched.U_pack = in->U_pack; /* inputs.U_pack */
-    } else {
-        self->faults |= supervisor_FAULT_range_U_pack;
-        if ((in->U_pack - in->U_pack) >= 0.0F) {
-            self->latched.U_pack = ha_clipf(in->U_pack, 0.0F, 500.0F);
-        } else {
-            self->latched.U_pack = 0.0F;
-        }
-    }
-    if ((in->T_req >= (-400.0F)) && (in->T_req <= 400.0F)) {
         self->latched.T_req = in->T_req; /* inputs.T_req */
-    } else {
-        self->faults |= supervisor_FAULT_range_T_req;
-        if ((in->T_req - in->T_req) >= 0.0F) {
-            self->latched.T_req = ha_clipf(in->T_req, -400.0F, 400.0F);
-        } else {
-            self->latched.T_req = 0.0F;
-        }
-    }
-    if ((in->v >= (-20.0F)) && (in->v <= 80.0F)) {
         self->latched.v = in->v; /* inputs.v */
-    } else {
-        self->faults |= supervisor_FAULT_range_v;
-        if ((in->v - in->v) >= 0.0F) {
-            self->latched.v = ha_clipf(in->v, -20.0F, 80.0F);
-        }
-    }
-    if ((in->temp >= 233.15F) && (in->temp <= 473.15F)) {
         self->latched.temp = in->temp; /* inputs.temp */
     } else {
-        self->faults |= supervisor_FAULT_range_temp;
-        if ((in->temp - in->temp) >= 0.0F) {
-            self->latched.temp = ha_clipf(in->temp, 233.15F, 473.15F);
-        }
+        latch_apart(self, in);
     }
 }
 
@@ -1569,7 +1601,7 @@ static inline void decide(supervisor_Self *self, const supervisor_In *in, Work *
     /* supervisor tables.permission.if.voltage */
     const bool decision_1_voltage = self->latched.U_dc > (constant.U_close * self->latched.U_pack);
     const bool decision_1_isolated = in->hv_ok; /* supervisor tables.permission.if.isolated */
-    if ((decision_1_ready_key && decision_1_voltage) && decision_1_isolated) {
+    if (decision_1_ready_key && decision_1_voltage && decision_1_isolated) {
         work->decided_permit = true; /* supervisor tables.permission.rows.T T T.permit */
     } else if (!decision_1_ready_key) {
         work->decided_permit = false; /* supervisor tables.permission.rows.F - -.permit */
@@ -1583,19 +1615,18 @@ static inline void decide(supervisor_Self *self, const supervisor_In *in, Work *
 
 static inline void keep(supervisor_Self *self)
 {
-    if (self->mode == supervisor_MODE_operation_precharge) { /* supervisor modes.operation.modes.precharge */
-        if (self->timer.after_1 < 200U) {
-            self->timer.after_1++;
-        }
-    } else {
+    /* supervisor modes.operation.modes.precharge */
+    if (self->mode != supervisor_MODE_operation_precharge) {
         self->timer.after_1 = 0U;
+    } else if (self->timer.after_1 < 200U) {
+        self->timer.after_1++;
     }
 }
 
 static inline void start(supervisor_Self *self, Work *work)
 {
     const float new_T_cmd = 0.0F; /* supervisor discrete.T_cmd.initial */
-    if ((new_T_cmd >= (-400.0F)) && (new_T_cmd <= 400.0F)) {
+    if (fabsf(new_T_cmd) <= 400.0F) {
         self->discrete.T_cmd = new_T_cmd;
     } else {
         self->faults |= supervisor_FAULT_range_T_cmd;
@@ -1625,7 +1656,7 @@ static inline void start(supervisor_Self *self, Work *work)
     work->reset_T_cmd = 0.0F; /* supervisor modes.operation.modes.standby.entry.T_cmd */
     self->discrete.main_cmd = work->reset_main_cmd;
     self->discrete.pre_cmd = work->reset_pre_cmd;
-    if ((work->reset_T_cmd >= (-400.0F)) && (work->reset_T_cmd <= 400.0F)) {
+    if (fabsf(work->reset_T_cmd) <= 400.0F) {
         self->discrete.T_cmd = work->reset_T_cmd;
     } else {
         self->faults |= supervisor_FAULT_range_T_cmd;

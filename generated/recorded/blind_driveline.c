@@ -964,7 +964,7 @@ void blind_driveline_Step(blind_driveline_Self *self, const blind_driveline_Cal 
         if (work->left > 0.0) {
             self->faults |= blind_driveline_FAULT_zeno;
         }
-        work->event = (work->event || (in->T_em != self->before.T_em)) || (in->T_br != self->before.T_br);
+        work->event = work->event || (in->T_em != self->before.T_em) || (in->T_br != self->before.T_br);
         latch(self, in);
     } else {
         latch(self, in);

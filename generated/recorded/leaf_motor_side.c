@@ -275,7 +275,7 @@ void leaf_motor_side_Step(leaf_motor_side_Self *self, const leaf_motor_side_Cal 
         if (work->left > 0.0) {
             self->faults |= leaf_motor_side_FAULT_zeno;
         }
-        work->event = (work->event || (in->T_em != self->before.T_em)) || (in->v_wh != self->before.v_wh);
+        work->event = work->event || (in->T_em != self->before.T_em) || (in->v_wh != self->before.v_wh);
         latch(self, in);
     } else {
         latch(self, in);

@@ -93,16 +93,20 @@ def interpreted(ticks: int) -> Run:
     return run
 
 
-def in_c(ticks: int, ranges: bool = False) -> tuple[Run, Run]:
-    """Return what runs our C, and what runs the peer's, both in one library."""
+def in_c(ticks: int, ranges: bool = False, held: bool = False) -> tuple[Run, Run]:
+    """Return what runs our C, and what runs the peer's, both in one library.
+
+    With `held` the side by hand is mode_switch_held.c, which holds its inputs in ranges as well.
+    """
     fed, loops = inputs(ticks), _library(ranges)
+    hand = loops.loop_by_hand_held if held else loops.loop_by_hand
     ours = np.ascontiguousarray(np.stack([fed.theta, fed.torque], axis=1))
 
     def generated() -> int:
         return int(loops.loop_generated(ours.ctypes.data, ticks))
 
     def by_hand() -> int:
-        return int(loops.loop_by_hand(fed.theta.ctypes.data, fed.torque.ctypes.data, ticks))
+        return int(hand(fed.theta.ctypes.data, fed.torque.ctypes.data, ticks))
 
     return generated, by_hand
 
@@ -123,7 +127,8 @@ def _library(ranges: bool) -> ctypes.CDLL:
         loaded = ctypes.CDLL(str(target))
     pointer, whole = ctypes.c_void_p, ctypes.c_int
     loaded.loop_by_hand.argtypes = [pointer, pointer, whole]
+    loaded.loop_by_hand_held.argtypes = [pointer, pointer, whole]
     loaded.loop_generated.argtypes = [pointer, whole]
-    for loop in (loaded.loop_by_hand, loaded.loop_generated):
+    for loop in (loaded.loop_by_hand, loaded.loop_by_hand_held, loaded.loop_generated):
         loop.restype = ctypes.c_long
     return loaded

@@ -36,6 +36,7 @@ def charts(pairs: int) -> Figure:
         **found,
         "generated_over_c": _over_c(pairs, ranges=False),
         "generated_with_ranges_over_c": _over_c(pairs, ranges=True),
+        "generated_over_c_both_with_ranges": _over_c(pairs, ranges=True, held=True),
     }
 
 
@@ -47,8 +48,8 @@ def _over_machine(module: str, name: str, pairs: int) -> Figure:
     return _rated(interleaved(rival, ours, pairs), name, "interpreter", ticks)
 
 
-def _over_c(pairs: int, ranges: bool) -> Figure:
-    generated, by_hand = in_c(TICKS_IN_C, ranges)
+def _over_c(pairs: int, ranges: bool, held: bool = False) -> Figure:
+    generated, by_hand = in_c(TICKS_IN_C, ranges, held)
     _same("C", generated(), by_hand())
     return _rated(interleaved(by_hand, generated, pairs), "c", "generated", TICKS_IN_C)
 

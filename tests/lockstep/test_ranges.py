@@ -15,6 +15,8 @@ from tests.lockstep.heater import column
 from tests.lockstep.programs import Tick
 
 LOW, HIGH = -1.5, 2.25
+BOUNDS = {name: (LOW, HIGH) for name in "abcdef"} | {"m": (-HIGH, HIGH)}
+"""Of each real input; those of `m` are one comparison in C."""
 SPEC = """\
 language: 1
 automaton: ranges
@@ -29,6 +31,7 @@ inputs:
   d: {{unit: m, range: [-1.5, 2.25], on_range: hold}}
   e: {{unit: m, range: [-1.5, 2.25], on_range: hold, fallback: 0.5 m, fault: loose}}
   f: {{unit: m, range: [-1.5, 2.25], on_range: fault, default: 1 m}}
+  m: {{unit: m, range: [-2.25, 2.25]}}
   k: {{type: int, range: [-3, 5]}}
   g: {{type: enum, values: [low, high], fallback: high}}
 states:
@@ -46,6 +49,7 @@ equations:
   sd: d
   se: e
   sf: f
+  sm: m
   sk: k
   sg: g
 initial: drive
@@ -64,6 +68,7 @@ outputs: [mode, faults]
 """
 VALUES = [0.0, -0.0, 5e-324, -5e-324, 1e-40, LOW, HIGH, math.nextafter(LOW, -9), -2.0]
 VALUES += [math.nextafter(HIGH, 9), 1e9, math.inf, -math.inf, math.nan, 1.0, 2.0, -1.0]
+VALUES += [-HIGH, math.nextafter(-HIGH, -9)]
 FALLBACK = 0.5
 
 
@@ -71,35 +76,42 @@ def bits(value: float) -> bytes:
     return struct.pack("<d", value)
 
 
-def nearest(value: float) -> float:
+def nearest(name: str, value: float) -> float:
     """Return the nearest bound; the lower one for NaN (codegen rule R8)."""
-    return HIGH if value > HIGH else LOW
+    low, high = BOUNDS[name]
+    return high if value > high else low
 
 
 def held(name: str, value: float, last: float) -> float:
     """Return what rule 18 makes of an input's value, given what it held before."""
-    if LOW <= value <= HIGH:
+    low, high = BOUNDS[name]
+    if low <= value <= high:
         return value
     if not math.isfinite(value) and name in "be":
         return FALLBACK
     if name in "def" or (not math.isfinite(value) and name == "c"):
         return last
-    return nearest(value)
+    return nearest(name, value)
 
 
 def ticks() -> list[Tick]:
-    """Return ticks in which each input takes each value, beside different ones of the others."""
+    """Return ticks in which each input takes each value, beside different ones of the others.
+
+    Then those in which all take the same, inside: C takes these at once.
+    """
     found: list[Tick] = []
     for k in range(3 * len(VALUES)):
         tick: Tick = {
             f"input.{name}": VALUES[(k * (2 * place + 1) + place) % len(VALUES)]
-            for place, name in enumerate("abcdef")
+            for place, name in enumerate(BOUNDS)
         }
         tick["input.k"], tick["input.g"] = (
             (-4, -3, 0, 5, 6, 100000)[k % 6],
             (0, 1, 2, 255)[k % 4],
         )
         found.append(tick)
+    for value in (value for value in VALUES if LOW <= value <= HIGH):
+        found.append({f"input.{name}": value for name in BOUNDS} | {"input.k": 5, "input.g": 1})
     return found
 
 
@@ -126,7 +138,7 @@ def test_engine_and_c_do_the_same(tape: Tape) -> None:
     assert verdict.is_equal, str(verdict.first)
 
 
-@pytest.mark.parametrize("name", list("abcdef"))
+@pytest.mark.parametrize("name", list(BOUNDS))
 def test_an_input_is_what_rule_18_says(tape: Tape, name: str) -> None:
     number = tape.program.number
     last = 1.0 if name == "f" else 0.0

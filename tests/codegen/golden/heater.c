@@ -42,12 +42,10 @@ static inline void equations_rest(heater_Self *self)
 
 static inline void jump_rest(heater_Self *self, const heater_In *in)
 {
-    if (self->equation.low && in->request) { /* heater modes.rest.transitions.heating.when */
-        if (self->timer.rest_heating < 4U) {
-            self->timer.rest_heating++;
-        }
-    } else {
+    if (!(self->equation.low && in->request)) { /* heater modes.rest.transitions.heating.when */
         self->timer.rest_heating = 0U;
+    } else if (self->timer.rest_heating < 4U) {
+        self->timer.rest_heating++;
     }
     if (self->timer.rest_heating > 3U) {
         const double reset_heat = 0.1; /* heater modes.rest.transitions.heating.reset.heat */

@@ -59,7 +59,7 @@ def _everywhere(name: str, value: Any) -> Patch:
     return apply
 
 
-def _short(writer: Writer, timer: str, condition: object, limit: int, key: str) -> Any:
+def _short(writer: Writer, timer: str, condition: Expr, limit: int, key: str) -> Any:
     return _COUNT(writer, timer, condition, limit - 1, key)
 
 

@@ -1,0 +1,57 @@
+"""Gate: inputs within their ranges are taken all at once in C, by few comparisons; bits stay.
+
+A Program holds its inputs in their ranges one by one (rule 18). Nothing that it does with one reads
+another, so where all of them are inside, which is nearly always, one branch takes them.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+from functools import reduce
+
+from language.operation import Assign, Binary, Block, Branch, Call, Compare, Expr, Run, Value
+from language.program import Program
+from language.substitution import with_expressions
+
+LATCH = "latch"
+APART = "latch_apart"
+"""What takes the inputs one by one."""
+
+
+def gated(program: Program) -> Program:
+    """Return a Program that takes its inputs at once where all are within their ranges."""
+    blocks = {name: with_expressions(block, centred) for name, block in program.blocks.items()}
+    taken = blocks.get(LATCH, ())
+    held = [op for op in taken if isinstance(op, Branch) and _takes(op.then)]
+    if len(held) == len(taken) > 1:
+        inside = reduce(_both, (part for branch in held for part in _parts(branch.condition)))
+        together = tuple(op for branch in held for op in branch.then)
+        blocks = {APART: taken, **blocks, LATCH: (Branch(inside, together, (Run(APART),)),)}
+    return dataclasses.replace(program, blocks=blocks)
+
+
+def centred(expr: Expr) -> Expr:
+    """Return `-a <= x <= a` as one comparison, |x| <= a; with a NaN both are false."""
+    match expr:
+        case Binary(
+            "and", Compare(">=", value, Value(float(low))), Compare("<=", same, Value(float(high)))
+        ) if value == same and low == -high <= 0:
+            return Compare("<=", Call("abs", (value,)), Value(high))
+    return expr
+
+
+def _parts(condition: Expr) -> Iterator[Expr]:
+    match condition:
+        case Binary("and", left, right):
+            yield from (*_parts(left), *_parts(right))
+        case _:
+            yield condition
+
+
+def _both(left: Expr, right: Expr) -> Expr:
+    return Binary("and", left, right)
+
+
+def _takes(block: Block) -> bool:
+    return len(block) == 1 and isinstance(block[0], Assign)
