@@ -15,10 +15,11 @@ from pathlib import Path
 
 import numpy as np
 
+from diagnosis.adaptation import adapted
 from diagnosis.bench import Bench
 from diagnosis.case import Case, case_bench, read_series
 from diagnosis.description import Description
-from diagnosis.estimation import Estimate, adapted
+from diagnosis.estimation import Estimate
 from diagnosis.judgement import judged
 from diagnosis.location import led_by
 from diagnosis.locus import Locus

@@ -110,7 +110,7 @@ def estimated(
     damping = FIRST_DAMPING
     for _ in range(rounds if np.isfinite(now.cost) else 0):
         now = with_normal(now, series)
-        better, damping = _improved(now, series, damping)
+        better, damping = improved(now, series, damping)
         if better is None:
             break
         renewed = looked_at(candidate, series, noises, better.point, better.outcome)
@@ -121,31 +121,11 @@ def estimated(
     return now if now.normal else with_normal(now, series) if np.isfinite(now.cost) else now
 
 
-def adapted(model: Estimate, series: Sequence[Series], rounds: int = 5) -> Estimate:
-    """Return a model for other recordings, with the gains that it has.
-
-    What all recordings share stays where it is; only what each has of its own is fitted.
-    """
-    shared = model.point.shared
-    point = Point(shared, np.tile(shared, (len(series), 1)))
-    outcome = _run(model.candidate, series, point, model.gains, model.noises)
-    cost = outcome.cost() + point.prior(model.candidate)
-    now = dataclasses.replace(model, point=point, cost=cost, outcome=outcome, normal=None)
-    damping = FIRST_DAMPING
-    has_own = any(one.per_recording for one in model.candidate.uncertain)
-    for _ in range(rounds if has_own and np.isfinite(cost) else 0):
-        better, damping = _improved(with_normal(now, series), series, damping, own_only=True)
-        if better is None:
-            break
-        now = better
-    return now
-
-
 def reached(estimate: Estimate, series: Sequence[Series], known: Columns) -> Estimate:
     """Return where some steps lead for which `known` columns of a model near it are good enough."""
     now, damping = estimate, FIRST_DAMPING
     for _ in range(SCREENED_ROUNDS if np.isfinite(now.cost) else 0):
-        better, damping = _improved(with_normal(now, series, known), series, damping)
+        better, damping = improved(with_normal(now, series, known), series, damping)
         if better is None:
             break
         gained, now = now.cost - better.cost, better
@@ -155,7 +135,7 @@ def reached(estimate: Estimate, series: Sequence[Series], known: Columns) -> Est
     return min(now, regained, key=lambda one: one.cost)
 
 
-def _improved(
+def improved(
     now: Estimate, series: Sequence[Series], damping: float, own_only: bool = False
 ) -> tuple[Estimate | None, float]:
     """Return a better point and the damping that led there; None where there is none."""

@@ -8,14 +8,14 @@ from functools import partial
 
 import numpy as np
 
+from diagnosis.adaptation import turned
 from diagnosis.bench import Bench
 from diagnosis.candidate import Candidate
-from diagnosis.estimation import Estimate, looked_at, outcome_at, reached
+from diagnosis.estimation import Estimate, looked_at, reached
 from diagnosis.evidence import Evidence, evidence, inflation
 from diagnosis.layers import Layer
 from diagnosis.level import fitted
-from diagnosis.point import Point, extended, point_of
-from diagnosis.series import Series
+from diagnosis.point import extended, point_of
 
 FULL_FITS = 7
 """Candidates that are fitted to the end, best foreseen first."""
@@ -118,26 +118,6 @@ def starts_of(candidate: Candidate, base: Mapping[str, float]) -> list[dict[str,
     own = [one for one in candidate.uncertain if one.name not in base]
     most = max((len(one.starts) for one in own if not one.per_recording), default=1)
     return [{one.name: one.starts[min(k, len(one.starts) - 1)] for one in own} for k in range(most)]
-
-
-def turned(estimate: Estimate, series: Sequence[Series]) -> Estimate:
-    """Return an estimate with what each recording has of its own at the best of its starts."""
-    uncertain = estimate.candidate.uncertain
-    own = [k for k, one in enumerate(uncertain) if one.per_recording and len(one.starts) > 1]
-    if not own or not np.isfinite(estimate.cost):
-        return estimate
-    variances = estimate.outcome.variances
-    best, lowest = estimate.point.own.copy(), np.full(len(series), np.inf)
-    for k in own:
-        for start in uncertain[k].starts:
-            trial = best.copy()
-            trial[:, k] = uncertain[k].coordinate(start)
-            outcome = outcome_at(estimate, series, Point(estimate.point.shared, trial))
-            each = np.array([np.nansum(one / variances) for one in outcome.squares])
-            better = each < lowest
-            best[better, k], lowest[better] = trial[better, k], each[better]
-    point = Point(estimate.point.shared, best)
-    return looked_at(estimate.candidate, series, estimate.noises, point, estimate.outcome)
 
 
 def _possible(bench: Bench, base: Estimate, layer: Layer) -> Candidate | None:

@@ -1,0 +1,69 @@
+"""Adaptation: what each recording has of its own - a phase, a grade - found with all else held."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from diagnosis.estimation import (
+    FIRST_DAMPING,
+    Estimate,
+    improved,
+    looked_at,
+    outcome_at,
+    with_normal,
+)
+from diagnosis.point import Point
+from diagnosis.series import Series
+
+ROUNDS = 5
+"""Most steps of what other recordings have of their own."""
+
+
+def adapted(model: Estimate, series: Sequence[Series]) -> Estimate:
+    """Return a model for other recordings, with the gains that it has.
+
+    What all recordings share stays where it is; only what each has of its own is fitted, from the
+    best of its starts.
+    """
+    shared = model.point.shared
+    now = _at(model, series, Point(shared, np.tile(shared, (len(series), 1))))
+    if not any(one.per_recording for one in model.candidate.uncertain):
+        return now
+    now = min(now, _at(model, series, turned(now, series).point), key=lambda one: one.cost)
+    damping = FIRST_DAMPING
+    for _ in range(ROUNDS if np.isfinite(now.cost) else 0):
+        better, damping = improved(with_normal(now, series), series, damping, own_only=True)
+        if better is None:
+            break
+        now = better
+    return now
+
+
+def _at(model: Estimate, series: Sequence[Series], point: Point) -> Estimate:
+    """Return a model with its gains at a point for some recordings."""
+    outcome = outcome_at(model, series, point)
+    cost = outcome.cost() + point.prior(model.candidate)
+    return dataclasses.replace(model, point=point, cost=cost, outcome=outcome, normal=None)
+
+
+def turned(estimate: Estimate, series: Sequence[Series]) -> Estimate:
+    """Return an estimate with what each recording has of its own at the best of its starts."""
+    uncertain = estimate.candidate.uncertain
+    own = [k for k, one in enumerate(uncertain) if one.per_recording and len(one.starts) > 1]
+    if not own or not np.isfinite(estimate.cost):
+        return estimate
+    variances = estimate.outcome.variances
+    best, lowest = estimate.point.own.copy(), np.full(len(series), np.inf)
+    for k in own:
+        for start in uncertain[k].starts:
+            trial = best.copy()
+            trial[:, k] = uncertain[k].coordinate(start)
+            outcome = outcome_at(estimate, series, Point(estimate.point.shared, trial))
+            each = np.array([np.nansum(one / variances) for one in outcome.squares])
+            better = each < lowest
+            best[better, k], lowest[better] = trial[better, k], each[better]
+    point = Point(estimate.point.shared, best)
+    return looked_at(estimate.candidate, series, estimate.noises, point, estimate.outcome)
