@@ -15,7 +15,6 @@ import random
 import sys
 from collections.abc import Iterator
 from fractions import Fraction
-from pathlib import Path
 
 from engine.interpreter import Interpreter
 from engine.simulate import simulate
@@ -29,8 +28,8 @@ from language.stimulus import held
 from language.system import around, in_numbers
 from lockstep.compare import Tape, compare
 from modewright.api import Loaded, load
+from tests.verify.store import ROOT, write
 
-ROOT = Path(__file__).resolve().parent.parent.parent
 EVIDENCE = ROOT / "docs" / "evidence" / "lockstep.json"
 PART = 50_000
 """Ticks of one tape: some seconds of the interpreter and 10 MB."""
@@ -56,7 +55,7 @@ def main() -> int:
             for part in range(parts):
                 if str(part) not in kept["parts"]:
                     kept["parts"][str(part)] = measured(program, part)
-                    EVIDENCE.write_text(json.dumps(found, indent=1, sort_keys=True) + "\n")
+                    write(EVIDENCE, found, sort_keys=True)
                     print(f"{program.name} {number} part {part}: {kept['parts'][str(part)]}")
     return report(found, ticks)
 

@@ -21,7 +21,7 @@ from typing import Any
 from tests.open_generator.__main__ import main as generate
 from tests.verify.store import CODE, ROOT, Figure, code_digest, measured
 
-SEED = 20261130
+SEED = 20261201
 EFFECTS = "all:5,none:65"
 NAMED, ALARMS, PLACED, CPU = 0.92, 0.05, 0.85, 10.0
 """Bars: first names, false alarms, places, CPU seconds of the median case."""

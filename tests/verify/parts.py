@@ -18,7 +18,7 @@ from codegen.source import c_files
 from language.printing import digest
 from language.program import Program
 from tests.lockstep.chance.spec import Spec
-from tests.verify.store import ROOT, Figure
+from tests.verify.store import ROOT, Figure, write
 
 PART = 20
 """Specs of a part: a kill loses less than a minute."""
@@ -51,7 +51,7 @@ def verified(
             if found.get(str(start), {}).get("digest") == key:
                 continue
             found[str(start)] = {"digest": key, **part(pairs, Path(folder))}
-        evidence.write_text(json.dumps(found, indent=1, sort_keys=True) + "\n")
+        write(evidence, found, sort_keys=True)
         print(f"{name} {start} to {start + PART - 1}: {found[str(start)]['bits']}", flush=True)
     return [found[str(start)] for start in range(0, count, PART)], -(-HITS * count // full)
 

@@ -47,9 +47,12 @@ def code_digest(folders: Sequence[str] = CODE) -> str:
 
 
 def _write(path: Path, issue: int, digest: str, figures: Mapping[str, Figure]) -> None:
-    """Write the evidence, whole or not at all."""
+    write(path, {"issue": issue, "code": digest, "figures": figures})
+
+
+def write(path: Path, known: Mapping[str, Any], sort_keys: bool = False) -> None:
+    """Write what is known as JSON, whole or not at all."""
     path.parent.mkdir(exist_ok=True)
-    text = json.dumps({"issue": issue, "code": digest, "figures": figures}, indent=1) + "\n"
     temporary = path.with_suffix(".tmp")
-    temporary.write_text(text)
+    temporary.write_text(json.dumps(known, indent=1, sort_keys=sort_keys) + "\n")
     temporary.replace(path)
