@@ -11,7 +11,7 @@ from codegen.names import (
     REAL,
 )
 from codegen.rendering import render, version
-from codegen.statement import wrapped
+from codegen.statement import INDENT, WIDTH, wrapped
 from language.functions import FUNCTIONS_OF
 from language.number import NumberType
 from language.operation import Assign
@@ -76,7 +76,7 @@ def _function(function: Function, number: NumberType) -> dict[str, Any]:
     for op in function.body:
         assert isinstance(op, Assign)
         left = "return " if op.target == "work.y" else f"const {REAL[number]} {place(op.target)} = "
-        lines += wrapped(left, c_expression(op.value, place), "")
+        lines += wrapped(left, c_expression(op.value, place), "", WIDTH - len(INDENT))
     parameters = ", ".join(f"{REAL[number]} {name}" for name in function.parameters)
     about = function.about
     return {"name": function.name, "parameters": parameters, "about": about, "lines": lines}

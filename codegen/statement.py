@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 import textwrap
 from collections.abc import Iterator, Mapping
@@ -43,12 +44,14 @@ class Writer:
     local: frozenset[str]
     place: Place
     types: Mapping[str, str]
+    room: int = WIDTH
 
-    def lines(self, block: Block, depth: int = 1) -> Iterator[str]:
-        """Yield the lines of a block."""
+    def lines(self, block: Block) -> Iterator[str]:
+        """Yield the lines of a block, no longer than there is `room`."""
+        inner = dataclasses.replace(self, room=self.room - len(INDENT))
         for op in block:
-            for line in self._op(op):
-                yield (INDENT * depth + line) if line else ""
+            for line in inner._op(op):
+                yield (INDENT + line) if line else ""
 
     def _op(self, op: Op) -> Iterator[str]:
         match op:
@@ -56,7 +59,7 @@ class Writer:
                 yield from self._assign(target, c_expression(value, self.place), value, key)
             case Store(array, index, value):
                 left = f"{self.place(array)}[{c_expression(index, self.place)}]"
-                yield from wrapped(f"{left} = ", c_expression(value, self.place), "")
+                yield from wrapped(f"{left} = ", c_expression(value, self.place), "", self.room)
             case Branch(condition, then, other):
                 yield from self._branch(condition, then, other)
             case Choose(selector, cases):
@@ -76,14 +79,14 @@ class Writer:
         if isinstance(value, Value) and type(value.value) is int:
             text = self.place.whole(target, value.value)
         declared = f"const {self.types[target]} " if target in self.local else ""
-        yield from wrapped(f"{declared}{self.place(target)} = ", text, key)
+        yield from wrapped(f"{declared}{self.place(target)} = ", text, key, self.room)
 
     def _branch(self, condition: Expr, then: Block, other: Block) -> Iterator[str]:
-        yield from tested("if", c_expression(condition, self.place))
+        yield from tested("if", c_expression(condition, self.place), "", self.room)
         yield from self.lines(then)
         while len(other) == 1 and isinstance(other[0], Branch):
             inner = other[0]
-            yield from tested("} else if", c_expression(inner.condition, self.place))
+            yield from tested("} else if", c_expression(inner.condition, self.place), "", self.room)
             yield from self.lines(inner.then)
             other = inner.other
         if other:
@@ -112,7 +115,7 @@ class Writer:
         yield "}"
 
     def _count(self, timer: str, condition: Expr, limit: int, key: str) -> Iterator[str]:
-        yield from tested("if", c_expression(opposite(condition), self.place), key)
+        yield from tested("if", c_expression(opposite(condition), self.place), key, self.room)
         yield f"{INDENT}{timer} = 0U;"
         yield f"}} else if ({timer} < {limit}U) {{"
         yield f"{INDENT}{timer}++;"
@@ -135,22 +138,22 @@ def _comment(key: str) -> str:
     return f" /* {safe(key)} */" if key else ""
 
 
-def wrapped(left: str, text: str, key: str) -> Iterator[str]:
+def wrapped(left: str, text: str, key: str, room: int = WIDTH) -> Iterator[str]:
     """Yield `left text;` with the key path cited, broken before operators where it is too long."""
     comment = _comment(key)
-    if len(left) + len(text) + len(comment) <= WIDTH:
+    if len(left) + len(text) + len(comment) < room:
         yield f"{left}{text};{comment}"
         return
     if key:
         yield f"/* {safe(key)} */"
-    if len(left) + len(text) <= WIDTH:
+    if len(left) + len(text) < room:
         yield f"{left}{text};"
         return
     pieces = textwrap.wrap(
         re.sub(r" ([*/]|[<>=!]=?|&&) ", "\1\\g<1>\1", text)
         .replace(" + ", " +\1")
         .replace(" - ", " -\1"),
-        width=WIDTH - 2 * len(INDENT),
+        width=room - 2 * len(INDENT),
         initial_indent="",
         break_long_words=False,
         break_on_hyphens=False,
@@ -158,17 +161,17 @@ def wrapped(left: str, text: str, key: str) -> Iterator[str]:
     joined = "\n".join(pieces).replace("\1", " ")
     first, *rest = joined.split("\n")
     lines = (
-        [f"{left}{first}"] if len(left) + len(first) <= WIDTH else [left.rstrip(), INDENT + first]
+        [f"{left}{first}"] if len(left) + len(first) < room else [left.rstrip(), INDENT + first]
     )
     lines += [INDENT + line for line in rest]
     lines[-1] += ";"
     yield from (line.rstrip() for line in lines)
 
 
-def tested(opening: str, test: str, key: str = "") -> Iterator[str]:
+def tested(opening: str, test: str, key: str, room: int) -> Iterator[str]:
     """Yield `opening (test) {` with the key path cited, broken before `&&` where it is too long."""
     line, comment = f"{opening} ({test}) {{", _comment(key)
-    if len(line) + len(comment) <= WIDTH:
+    if len(line) + len(comment) <= room:
         yield line + comment
         return
     if key:
@@ -176,7 +179,7 @@ def tested(opening: str, test: str, key: str = "") -> Iterator[str]:
     glued = re.sub("\1(&&|\\|\\|)\1", " \\1\1", line.replace(" ", "\1"))
     pieces = textwrap.wrap(
         glued,
-        width=WIDTH - 2 * len(INDENT),
+        width=room - 2 * len(INDENT),
         subsequent_indent=INDENT,
         break_long_words=False,
         break_on_hyphens=False,

@@ -98,7 +98,8 @@ static inline void rates_drive_contact(const driveline_load_Self *self, Work *wo
     /* driveline_load equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
     const double w_w_squared = work->at_w_w * work->at_w_w; /* w_w * w_w */
-    const double at_T_aer = constant.a_aer_r_w_cubed * w_w_squared; /* driveline_load equations.T_aer */
+    /* driveline_load equations.T_aer */
+    const double at_T_aer = constant.a_aer_r_w_cubed * w_w_squared;
     /* driveline_load equations.T_rr */
     const double at_T_rr = constant.m_g_r_w * (constant.C_0 + (constant.C_1 * work->at_w_w)
         + (constant.C_2 * w_w_squared));
@@ -125,19 +126,23 @@ static inline void guards_drive_contact(Work *work)
     /* driveline_load equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
     /* driveline_load equations.w_free */
-    const double at_w_free = at_w_d + (constant.k_hs_per_c_hs * (work->at_theta_d - work->at_theta_b));
-    work->guard_0 = at_w_free < 0.0; /* driveline_load modes.drive_contact.transitions.no_contact.when */
+    const double at_w_free =
+        at_w_d + (constant.k_hs_per_c_hs * (work->at_theta_d - work->at_theta_b));
+    /* driveline_load modes.drive_contact.transitions.no_contact.when */
+    work->guard_0 = at_w_free < 0.0;
 }
 
 static inline void rates_no_contact(const driveline_load_Self *self, Work *work)
 {
     /* driveline_load equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
-    const double theta_d_minus_theta_b = work->at_theta_d - work->at_theta_b; /* theta_d - theta_b */
+    /* theta_d - theta_b */
+    const double theta_d_minus_theta_b = work->at_theta_d - work->at_theta_b;
     /* driveline_load equations.w_free */
     const double at_w_free = at_w_d + (constant.k_hs_per_c_hs * theta_d_minus_theta_b);
     const double w_w_squared = work->at_w_w * work->at_w_w; /* w_w * w_w */
-    const double at_T_aer = constant.a_aer_r_w_cubed * w_w_squared; /* driveline_load equations.T_aer */
+    /* driveline_load equations.T_aer */
+    const double at_T_aer = constant.a_aer_r_w_cubed * w_w_squared;
     /* driveline_load equations.T_rr */
     const double at_T_rr = constant.m_g_r_w * (constant.C_0 + (constant.C_1 * work->at_w_w)
         + (constant.C_2 * w_w_squared));
@@ -145,7 +150,8 @@ static inline void rates_no_contact(const driveline_load_Self *self, Work *work)
     const double at_T_v = at_T_aer + at_T_rr + self->before.m_g_r_w_sin_slope;
     const double at_w_b = at_w_free; /* driveline_load modes.no_contact.equations.w_b */
     /* driveline_load equations.T_hs */
-    const double at_T_hs = (constant.k_hs * theta_d_minus_theta_b) + (constant.c_hs * (at_w_d - at_w_b));
+    const double at_T_hs =
+        (constant.k_hs * theta_d_minus_theta_b) + (constant.c_hs * (at_w_d - at_w_b));
     /* driveline_load flow.w_w */
     work->rate_w_w = (at_T_hs - at_T_v - self->before.T_br - (constant.b_w * work->at_w_w)
         + (-work->at_T_l)) * constant.per_J_v;
@@ -162,7 +168,8 @@ static inline void guards_no_contact(Work *work)
     /* driveline_load equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
     /* driveline_load equations.w_free */
-    const double at_w_free = at_w_d + (constant.k_hs_per_c_hs * (work->at_theta_d - work->at_theta_b));
+    const double at_w_free =
+        at_w_d + (constant.k_hs_per_c_hs * (work->at_theta_d - work->at_theta_b));
     /* driveline_load modes.no_contact.transitions.drive_contact.when */
     work->guard_0 = (work->at_theta_b >= constant.alpha) && (at_w_free > 0.0);
     /* driveline_load modes.no_contact.transitions.coast_contact.when */
@@ -174,7 +181,8 @@ static inline void rates_coast_contact(const driveline_load_Self *self, Work *wo
     /* driveline_load equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
     const double w_w_squared = work->at_w_w * work->at_w_w; /* w_w * w_w */
-    const double at_T_aer = constant.a_aer_r_w_cubed * w_w_squared; /* driveline_load equations.T_aer */
+    /* driveline_load equations.T_aer */
+    const double at_T_aer = constant.a_aer_r_w_cubed * w_w_squared;
     /* driveline_load equations.T_rr */
     const double at_T_rr = constant.m_g_r_w * (constant.C_0 + (constant.C_1 * work->at_w_w)
         + (constant.C_2 * w_w_squared));
@@ -201,8 +209,10 @@ static inline void guards_coast_contact(Work *work)
     /* driveline_load equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
     /* driveline_load equations.w_free */
-    const double at_w_free = at_w_d + (constant.k_hs_per_c_hs * (work->at_theta_d - work->at_theta_b));
-    work->guard_0 = at_w_free > 0.0; /* driveline_load modes.coast_contact.transitions.no_contact.when */
+    const double at_w_free =
+        at_w_d + (constant.k_hs_per_c_hs * (work->at_theta_d - work->at_theta_b));
+    /* driveline_load modes.coast_contact.transitions.no_contact.when */
+    work->guard_0 = at_w_free > 0.0;
 }
 
 static inline void step_drive_contact(const driveline_load_Self *self, Work *work)
@@ -256,13 +266,12 @@ static inline void step_drive_contact(const driveline_load_Self *self, Work *wor
     work->end_w_w =
         self->state.w_w + (h_per_6 * (work->k1_w_w + (2.0 * k2_w_w) + (2.0 * k3_w_w) + k4_w_w));
     work->end_w_em =
-        self->state.w_em + (h_per_6 * (work->k1_w_em + (2.0 * k2_w_em) + (2.0 * k3_w_em) + k4_w_em));
-    work->end_theta_d =
-        self->state.theta_d + (h_per_6 * (work->k1_theta_d + (2.0 * k2_theta_d) + (2.0 * k3_theta_d)
-        + k4_theta_d));
-    work->end_theta_b =
-        self->state.theta_b + (h_per_6 * (work->k1_theta_b + (2.0 * k2_theta_b) + (2.0 * k3_theta_b)
-        + k4_theta_b));
+        self->state.w_em + (h_per_6 * (work->k1_w_em + (2.0 * k2_w_em) + (2.0 * k3_w_em)
+        + k4_w_em));
+    work->end_theta_d = self->state.theta_d + (h_per_6 * (work->k1_theta_d + (2.0 * k2_theta_d)
+        + (2.0 * k3_theta_d) + k4_theta_d));
+    work->end_theta_b = self->state.theta_b + (h_per_6 * (work->k1_theta_b + (2.0 * k2_theta_b)
+        + (2.0 * k3_theta_b) + k4_theta_b));
     work->end_T_l =
         self->state.T_l + (h_per_6 * (work->k1_T_l + (2.0 * k2_T_l) + (2.0 * k3_T_l) + k4_T_l));
 }
@@ -353,13 +362,12 @@ static inline void step_no_contact(const driveline_load_Self *self, Work *work)
     work->end_w_w =
         self->state.w_w + (h_per_6 * (work->k1_w_w + (2.0 * k2_w_w) + (2.0 * k3_w_w) + k4_w_w));
     work->end_w_em =
-        self->state.w_em + (h_per_6 * (work->k1_w_em + (2.0 * k2_w_em) + (2.0 * k3_w_em) + k4_w_em));
-    work->end_theta_d =
-        self->state.theta_d + (h_per_6 * (work->k1_theta_d + (2.0 * k2_theta_d) + (2.0 * k3_theta_d)
-        + k4_theta_d));
-    work->end_theta_b =
-        self->state.theta_b + (h_per_6 * (work->k1_theta_b + (2.0 * k2_theta_b) + (2.0 * k3_theta_b)
-        + k4_theta_b));
+        self->state.w_em + (h_per_6 * (work->k1_w_em + (2.0 * k2_w_em) + (2.0 * k3_w_em)
+        + k4_w_em));
+    work->end_theta_d = self->state.theta_d + (h_per_6 * (work->k1_theta_d + (2.0 * k2_theta_d)
+        + (2.0 * k3_theta_d) + k4_theta_d));
+    work->end_theta_b = self->state.theta_b + (h_per_6 * (work->k1_theta_b + (2.0 * k2_theta_b)
+        + (2.0 * k3_theta_b) + k4_theta_b));
     work->end_T_l =
         self->state.T_l + (h_per_6 * (work->k1_T_l + (2.0 * k2_T_l) + (2.0 * k3_T_l) + k4_T_l));
 }
@@ -450,13 +458,12 @@ static inline void step_coast_contact(const driveline_load_Self *self, Work *wor
     work->end_w_w =
         self->state.w_w + (h_per_6 * (work->k1_w_w + (2.0 * k2_w_w) + (2.0 * k3_w_w) + k4_w_w));
     work->end_w_em =
-        self->state.w_em + (h_per_6 * (work->k1_w_em + (2.0 * k2_w_em) + (2.0 * k3_w_em) + k4_w_em));
-    work->end_theta_d =
-        self->state.theta_d + (h_per_6 * (work->k1_theta_d + (2.0 * k2_theta_d) + (2.0 * k3_theta_d)
-        + k4_theta_d));
-    work->end_theta_b =
-        self->state.theta_b + (h_per_6 * (work->k1_theta_b + (2.0 * k2_theta_b) + (2.0 * k3_theta_b)
-        + k4_theta_b));
+        self->state.w_em + (h_per_6 * (work->k1_w_em + (2.0 * k2_w_em) + (2.0 * k3_w_em)
+        + k4_w_em));
+    work->end_theta_d = self->state.theta_d + (h_per_6 * (work->k1_theta_d + (2.0 * k2_theta_d)
+        + (2.0 * k3_theta_d) + k4_theta_d));
+    work->end_theta_b = self->state.theta_b + (h_per_6 * (work->k1_theta_b + (2.0 * k2_theta_b)
+        + (2.0 * k3_theta_b) + k4_theta_b));
     work->end_T_l =
         self->state.T_l + (h_per_6 * (work->k1_T_l + (2.0 * k2_T_l) + (2.0 * k3_T_l) + k4_T_l));
 }
@@ -871,15 +878,18 @@ static inline void equations_drive_contact(driveline_load_Self *self)
     /* driveline_load equations.w_free */
     self->equation.w_free = self->equation.w_d + (constant.k_hs_per_c_hs * theta_d_minus_theta_b);
     const double w_w_squared = self->state.w_w * self->state.w_w; /* w_w * w_w */
-    self->equation.T_aer = constant.a_aer_r_w_cubed * w_w_squared; /* driveline_load equations.T_aer */
+    /* driveline_load equations.T_aer */
+    self->equation.T_aer = constant.a_aer_r_w_cubed * w_w_squared;
     /* driveline_load equations.T_rr */
     self->equation.T_rr = constant.m_g_r_w * (constant.C_0 + (constant.C_1 * self->state.w_w)
         + (constant.C_2 * w_w_squared));
     /* driveline_load equations.T_v */
-    self->equation.T_v = self->equation.T_aer + self->equation.T_rr + self->before.m_g_r_w_sin_slope;
+    self->equation.T_v =
+        self->equation.T_aer + self->equation.T_rr + self->before.m_g_r_w_sin_slope;
     self->equation.w_b = 0.0; /* driveline_load modes.drive_contact.equations.w_b */
     /* driveline_load equations.T_hs */
-    self->equation.T_hs = (constant.k_hs * theta_d_minus_theta_b) + (constant.c_hs * (self->equation.w_d
+    self->equation.T_hs =
+        (constant.k_hs * theta_d_minus_theta_b) + (constant.c_hs * (self->equation.w_d
         - self->equation.w_b));
 }
 
@@ -892,15 +902,18 @@ static inline void equations_no_contact(driveline_load_Self *self)
     /* driveline_load equations.w_free */
     self->equation.w_free = self->equation.w_d + (constant.k_hs_per_c_hs * theta_d_minus_theta_b);
     const double w_w_squared = self->state.w_w * self->state.w_w; /* w_w * w_w */
-    self->equation.T_aer = constant.a_aer_r_w_cubed * w_w_squared; /* driveline_load equations.T_aer */
+    /* driveline_load equations.T_aer */
+    self->equation.T_aer = constant.a_aer_r_w_cubed * w_w_squared;
     /* driveline_load equations.T_rr */
     self->equation.T_rr = constant.m_g_r_w * (constant.C_0 + (constant.C_1 * self->state.w_w)
         + (constant.C_2 * w_w_squared));
     /* driveline_load equations.T_v */
-    self->equation.T_v = self->equation.T_aer + self->equation.T_rr + self->before.m_g_r_w_sin_slope;
+    self->equation.T_v =
+        self->equation.T_aer + self->equation.T_rr + self->before.m_g_r_w_sin_slope;
     self->equation.w_b = self->equation.w_free; /* driveline_load modes.no_contact.equations.w_b */
     /* driveline_load equations.T_hs */
-    self->equation.T_hs = (constant.k_hs * theta_d_minus_theta_b) + (constant.c_hs * (self->equation.w_d
+    self->equation.T_hs =
+        (constant.k_hs * theta_d_minus_theta_b) + (constant.c_hs * (self->equation.w_d
         - self->equation.w_b));
 }
 
@@ -913,15 +926,18 @@ static inline void equations_coast_contact(driveline_load_Self *self)
     /* driveline_load equations.w_free */
     self->equation.w_free = self->equation.w_d + (constant.k_hs_per_c_hs * theta_d_minus_theta_b);
     const double w_w_squared = self->state.w_w * self->state.w_w; /* w_w * w_w */
-    self->equation.T_aer = constant.a_aer_r_w_cubed * w_w_squared; /* driveline_load equations.T_aer */
+    /* driveline_load equations.T_aer */
+    self->equation.T_aer = constant.a_aer_r_w_cubed * w_w_squared;
     /* driveline_load equations.T_rr */
     self->equation.T_rr = constant.m_g_r_w * (constant.C_0 + (constant.C_1 * self->state.w_w)
         + (constant.C_2 * w_w_squared));
     /* driveline_load equations.T_v */
-    self->equation.T_v = self->equation.T_aer + self->equation.T_rr + self->before.m_g_r_w_sin_slope;
+    self->equation.T_v =
+        self->equation.T_aer + self->equation.T_rr + self->before.m_g_r_w_sin_slope;
     self->equation.w_b = 0.0; /* driveline_load modes.coast_contact.equations.w_b */
     /* driveline_load equations.T_hs */
-    self->equation.T_hs = (constant.k_hs * theta_d_minus_theta_b) + (constant.c_hs * (self->equation.w_d
+    self->equation.T_hs =
+        (constant.k_hs * theta_d_minus_theta_b) + (constant.c_hs * (self->equation.w_d
         - self->equation.w_b));
 }
 
@@ -981,7 +997,8 @@ void driveline_load_Step(driveline_load_Self *self, const driveline_load_Cal *ca
         if (work->left > 0.0) {
             self->faults |= driveline_load_FAULT_zeno;
         }
-        work->event = work->event || (in->T_em != self->before.T_em) || (in->T_br != self->before.T_br) ||
+        work->event =
+            work->event || (in->T_em != self->before.T_em) || (in->T_br != self->before.T_br) ||
             (in->slope != self->before.slope);
         latch(self, in);
     } else {

@@ -349,7 +349,8 @@ static inline void latch_apart(estimator_Self *self, const estimator_In *in)
 
 static inline void rates_drive_contact(const estimator_Self *self, Work *work)
 {
-    const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w; /* driveline equations.w_d */
+    /* driveline equations.w_d */
+    const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
     const double w_w_squared = work->at_w_w * work->at_w_w; /* w_w * w_w */
     const double at_T_aer = constant.a_aer_r_w_cubed * w_w_squared; /* driveline equations.T_aer */
     /* driveline equations.T_rr */
@@ -362,8 +363,8 @@ static inline void rates_drive_contact(const estimator_Self *self, Work *work)
         (constant.k_hs * (work->at_theta_d - work->at_theta_b)) + (constant.c_hs * (at_w_d
         - at_w_b));
     /* driveline flow.w_w */
-    work->rate_w_w =
-        (at_T_hs - at_T_v - self->before.T_br - (constant.b_w * work->at_w_w)) * constant.per_J_v;
+    work->rate_w_w = (at_T_hs - at_T_v - self->before.T_br
+        - (constant.b_w * work->at_w_w)) * constant.per_J_v;
     /* driveline flow.w_em */
     work->rate_w_em = (self->before.T_em - (at_T_hs * constant.per_R)
         - (constant.b_em * work->at_w_em)) * self->derived.per_J_em;
@@ -373,16 +374,20 @@ static inline void rates_drive_contact(const estimator_Self *self, Work *work)
 
 static inline void guards_drive_contact(Work *work)
 {
-    const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w; /* driveline equations.w_d */
+    /* driveline equations.w_d */
+    const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
     /* driveline equations.w_free */
-    const double at_w_free = at_w_d + (constant.k_hs_per_c_hs * (work->at_theta_d - work->at_theta_b));
+    const double at_w_free =
+        at_w_d + (constant.k_hs_per_c_hs * (work->at_theta_d - work->at_theta_b));
     work->guard_0 = at_w_free < 0.0; /* driveline modes.drive_contact.transitions.no_contact.when */
 }
 
 static inline void rates_no_contact(const estimator_Self *self, Work *work)
 {
-    const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w; /* driveline equations.w_d */
-    const double theta_d_minus_theta_b = work->at_theta_d - work->at_theta_b; /* theta_d - theta_b */
+    /* driveline equations.w_d */
+    const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
+    /* theta_d - theta_b */
+    const double theta_d_minus_theta_b = work->at_theta_d - work->at_theta_b;
     /* driveline equations.w_free */
     const double at_w_free = at_w_d + (constant.k_hs_per_c_hs * theta_d_minus_theta_b);
     const double w_w_squared = work->at_w_w * work->at_w_w; /* w_w * w_w */
@@ -393,10 +398,11 @@ static inline void rates_no_contact(const estimator_Self *self, Work *work)
     const double at_T_v = at_T_aer + at_T_rr + constant.m_g_r_w_sin_0; /* driveline equations.T_v */
     const double at_w_b = at_w_free; /* driveline modes.no_contact.equations.w_b */
     /* driveline equations.T_hs */
-    const double at_T_hs = (constant.k_hs * theta_d_minus_theta_b) + (constant.c_hs * (at_w_d - at_w_b));
+    const double at_T_hs =
+        (constant.k_hs * theta_d_minus_theta_b) + (constant.c_hs * (at_w_d - at_w_b));
     /* driveline flow.w_w */
-    work->rate_w_w =
-        (at_T_hs - at_T_v - self->before.T_br - (constant.b_w * work->at_w_w)) * constant.per_J_v;
+    work->rate_w_w = (at_T_hs - at_T_v - self->before.T_br
+        - (constant.b_w * work->at_w_w)) * constant.per_J_v;
     /* driveline flow.w_em */
     work->rate_w_em = (self->before.T_em - (at_T_hs * constant.per_R)
         - (constant.b_em * work->at_w_em)) * self->derived.per_J_em;
@@ -406,9 +412,11 @@ static inline void rates_no_contact(const estimator_Self *self, Work *work)
 
 static inline void guards_no_contact(Work *work)
 {
-    const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w; /* driveline equations.w_d */
+    /* driveline equations.w_d */
+    const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
     /* driveline equations.w_free */
-    const double at_w_free = at_w_d + (constant.k_hs_per_c_hs * (work->at_theta_d - work->at_theta_b));
+    const double at_w_free =
+        at_w_d + (constant.k_hs_per_c_hs * (work->at_theta_d - work->at_theta_b));
     /* driveline modes.no_contact.transitions.drive_contact.when */
     work->guard_0 = (work->at_theta_b >= constant.alpha) && (at_w_free > 0.0);
     /* driveline modes.no_contact.transitions.coast_contact.when */
@@ -417,7 +425,8 @@ static inline void guards_no_contact(Work *work)
 
 static inline void rates_coast_contact(const estimator_Self *self, Work *work)
 {
-    const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w; /* driveline equations.w_d */
+    /* driveline equations.w_d */
+    const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
     const double w_w_squared = work->at_w_w * work->at_w_w; /* w_w * w_w */
     const double at_T_aer = constant.a_aer_r_w_cubed * w_w_squared; /* driveline equations.T_aer */
     /* driveline equations.T_rr */
@@ -430,8 +439,8 @@ static inline void rates_coast_contact(const estimator_Self *self, Work *work)
         (constant.k_hs * (work->at_theta_d - work->at_theta_b)) + (constant.c_hs * (at_w_d
         - at_w_b));
     /* driveline flow.w_w */
-    work->rate_w_w =
-        (at_T_hs - at_T_v - self->before.T_br - (constant.b_w * work->at_w_w)) * constant.per_J_v;
+    work->rate_w_w = (at_T_hs - at_T_v - self->before.T_br
+        - (constant.b_w * work->at_w_w)) * constant.per_J_v;
     /* driveline flow.w_em */
     work->rate_w_em = (self->before.T_em - (at_T_hs * constant.per_R)
         - (constant.b_em * work->at_w_em)) * self->derived.per_J_em;
@@ -441,9 +450,11 @@ static inline void rates_coast_contact(const estimator_Self *self, Work *work)
 
 static inline void guards_coast_contact(Work *work)
 {
-    const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w; /* driveline equations.w_d */
+    /* driveline equations.w_d */
+    const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
     /* driveline equations.w_free */
-    const double at_w_free = at_w_d + (constant.k_hs_per_c_hs * (work->at_theta_d - work->at_theta_b));
+    const double at_w_free =
+        at_w_d + (constant.k_hs_per_c_hs * (work->at_theta_d - work->at_theta_b));
     work->guard_0 = at_w_free > 0.0; /* driveline modes.coast_contact.transitions.no_contact.when */
 }
 
@@ -471,7 +482,8 @@ static inline void series_drive_contact(const estimator_Self *self, Work *work)
             + (solved_drive_contact_A_w_em_w_em * work->series_w_em[term])
             + (solved_drive_contact_A_w_em_theta_d * work->series_theta_d[term])
             + (solved_drive_contact_A_w_em_theta_b * work->series_theta_b[term])) / work->order;
-        work->series_theta_d[term + 1] = ((solved_drive_contact_A_theta_d_w_w * work->series_w_w[term])
+        work->series_theta_d[term + 1] =
+            ((solved_drive_contact_A_theta_d_w_w * work->series_w_w[term])
             + (solved_drive_contact_A_theta_d_w_em * work->series_w_em[term])) / work->order;
         work->series_theta_b[term + 1] = 0.0 / work->order;
     }
@@ -608,11 +620,15 @@ static inline void series_no_contact(const estimator_Self *self, Work *work)
         + (solved_no_contact_A_theta_b_theta_b * self->state.theta_b) + work->pull_theta_b;
     for (int32_t term = 0; term < 26; term++) {
         work->order = work->order + 1.0;
-        work->series_w_w[term + 1] = solved_no_contact_A_w_w_w_w * work->series_w_w[term] / work->order;
-        work->series_w_em[term + 1] = solved_no_contact_A_w_em_w_em * work->series_w_em[term] / work->order;
-        work->series_theta_d[term + 1] = ((solved_no_contact_A_theta_d_w_w * work->series_w_w[term])
+        work->series_w_w[term + 1] =
+            solved_no_contact_A_w_w_w_w * work->series_w_w[term] / work->order;
+        work->series_w_em[term + 1] =
+            solved_no_contact_A_w_em_w_em * work->series_w_em[term] / work->order;
+        work->series_theta_d[term + 1] =
+            ((solved_no_contact_A_theta_d_w_w * work->series_w_w[term])
             + (solved_no_contact_A_theta_d_w_em * work->series_w_em[term])) / work->order;
-        work->series_theta_b[term + 1] = ((solved_no_contact_A_theta_b_w_w * work->series_w_w[term])
+        work->series_theta_b[term + 1] =
+            ((solved_no_contact_A_theta_b_w_w * work->series_w_w[term])
             + (solved_no_contact_A_theta_b_w_em * work->series_w_em[term])
             + (solved_no_contact_A_theta_b_theta_d * work->series_theta_d[term])
             + (solved_no_contact_A_theta_b_theta_b * work->series_theta_b[term])) / work->order;
@@ -721,7 +737,8 @@ static inline void series_coast_contact(const estimator_Self *self, Work *work)
             + (solved_coast_contact_A_w_em_w_em * work->series_w_em[term])
             + (solved_coast_contact_A_w_em_theta_d * work->series_theta_d[term])
             + (solved_coast_contact_A_w_em_theta_b * work->series_theta_b[term])) / work->order;
-        work->series_theta_d[term + 1] = ((solved_coast_contact_A_theta_d_w_w * work->series_w_w[term])
+        work->series_theta_d[term + 1] =
+            ((solved_coast_contact_A_theta_d_w_w * work->series_w_w[term])
             + (solved_coast_contact_A_theta_d_w_em * work->series_w_em[term])) / work->order;
         work->series_theta_b[term + 1] = 0.0 / work->order;
     }
@@ -1010,8 +1027,8 @@ static inline void predict_drive(estimator_Self *self)
         + (solved_drive_Phi_w_em_w_em * self->state.w_em)
         + (solved_drive_Phi_w_em_w_w * self->state.w_w)
         + (solved_drive_Gamma_w_em_T_em * self->before.T_em)
-        + (solved_drive_Gamma_w_em_T_br * self->before.T_br) + (solved_drive_G_w_em_w_em * f_w_em)
-        + (solved_drive_G_w_em_w_w * f_w_w);
+        + (solved_drive_Gamma_w_em_T_br * self->before.T_br)
+        + (solved_drive_G_w_em_w_em * f_w_em) + (solved_drive_G_w_em_w_w * f_w_w);
     /* estimator modes.drive.observer */
     const double predicted_w_w = (solved_drive_Phi_w_w_theta_d * self->state.theta_d)
         + (solved_drive_Phi_w_w_w_em * self->state.w_em)
@@ -1158,8 +1175,8 @@ static inline void predict_coast(estimator_Self *self)
         + (solved_coast_Phi_w_em_w_em * self->state.w_em)
         + (solved_coast_Phi_w_em_w_w * self->state.w_w)
         + (solved_coast_Gamma_w_em_T_em * self->before.T_em)
-        + (solved_coast_Gamma_w_em_T_br * self->before.T_br) + (solved_coast_G_w_em_w_em * f_w_em)
-        + (solved_coast_G_w_em_w_w * f_w_w);
+        + (solved_coast_Gamma_w_em_T_br * self->before.T_br)
+        + (solved_coast_G_w_em_w_em * f_w_em) + (solved_coast_G_w_em_w_w * f_w_w);
     /* estimator modes.coast.observer */
     const double predicted_w_w = (solved_coast_Phi_w_w_theta_d * self->state.theta_d)
         + (solved_coast_Phi_w_w_w_em * self->state.w_em)
@@ -1253,7 +1270,8 @@ static inline void equations_gap(estimator_Self *self)
     self->equation.w_b = (self->run_mode == estimator_RUN_no_contact) ? (self->equation.w_d
         + (constant.k_hs_per_c_hs * theta_d_minus_theta_b)) : 0.0;
     /* estimator equations.T_hs */
-    self->equation.T_hs = (constant.k_hs * theta_d_minus_theta_b) + (constant.c_hs * (self->equation.w_d
+    self->equation.T_hs =
+        (constant.k_hs * theta_d_minus_theta_b) + (constant.c_hs * (self->equation.w_d
         - self->equation.w_b));
 }
 
@@ -1370,7 +1388,8 @@ static inline void start(estimator_Self *self, const estimator_In *in)
 void estimator_Derive(const estimator_Cal *cal, estimator_Derived *derived)
 {
     derived->per_J_em = 1.0 / cal->J_em; /* 1 / J_em */
-    derived->k_hs_per_R_per_J_em = constant.k_hs / constant.R / cal->J_em; /* k_hs / R / J_em */
+    /* k_hs / R / J_em */
+    derived->k_hs_per_R_per_J_em = constant.k_hs / constant.R / cal->J_em;
 }
 
 void estimator_Init(estimator_Self *self, const estimator_Cal *cal)

@@ -153,8 +153,8 @@ static inline void predict_drive(estimator_simple_Self *self)
         + (solved_drive_Phi_w_em_w_em * self->state.w_em)
         + (solved_drive_Phi_w_em_w_w * self->state.w_w)
         + (solved_drive_Gamma_w_em_T_em * self->before.T_em)
-        + (solved_drive_Gamma_w_em_T_br * self->before.T_br) + (solved_drive_G_w_em_w_em * f_w_em)
-        + (solved_drive_G_w_em_w_w * f_w_w);
+        + (solved_drive_Gamma_w_em_T_br * self->before.T_br)
+        + (solved_drive_G_w_em_w_em * f_w_em) + (solved_drive_G_w_em_w_w * f_w_w);
     /* estimator_simple modes.drive.observer */
     const double predicted_w_w = (solved_drive_Phi_w_w_theta_d * self->state.theta_d)
         + (solved_drive_Phi_w_w_w_em * self->state.w_em)
@@ -231,8 +231,8 @@ static inline void predict_coast(estimator_simple_Self *self)
         + (solved_coast_Phi_w_em_w_em * self->state.w_em)
         + (solved_coast_Phi_w_em_w_w * self->state.w_w)
         + (solved_coast_Gamma_w_em_T_em * self->before.T_em)
-        + (solved_coast_Gamma_w_em_T_br * self->before.T_br) + (solved_coast_G_w_em_w_em * f_w_em)
-        + (solved_coast_G_w_em_w_w * f_w_w);
+        + (solved_coast_Gamma_w_em_T_br * self->before.T_br)
+        + (solved_coast_G_w_em_w_em * f_w_em) + (solved_coast_G_w_em_w_w * f_w_w);
     /* estimator_simple modes.coast.observer */
     const double predicted_w_w = (solved_coast_Phi_w_w_theta_d * self->state.theta_d)
         + (solved_coast_Phi_w_w_w_em * self->state.w_em)
@@ -342,8 +342,10 @@ static inline void jump_gap(estimator_simple_Self *self, Work *work)
         work->reset_theta_b = constant.alpha;
         /* estimator_simple modes.gap.transitions.drive.reset.theta_d */
         work->reset_theta_d = constant.alpha;
-        work->reset_w_em = self->latched.y_em; /* estimator_simple modes.gap.transitions.drive.reset.w_em */
-        work->reset_w_w = self->latched.y_w; /* estimator_simple modes.gap.transitions.drive.reset.w_w */
+        /* estimator_simple modes.gap.transitions.drive.reset.w_em */
+        work->reset_w_em = self->latched.y_em;
+        /* estimator_simple modes.gap.transitions.drive.reset.w_w */
+        work->reset_w_w = self->latched.y_w;
         if (fabs(work->reset_theta_b) <= 0.2) {
             self->state.theta_b = work->reset_theta_b;
         } else {
@@ -377,8 +379,10 @@ static inline void jump_gap(estimator_simple_Self *self, Work *work)
         work->reset_theta_b = -constant.alpha;
         /* estimator_simple modes.gap.transitions.coast.reset.theta_d */
         work->reset_theta_d = -constant.alpha;
-        work->reset_w_em = self->latched.y_em; /* estimator_simple modes.gap.transitions.coast.reset.w_em */
-        work->reset_w_w = self->latched.y_w; /* estimator_simple modes.gap.transitions.coast.reset.w_w */
+        /* estimator_simple modes.gap.transitions.coast.reset.w_em */
+        work->reset_w_em = self->latched.y_em;
+        /* estimator_simple modes.gap.transitions.coast.reset.w_w */
+        work->reset_w_w = self->latched.y_w;
         if (fabs(work->reset_theta_b) <= 0.2) {
             self->state.theta_b = work->reset_theta_b;
         } else {
@@ -527,7 +531,8 @@ static inline void start(estimator_simple_Self *self, const estimator_simple_In 
 
 void estimator_simple_Derive(const estimator_simple_Cal *cal, estimator_simple_Derived *derived)
 {
-    derived->k_hs_per_R_per_J_em = constant.k_hs / constant.R / cal->J_em; /* k_hs / R / J_em */
+    /* k_hs / R / J_em */
+    derived->k_hs_per_R_per_J_em = constant.k_hs / constant.R / cal->J_em;
 }
 
 void estimator_simple_Init(estimator_simple_Self *self, const estimator_simple_Cal *cal)

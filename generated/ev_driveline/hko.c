@@ -336,11 +336,13 @@ static inline void rates_drive_contact(const hko_Self *self, Work *work)
     /* driveline_load equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
     const double w_w_squared = work->at_w_w * work->at_w_w; /* w_w * w_w */
-    const double at_T_aer = constant.a_aer_r_w_cubed * w_w_squared; /* driveline_load equations.T_aer */
+    /* driveline_load equations.T_aer */
+    const double at_T_aer = constant.a_aer_r_w_cubed * w_w_squared;
     /* driveline_load equations.T_rr */
     const double at_T_rr = constant.m_g_r_w * (constant.C_0 + (constant.C_1 * work->at_w_w)
         + (constant.C_2 * w_w_squared));
-    const double at_T_v = at_T_aer + at_T_rr + constant.m_g_r_w_sin_0; /* driveline_load equations.T_v */
+    /* driveline_load equations.T_v */
+    const double at_T_v = at_T_aer + at_T_rr + constant.m_g_r_w_sin_0;
     const double at_w_b = 0.0; /* driveline_load modes.drive_contact.equations.w_b */
     /* driveline_load equations.T_hs */
     const double at_T_hs =
@@ -362,26 +364,32 @@ static inline void guards_drive_contact(Work *work)
     /* driveline_load equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
     /* driveline_load equations.w_free */
-    const double at_w_free = at_w_d + (constant.k_hs_per_c_hs * (work->at_theta_d - work->at_theta_b));
-    work->guard_0 = at_w_free < 0.0; /* driveline_load modes.drive_contact.transitions.no_contact.when */
+    const double at_w_free =
+        at_w_d + (constant.k_hs_per_c_hs * (work->at_theta_d - work->at_theta_b));
+    /* driveline_load modes.drive_contact.transitions.no_contact.when */
+    work->guard_0 = at_w_free < 0.0;
 }
 
 static inline void rates_no_contact(const hko_Self *self, Work *work)
 {
     /* driveline_load equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
-    const double theta_d_minus_theta_b = work->at_theta_d - work->at_theta_b; /* theta_d - theta_b */
+    /* theta_d - theta_b */
+    const double theta_d_minus_theta_b = work->at_theta_d - work->at_theta_b;
     /* driveline_load equations.w_free */
     const double at_w_free = at_w_d + (constant.k_hs_per_c_hs * theta_d_minus_theta_b);
     const double w_w_squared = work->at_w_w * work->at_w_w; /* w_w * w_w */
-    const double at_T_aer = constant.a_aer_r_w_cubed * w_w_squared; /* driveline_load equations.T_aer */
+    /* driveline_load equations.T_aer */
+    const double at_T_aer = constant.a_aer_r_w_cubed * w_w_squared;
     /* driveline_load equations.T_rr */
     const double at_T_rr = constant.m_g_r_w * (constant.C_0 + (constant.C_1 * work->at_w_w)
         + (constant.C_2 * w_w_squared));
-    const double at_T_v = at_T_aer + at_T_rr + constant.m_g_r_w_sin_0; /* driveline_load equations.T_v */
+    /* driveline_load equations.T_v */
+    const double at_T_v = at_T_aer + at_T_rr + constant.m_g_r_w_sin_0;
     const double at_w_b = at_w_free; /* driveline_load modes.no_contact.equations.w_b */
     /* driveline_load equations.T_hs */
-    const double at_T_hs = (constant.k_hs * theta_d_minus_theta_b) + (constant.c_hs * (at_w_d - at_w_b));
+    const double at_T_hs =
+        (constant.k_hs * theta_d_minus_theta_b) + (constant.c_hs * (at_w_d - at_w_b));
     /* driveline_load flow.w_w */
     work->rate_w_w = (at_T_hs - at_T_v - self->before.T_br - (constant.b_w * work->at_w_w)
         + (-work->at_T_l)) * constant.per_J_v;
@@ -398,7 +406,8 @@ static inline void guards_no_contact(Work *work)
     /* driveline_load equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
     /* driveline_load equations.w_free */
-    const double at_w_free = at_w_d + (constant.k_hs_per_c_hs * (work->at_theta_d - work->at_theta_b));
+    const double at_w_free =
+        at_w_d + (constant.k_hs_per_c_hs * (work->at_theta_d - work->at_theta_b));
     /* driveline_load modes.no_contact.transitions.drive_contact.when */
     work->guard_0 = (work->at_theta_b >= constant.alpha) && (at_w_free > 0.0);
     /* driveline_load modes.no_contact.transitions.coast_contact.when */
@@ -410,11 +419,13 @@ static inline void rates_coast_contact(const hko_Self *self, Work *work)
     /* driveline_load equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
     const double w_w_squared = work->at_w_w * work->at_w_w; /* w_w * w_w */
-    const double at_T_aer = constant.a_aer_r_w_cubed * w_w_squared; /* driveline_load equations.T_aer */
+    /* driveline_load equations.T_aer */
+    const double at_T_aer = constant.a_aer_r_w_cubed * w_w_squared;
     /* driveline_load equations.T_rr */
     const double at_T_rr = constant.m_g_r_w * (constant.C_0 + (constant.C_1 * work->at_w_w)
         + (constant.C_2 * w_w_squared));
-    const double at_T_v = at_T_aer + at_T_rr + constant.m_g_r_w_sin_0; /* driveline_load equations.T_v */
+    /* driveline_load equations.T_v */
+    const double at_T_v = at_T_aer + at_T_rr + constant.m_g_r_w_sin_0;
     const double at_w_b = 0.0; /* driveline_load modes.coast_contact.equations.w_b */
     /* driveline_load equations.T_hs */
     const double at_T_hs =
@@ -436,8 +447,10 @@ static inline void guards_coast_contact(Work *work)
     /* driveline_load equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
     /* driveline_load equations.w_free */
-    const double at_w_free = at_w_d + (constant.k_hs_per_c_hs * (work->at_theta_d - work->at_theta_b));
-    work->guard_0 = at_w_free > 0.0; /* driveline_load modes.coast_contact.transitions.no_contact.when */
+    const double at_w_free =
+        at_w_d + (constant.k_hs_per_c_hs * (work->at_theta_d - work->at_theta_b));
+    /* driveline_load modes.coast_contact.transitions.no_contact.when */
+    work->guard_0 = at_w_free > 0.0;
 }
 
 static inline void step_drive_contact(const hko_Self *self, Work *work)
@@ -491,13 +504,12 @@ static inline void step_drive_contact(const hko_Self *self, Work *work)
     work->end_w_w =
         self->state.w_w + (h_per_6 * (work->k1_w_w + (2.0 * k2_w_w) + (2.0 * k3_w_w) + k4_w_w));
     work->end_w_em =
-        self->state.w_em + (h_per_6 * (work->k1_w_em + (2.0 * k2_w_em) + (2.0 * k3_w_em) + k4_w_em));
-    work->end_theta_d =
-        self->state.theta_d + (h_per_6 * (work->k1_theta_d + (2.0 * k2_theta_d) + (2.0 * k3_theta_d)
-        + k4_theta_d));
-    work->end_theta_b =
-        self->state.theta_b + (h_per_6 * (work->k1_theta_b + (2.0 * k2_theta_b) + (2.0 * k3_theta_b)
-        + k4_theta_b));
+        self->state.w_em + (h_per_6 * (work->k1_w_em + (2.0 * k2_w_em) + (2.0 * k3_w_em)
+        + k4_w_em));
+    work->end_theta_d = self->state.theta_d + (h_per_6 * (work->k1_theta_d + (2.0 * k2_theta_d)
+        + (2.0 * k3_theta_d) + k4_theta_d));
+    work->end_theta_b = self->state.theta_b + (h_per_6 * (work->k1_theta_b + (2.0 * k2_theta_b)
+        + (2.0 * k3_theta_b) + k4_theta_b));
     work->end_T_l =
         self->state.T_l + (h_per_6 * (work->k1_T_l + (2.0 * k2_T_l) + (2.0 * k3_T_l) + k4_T_l));
 }
@@ -588,13 +600,12 @@ static inline void step_no_contact(const hko_Self *self, Work *work)
     work->end_w_w =
         self->state.w_w + (h_per_6 * (work->k1_w_w + (2.0 * k2_w_w) + (2.0 * k3_w_w) + k4_w_w));
     work->end_w_em =
-        self->state.w_em + (h_per_6 * (work->k1_w_em + (2.0 * k2_w_em) + (2.0 * k3_w_em) + k4_w_em));
-    work->end_theta_d =
-        self->state.theta_d + (h_per_6 * (work->k1_theta_d + (2.0 * k2_theta_d) + (2.0 * k3_theta_d)
-        + k4_theta_d));
-    work->end_theta_b =
-        self->state.theta_b + (h_per_6 * (work->k1_theta_b + (2.0 * k2_theta_b) + (2.0 * k3_theta_b)
-        + k4_theta_b));
+        self->state.w_em + (h_per_6 * (work->k1_w_em + (2.0 * k2_w_em) + (2.0 * k3_w_em)
+        + k4_w_em));
+    work->end_theta_d = self->state.theta_d + (h_per_6 * (work->k1_theta_d + (2.0 * k2_theta_d)
+        + (2.0 * k3_theta_d) + k4_theta_d));
+    work->end_theta_b = self->state.theta_b + (h_per_6 * (work->k1_theta_b + (2.0 * k2_theta_b)
+        + (2.0 * k3_theta_b) + k4_theta_b));
     work->end_T_l =
         self->state.T_l + (h_per_6 * (work->k1_T_l + (2.0 * k2_T_l) + (2.0 * k3_T_l) + k4_T_l));
 }
@@ -685,13 +696,12 @@ static inline void step_coast_contact(const hko_Self *self, Work *work)
     work->end_w_w =
         self->state.w_w + (h_per_6 * (work->k1_w_w + (2.0 * k2_w_w) + (2.0 * k3_w_w) + k4_w_w));
     work->end_w_em =
-        self->state.w_em + (h_per_6 * (work->k1_w_em + (2.0 * k2_w_em) + (2.0 * k3_w_em) + k4_w_em));
-    work->end_theta_d =
-        self->state.theta_d + (h_per_6 * (work->k1_theta_d + (2.0 * k2_theta_d) + (2.0 * k3_theta_d)
-        + k4_theta_d));
-    work->end_theta_b =
-        self->state.theta_b + (h_per_6 * (work->k1_theta_b + (2.0 * k2_theta_b) + (2.0 * k3_theta_b)
-        + k4_theta_b));
+        self->state.w_em + (h_per_6 * (work->k1_w_em + (2.0 * k2_w_em) + (2.0 * k3_w_em)
+        + k4_w_em));
+    work->end_theta_d = self->state.theta_d + (h_per_6 * (work->k1_theta_d + (2.0 * k2_theta_d)
+        + (2.0 * k3_theta_d) + k4_theta_d));
+    work->end_theta_b = self->state.theta_b + (h_per_6 * (work->k1_theta_b + (2.0 * k2_theta_b)
+        + (2.0 * k3_theta_b) + k4_theta_b));
     work->end_T_l =
         self->state.T_l + (h_per_6 * (work->k1_T_l + (2.0 * k2_T_l) + (2.0 * k3_T_l) + k4_T_l));
 }
@@ -979,7 +989,8 @@ static inline void predict_drive(hko_Self *self, Work *work)
         + (solved_drive_drive_contact_Phi_theta_d_w_em * self->P_theta_d__w_em)
         + (solved_drive_drive_contact_Phi_theta_d_w_w * self->P_theta_d__w_w)
         + (solved_drive_drive_contact_Phi_theta_d_T_l * self->P_theta_d__T_l);
-    work->t_theta_d__w_em = (solved_drive_drive_contact_Phi_theta_d_theta_d * self->P_theta_d__w_em)
+    work->t_theta_d__w_em =
+        (solved_drive_drive_contact_Phi_theta_d_theta_d * self->P_theta_d__w_em)
         + (solved_drive_drive_contact_Phi_theta_d_w_em * self->P_w_em__w_em)
         + (solved_drive_drive_contact_Phi_theta_d_w_w * self->P_w_em__w_w)
         + (solved_drive_drive_contact_Phi_theta_d_T_l * self->P_w_em__T_l);
@@ -991,7 +1002,8 @@ static inline void predict_drive(hko_Self *self, Work *work)
         + (solved_drive_drive_contact_Phi_theta_d_w_em * self->P_w_em__T_l)
         + (solved_drive_drive_contact_Phi_theta_d_w_w * self->P_w_w__T_l)
         + (solved_drive_drive_contact_Phi_theta_d_T_l * self->P_T_l__T_l);
-    work->t_w_em__theta_d = (solved_drive_drive_contact_Phi_w_em_theta_d * self->P_theta_d__theta_d)
+    work->t_w_em__theta_d =
+        (solved_drive_drive_contact_Phi_w_em_theta_d * self->P_theta_d__theta_d)
         + (solved_drive_drive_contact_Phi_w_em_w_em * self->P_theta_d__w_em)
         + (solved_drive_drive_contact_Phi_w_em_w_w * self->P_theta_d__w_w)
         + (solved_drive_drive_contact_Phi_w_em_T_l * self->P_theta_d__T_l);
@@ -1034,7 +1046,8 @@ static inline void predict_drive(hko_Self *self, Work *work)
         + (solved_drive_drive_contact_Phi_theta_d_T_l * work->t_theta_d__T_l)
         + solved_drive_drive_contact_Qd_theta_d_theta_d
         + (work->density_w_em * solved_drive_drive_contact_N_w_em_theta_d_theta_d);
-    self->P_theta_d__w_em = (solved_drive_drive_contact_Phi_w_em_theta_d * work->t_theta_d__theta_d)
+    self->P_theta_d__w_em =
+        (solved_drive_drive_contact_Phi_w_em_theta_d * work->t_theta_d__theta_d)
         + (solved_drive_drive_contact_Phi_w_em_w_em * work->t_theta_d__w_em)
         + (solved_drive_drive_contact_Phi_w_em_w_w * work->t_theta_d__w_w)
         + (solved_drive_drive_contact_Phi_w_em_T_l * work->t_theta_d__T_l)
@@ -1118,7 +1131,8 @@ static inline void correct_drive(hko_Self *self, const hko_In *in, Work *work)
             self->faults |= hko_FAULT_range_T_l;
             self->state.T_l = ha_clip(work->new_T_l, -2000.0, 2000.0);
         }
-        self->P_theta_d__theta_d = self->P_theta_d__theta_d - (work->gain_theta_d * work->pc_theta_d);
+        self->P_theta_d__theta_d =
+            self->P_theta_d__theta_d - (work->gain_theta_d * work->pc_theta_d);
         self->P_theta_d__w_em = self->P_theta_d__w_em - (work->gain_theta_d * work->pc_w_em);
         self->P_theta_d__w_w = self->P_theta_d__w_w - (work->gain_theta_d * work->pc_w_w);
         self->P_theta_d__T_l = self->P_theta_d__T_l - (work->gain_theta_d * work->pc_T_l);
@@ -1168,7 +1182,8 @@ static inline void correct_drive(hko_Self *self, const hko_In *in, Work *work)
             self->faults |= hko_FAULT_range_T_l;
             self->state.T_l = ha_clip(work->new_T_l, -2000.0, 2000.0);
         }
-        self->P_theta_d__theta_d = self->P_theta_d__theta_d - (work->gain_theta_d * work->pc_theta_d);
+        self->P_theta_d__theta_d =
+            self->P_theta_d__theta_d - (work->gain_theta_d * work->pc_theta_d);
         self->P_theta_d__w_em = self->P_theta_d__w_em - (work->gain_theta_d * work->pc_w_em);
         self->P_theta_d__w_w = self->P_theta_d__w_w - (work->gain_theta_d * work->pc_w_w);
         self->P_theta_d__T_l = self->P_theta_d__T_l - (work->gain_theta_d * work->pc_T_l);
@@ -1274,23 +1289,28 @@ static inline void predict_gap(hko_Self *self, Work *work)
             self->delay_2 : self->latched.T_em)) * self->derived.per_J_em * ((self->latched.T_em
             - (self->kept ? self->delay_2 :
             self->latched.T_em)) * self->derived.per_J_em) / 12.0)) * constant.t_hold;
-        work->t_theta_d__theta_d = (solved_gap_drive_contact_Phi_theta_d_theta_d * self->P_theta_d__theta_d)
+        work->t_theta_d__theta_d =
+            (solved_gap_drive_contact_Phi_theta_d_theta_d * self->P_theta_d__theta_d)
             + (solved_gap_drive_contact_Phi_theta_d_w_em * self->P_theta_d__w_em)
             + (solved_gap_drive_contact_Phi_theta_d_w_w * self->P_theta_d__w_w)
             + (solved_gap_drive_contact_Phi_theta_d_T_l * self->P_theta_d__T_l);
-        work->t_theta_d__w_em = (solved_gap_drive_contact_Phi_theta_d_theta_d * self->P_theta_d__w_em)
+        work->t_theta_d__w_em =
+            (solved_gap_drive_contact_Phi_theta_d_theta_d * self->P_theta_d__w_em)
             + (solved_gap_drive_contact_Phi_theta_d_w_em * self->P_w_em__w_em)
             + (solved_gap_drive_contact_Phi_theta_d_w_w * self->P_w_em__w_w)
             + (solved_gap_drive_contact_Phi_theta_d_T_l * self->P_w_em__T_l);
-        work->t_theta_d__w_w = (solved_gap_drive_contact_Phi_theta_d_theta_d * self->P_theta_d__w_w)
+        work->t_theta_d__w_w =
+            (solved_gap_drive_contact_Phi_theta_d_theta_d * self->P_theta_d__w_w)
             + (solved_gap_drive_contact_Phi_theta_d_w_em * self->P_w_em__w_w)
             + (solved_gap_drive_contact_Phi_theta_d_w_w * self->P_w_w__w_w)
             + (solved_gap_drive_contact_Phi_theta_d_T_l * self->P_w_w__T_l);
-        work->t_theta_d__T_l = (solved_gap_drive_contact_Phi_theta_d_theta_d * self->P_theta_d__T_l)
+        work->t_theta_d__T_l =
+            (solved_gap_drive_contact_Phi_theta_d_theta_d * self->P_theta_d__T_l)
             + (solved_gap_drive_contact_Phi_theta_d_w_em * self->P_w_em__T_l)
             + (solved_gap_drive_contact_Phi_theta_d_w_w * self->P_w_w__T_l)
             + (solved_gap_drive_contact_Phi_theta_d_T_l * self->P_T_l__T_l);
-        work->t_w_em__theta_d = (solved_gap_drive_contact_Phi_w_em_theta_d * self->P_theta_d__theta_d)
+        work->t_w_em__theta_d =
+            (solved_gap_drive_contact_Phi_w_em_theta_d * self->P_theta_d__theta_d)
             + (solved_gap_drive_contact_Phi_w_em_w_em * self->P_theta_d__w_em)
             + (solved_gap_drive_contact_Phi_w_em_w_w * self->P_theta_d__w_w)
             + (solved_gap_drive_contact_Phi_w_em_T_l * self->P_theta_d__T_l);
@@ -1306,7 +1326,8 @@ static inline void predict_gap(hko_Self *self, Work *work)
             + (solved_gap_drive_contact_Phi_w_em_w_em * self->P_w_em__T_l)
             + (solved_gap_drive_contact_Phi_w_em_w_w * self->P_w_w__T_l)
             + (solved_gap_drive_contact_Phi_w_em_T_l * self->P_T_l__T_l);
-        work->t_w_w__theta_d = (solved_gap_drive_contact_Phi_w_w_theta_d * self->P_theta_d__theta_d)
+        work->t_w_w__theta_d =
+            (solved_gap_drive_contact_Phi_w_w_theta_d * self->P_theta_d__theta_d)
             + (solved_gap_drive_contact_Phi_w_w_w_em * self->P_theta_d__w_em)
             + (solved_gap_drive_contact_Phi_w_w_w_w * self->P_theta_d__w_w)
             + (solved_gap_drive_contact_Phi_w_w_T_l * self->P_theta_d__T_l);
@@ -1326,19 +1347,22 @@ static inline void predict_gap(hko_Self *self, Work *work)
         work->t_T_l__w_em = self->P_w_em__T_l;
         work->t_T_l__w_w = self->P_w_w__T_l;
         work->t_T_l__T_l = self->P_T_l__T_l;
-        self->P_theta_d__theta_d = (solved_gap_drive_contact_Phi_theta_d_theta_d * work->t_theta_d__theta_d)
+        self->P_theta_d__theta_d =
+            (solved_gap_drive_contact_Phi_theta_d_theta_d * work->t_theta_d__theta_d)
             + (solved_gap_drive_contact_Phi_theta_d_w_em * work->t_theta_d__w_em)
             + (solved_gap_drive_contact_Phi_theta_d_w_w * work->t_theta_d__w_w)
             + (solved_gap_drive_contact_Phi_theta_d_T_l * work->t_theta_d__T_l)
             + solved_gap_drive_contact_Qd_theta_d_theta_d
             + (work->density_w_em * solved_gap_drive_contact_N_w_em_theta_d_theta_d);
-        self->P_theta_d__w_em = (solved_gap_drive_contact_Phi_w_em_theta_d * work->t_theta_d__theta_d)
+        self->P_theta_d__w_em =
+            (solved_gap_drive_contact_Phi_w_em_theta_d * work->t_theta_d__theta_d)
             + (solved_gap_drive_contact_Phi_w_em_w_em * work->t_theta_d__w_em)
             + (solved_gap_drive_contact_Phi_w_em_w_w * work->t_theta_d__w_w)
             + (solved_gap_drive_contact_Phi_w_em_T_l * work->t_theta_d__T_l)
             + solved_gap_drive_contact_Qd_theta_d_w_em
             + (work->density_w_em * solved_gap_drive_contact_N_w_em_theta_d_w_em);
-        self->P_theta_d__w_w = (solved_gap_drive_contact_Phi_w_w_theta_d * work->t_theta_d__theta_d)
+        self->P_theta_d__w_w =
+            (solved_gap_drive_contact_Phi_w_w_theta_d * work->t_theta_d__theta_d)
             + (solved_gap_drive_contact_Phi_w_w_w_em * work->t_theta_d__w_em)
             + (solved_gap_drive_contact_Phi_w_w_w_w * work->t_theta_d__w_w)
             + (solved_gap_drive_contact_Phi_w_w_T_l * work->t_theta_d__T_l)
@@ -1374,12 +1398,12 @@ static inline void predict_gap(hko_Self *self, Work *work)
             self->delay_2 : self->latched.T_em)) * self->derived.per_J_em * ((self->latched.T_em
             - (self->kept ? self->delay_2 :
             self->latched.T_em)) * self->derived.per_J_em) / 12.0)) * constant.t_hold;
-        work->t_theta_d__theta_d =
-            self->P_theta_d__theta_d + (solved_gap_no_contact_Phi_theta_d_w_em * self->P_theta_d__w_em)
+        work->t_theta_d__theta_d = self->P_theta_d__theta_d
+            + (solved_gap_no_contact_Phi_theta_d_w_em * self->P_theta_d__w_em)
             + (solved_gap_no_contact_Phi_theta_d_w_w * self->P_theta_d__w_w)
             + (solved_gap_no_contact_Phi_theta_d_T_l * self->P_theta_d__T_l);
-        work->t_theta_d__w_em =
-            self->P_theta_d__w_em + (solved_gap_no_contact_Phi_theta_d_w_em * self->P_w_em__w_em)
+        work->t_theta_d__w_em = self->P_theta_d__w_em
+            + (solved_gap_no_contact_Phi_theta_d_w_em * self->P_w_em__w_em)
             + (solved_gap_no_contact_Phi_theta_d_w_w * self->P_w_em__w_w)
             + (solved_gap_no_contact_Phi_theta_d_T_l * self->P_w_em__T_l);
         work->t_theta_d__w_w =
@@ -1406,8 +1430,8 @@ static inline void predict_gap(hko_Self *self, Work *work)
         work->t_T_l__w_em = self->P_w_em__T_l;
         work->t_T_l__w_w = self->P_w_w__T_l;
         work->t_T_l__T_l = self->P_T_l__T_l;
-        self->P_theta_d__theta_d =
-            work->t_theta_d__theta_d + (solved_gap_no_contact_Phi_theta_d_w_em * work->t_theta_d__w_em)
+        self->P_theta_d__theta_d = work->t_theta_d__theta_d
+            + (solved_gap_no_contact_Phi_theta_d_w_em * work->t_theta_d__w_em)
             + (solved_gap_no_contact_Phi_theta_d_w_w * work->t_theta_d__w_w)
             + (solved_gap_no_contact_Phi_theta_d_T_l * work->t_theta_d__T_l)
             + solved_gap_no_contact_Qd_theta_d_theta_d
@@ -1424,7 +1448,8 @@ static inline void predict_gap(hko_Self *self, Work *work)
             + (solved_gap_no_contact_Phi_w_w_T_l * work->t_w_em__T_l);
         self->P_w_em__T_l = work->t_w_em__T_l;
         self->P_w_w__w_w = (solved_gap_no_contact_Phi_w_w_w_w * work->t_w_w__w_w)
-            + (solved_gap_no_contact_Phi_w_w_T_l * work->t_w_w__T_l) + solved_gap_no_contact_Qd_w_w_w_w;
+            + (solved_gap_no_contact_Phi_w_w_T_l * work->t_w_w__T_l)
+            + solved_gap_no_contact_Qd_w_w_w_w;
         self->P_w_w__T_l = work->t_w_w__T_l + solved_gap_no_contact_Qd_w_w_T_l;
         self->P_T_l__T_l = work->t_T_l__T_l + solved_gap_no_contact_Qd_T_l_T_l;
         break;
@@ -1435,23 +1460,28 @@ static inline void predict_gap(hko_Self *self, Work *work)
             self->delay_2 : self->latched.T_em)) * self->derived.per_J_em * ((self->latched.T_em
             - (self->kept ? self->delay_2 :
             self->latched.T_em)) * self->derived.per_J_em) / 12.0)) * constant.t_hold;
-        work->t_theta_d__theta_d = (solved_gap_coast_contact_Phi_theta_d_theta_d * self->P_theta_d__theta_d)
+        work->t_theta_d__theta_d =
+            (solved_gap_coast_contact_Phi_theta_d_theta_d * self->P_theta_d__theta_d)
             + (solved_gap_coast_contact_Phi_theta_d_w_em * self->P_theta_d__w_em)
             + (solved_gap_coast_contact_Phi_theta_d_w_w * self->P_theta_d__w_w)
             + (solved_gap_coast_contact_Phi_theta_d_T_l * self->P_theta_d__T_l);
-        work->t_theta_d__w_em = (solved_gap_coast_contact_Phi_theta_d_theta_d * self->P_theta_d__w_em)
+        work->t_theta_d__w_em =
+            (solved_gap_coast_contact_Phi_theta_d_theta_d * self->P_theta_d__w_em)
             + (solved_gap_coast_contact_Phi_theta_d_w_em * self->P_w_em__w_em)
             + (solved_gap_coast_contact_Phi_theta_d_w_w * self->P_w_em__w_w)
             + (solved_gap_coast_contact_Phi_theta_d_T_l * self->P_w_em__T_l);
-        work->t_theta_d__w_w = (solved_gap_coast_contact_Phi_theta_d_theta_d * self->P_theta_d__w_w)
+        work->t_theta_d__w_w =
+            (solved_gap_coast_contact_Phi_theta_d_theta_d * self->P_theta_d__w_w)
             + (solved_gap_coast_contact_Phi_theta_d_w_em * self->P_w_em__w_w)
             + (solved_gap_coast_contact_Phi_theta_d_w_w * self->P_w_w__w_w)
             + (solved_gap_coast_contact_Phi_theta_d_T_l * self->P_w_w__T_l);
-        work->t_theta_d__T_l = (solved_gap_coast_contact_Phi_theta_d_theta_d * self->P_theta_d__T_l)
+        work->t_theta_d__T_l =
+            (solved_gap_coast_contact_Phi_theta_d_theta_d * self->P_theta_d__T_l)
             + (solved_gap_coast_contact_Phi_theta_d_w_em * self->P_w_em__T_l)
             + (solved_gap_coast_contact_Phi_theta_d_w_w * self->P_w_w__T_l)
             + (solved_gap_coast_contact_Phi_theta_d_T_l * self->P_T_l__T_l);
-        work->t_w_em__theta_d = (solved_gap_coast_contact_Phi_w_em_theta_d * self->P_theta_d__theta_d)
+        work->t_w_em__theta_d =
+            (solved_gap_coast_contact_Phi_w_em_theta_d * self->P_theta_d__theta_d)
             + (solved_gap_coast_contact_Phi_w_em_w_em * self->P_theta_d__w_em)
             + (solved_gap_coast_contact_Phi_w_em_w_w * self->P_theta_d__w_w)
             + (solved_gap_coast_contact_Phi_w_em_T_l * self->P_theta_d__T_l);
@@ -1467,7 +1497,8 @@ static inline void predict_gap(hko_Self *self, Work *work)
             + (solved_gap_coast_contact_Phi_w_em_w_em * self->P_w_em__T_l)
             + (solved_gap_coast_contact_Phi_w_em_w_w * self->P_w_w__T_l)
             + (solved_gap_coast_contact_Phi_w_em_T_l * self->P_T_l__T_l);
-        work->t_w_w__theta_d = (solved_gap_coast_contact_Phi_w_w_theta_d * self->P_theta_d__theta_d)
+        work->t_w_w__theta_d =
+            (solved_gap_coast_contact_Phi_w_w_theta_d * self->P_theta_d__theta_d)
             + (solved_gap_coast_contact_Phi_w_w_w_em * self->P_theta_d__w_em)
             + (solved_gap_coast_contact_Phi_w_w_w_w * self->P_theta_d__w_w)
             + (solved_gap_coast_contact_Phi_w_w_T_l * self->P_theta_d__T_l);
@@ -1487,19 +1518,22 @@ static inline void predict_gap(hko_Self *self, Work *work)
         work->t_T_l__w_em = self->P_w_em__T_l;
         work->t_T_l__w_w = self->P_w_w__T_l;
         work->t_T_l__T_l = self->P_T_l__T_l;
-        self->P_theta_d__theta_d = (solved_gap_coast_contact_Phi_theta_d_theta_d * work->t_theta_d__theta_d)
+        self->P_theta_d__theta_d =
+            (solved_gap_coast_contact_Phi_theta_d_theta_d * work->t_theta_d__theta_d)
             + (solved_gap_coast_contact_Phi_theta_d_w_em * work->t_theta_d__w_em)
             + (solved_gap_coast_contact_Phi_theta_d_w_w * work->t_theta_d__w_w)
             + (solved_gap_coast_contact_Phi_theta_d_T_l * work->t_theta_d__T_l)
             + solved_gap_coast_contact_Qd_theta_d_theta_d
             + (work->density_w_em * solved_gap_coast_contact_N_w_em_theta_d_theta_d);
-        self->P_theta_d__w_em = (solved_gap_coast_contact_Phi_w_em_theta_d * work->t_theta_d__theta_d)
+        self->P_theta_d__w_em =
+            (solved_gap_coast_contact_Phi_w_em_theta_d * work->t_theta_d__theta_d)
             + (solved_gap_coast_contact_Phi_w_em_w_em * work->t_theta_d__w_em)
             + (solved_gap_coast_contact_Phi_w_em_w_w * work->t_theta_d__w_w)
             + (solved_gap_coast_contact_Phi_w_em_T_l * work->t_theta_d__T_l)
             + solved_gap_coast_contact_Qd_theta_d_w_em
             + (work->density_w_em * solved_gap_coast_contact_N_w_em_theta_d_w_em);
-        self->P_theta_d__w_w = (solved_gap_coast_contact_Phi_w_w_theta_d * work->t_theta_d__theta_d)
+        self->P_theta_d__w_w =
+            (solved_gap_coast_contact_Phi_w_w_theta_d * work->t_theta_d__theta_d)
             + (solved_gap_coast_contact_Phi_w_w_w_em * work->t_theta_d__w_em)
             + (solved_gap_coast_contact_Phi_w_w_w_w * work->t_theta_d__w_w)
             + (solved_gap_coast_contact_Phi_w_w_T_l * work->t_theta_d__T_l)
@@ -1581,7 +1615,8 @@ static inline void correct_gap(hko_Self *self, const hko_In *in, Work *work)
             self->faults |= hko_FAULT_range_T_l;
             self->state.T_l = ha_clip(work->new_T_l, -2000.0, 2000.0);
         }
-        self->P_theta_d__theta_d = self->P_theta_d__theta_d - (work->gain_theta_d * work->pc_theta_d);
+        self->P_theta_d__theta_d =
+            self->P_theta_d__theta_d - (work->gain_theta_d * work->pc_theta_d);
         self->P_theta_d__w_em = self->P_theta_d__w_em - (work->gain_theta_d * work->pc_w_em);
         self->P_theta_d__w_w = self->P_theta_d__w_w - (work->gain_theta_d * work->pc_w_w);
         self->P_theta_d__T_l = self->P_theta_d__T_l - (work->gain_theta_d * work->pc_T_l);
@@ -1631,7 +1666,8 @@ static inline void correct_gap(hko_Self *self, const hko_In *in, Work *work)
             self->faults |= hko_FAULT_range_T_l;
             self->state.T_l = ha_clip(work->new_T_l, -2000.0, 2000.0);
         }
-        self->P_theta_d__theta_d = self->P_theta_d__theta_d - (work->gain_theta_d * work->pc_theta_d);
+        self->P_theta_d__theta_d =
+            self->P_theta_d__theta_d - (work->gain_theta_d * work->pc_theta_d);
         self->P_theta_d__w_em = self->P_theta_d__w_em - (work->gain_theta_d * work->pc_w_em);
         self->P_theta_d__w_w = self->P_theta_d__w_w - (work->gain_theta_d * work->pc_w_w);
         self->P_theta_d__T_l = self->P_theta_d__T_l - (work->gain_theta_d * work->pc_T_l);
@@ -1703,7 +1739,8 @@ static inline void predict_coast(hko_Self *self, Work *work)
         + (solved_coast_coast_contact_Phi_theta_d_w_em * self->P_theta_d__w_em)
         + (solved_coast_coast_contact_Phi_theta_d_w_w * self->P_theta_d__w_w)
         + (solved_coast_coast_contact_Phi_theta_d_T_l * self->P_theta_d__T_l);
-    work->t_theta_d__w_em = (solved_coast_coast_contact_Phi_theta_d_theta_d * self->P_theta_d__w_em)
+    work->t_theta_d__w_em =
+        (solved_coast_coast_contact_Phi_theta_d_theta_d * self->P_theta_d__w_em)
         + (solved_coast_coast_contact_Phi_theta_d_w_em * self->P_w_em__w_em)
         + (solved_coast_coast_contact_Phi_theta_d_w_w * self->P_w_em__w_w)
         + (solved_coast_coast_contact_Phi_theta_d_T_l * self->P_w_em__T_l);
@@ -1715,7 +1752,8 @@ static inline void predict_coast(hko_Self *self, Work *work)
         + (solved_coast_coast_contact_Phi_theta_d_w_em * self->P_w_em__T_l)
         + (solved_coast_coast_contact_Phi_theta_d_w_w * self->P_w_w__T_l)
         + (solved_coast_coast_contact_Phi_theta_d_T_l * self->P_T_l__T_l);
-    work->t_w_em__theta_d = (solved_coast_coast_contact_Phi_w_em_theta_d * self->P_theta_d__theta_d)
+    work->t_w_em__theta_d =
+        (solved_coast_coast_contact_Phi_w_em_theta_d * self->P_theta_d__theta_d)
         + (solved_coast_coast_contact_Phi_w_em_w_em * self->P_theta_d__w_em)
         + (solved_coast_coast_contact_Phi_w_em_w_w * self->P_theta_d__w_w)
         + (solved_coast_coast_contact_Phi_w_em_T_l * self->P_theta_d__T_l);
@@ -1758,7 +1796,8 @@ static inline void predict_coast(hko_Self *self, Work *work)
         + (solved_coast_coast_contact_Phi_theta_d_T_l * work->t_theta_d__T_l)
         + solved_coast_coast_contact_Qd_theta_d_theta_d
         + (work->density_w_em * solved_coast_coast_contact_N_w_em_theta_d_theta_d);
-    self->P_theta_d__w_em = (solved_coast_coast_contact_Phi_w_em_theta_d * work->t_theta_d__theta_d)
+    self->P_theta_d__w_em =
+        (solved_coast_coast_contact_Phi_w_em_theta_d * work->t_theta_d__theta_d)
         + (solved_coast_coast_contact_Phi_w_em_w_em * work->t_theta_d__w_em)
         + (solved_coast_coast_contact_Phi_w_em_w_w * work->t_theta_d__w_w)
         + (solved_coast_coast_contact_Phi_w_em_T_l * work->t_theta_d__T_l)
@@ -1842,7 +1881,8 @@ static inline void correct_coast(hko_Self *self, const hko_In *in, Work *work)
             self->faults |= hko_FAULT_range_T_l;
             self->state.T_l = ha_clip(work->new_T_l, -2000.0, 2000.0);
         }
-        self->P_theta_d__theta_d = self->P_theta_d__theta_d - (work->gain_theta_d * work->pc_theta_d);
+        self->P_theta_d__theta_d =
+            self->P_theta_d__theta_d - (work->gain_theta_d * work->pc_theta_d);
         self->P_theta_d__w_em = self->P_theta_d__w_em - (work->gain_theta_d * work->pc_w_em);
         self->P_theta_d__w_w = self->P_theta_d__w_w - (work->gain_theta_d * work->pc_w_w);
         self->P_theta_d__T_l = self->P_theta_d__T_l - (work->gain_theta_d * work->pc_T_l);
@@ -1892,7 +1932,8 @@ static inline void correct_coast(hko_Self *self, const hko_In *in, Work *work)
             self->faults |= hko_FAULT_range_T_l;
             self->state.T_l = ha_clip(work->new_T_l, -2000.0, 2000.0);
         }
-        self->P_theta_d__theta_d = self->P_theta_d__theta_d - (work->gain_theta_d * work->pc_theta_d);
+        self->P_theta_d__theta_d =
+            self->P_theta_d__theta_d - (work->gain_theta_d * work->pc_theta_d);
         self->P_theta_d__w_em = self->P_theta_d__w_em - (work->gain_theta_d * work->pc_w_em);
         self->P_theta_d__w_w = self->P_theta_d__w_w - (work->gain_theta_d * work->pc_w_w);
         self->P_theta_d__T_l = self->P_theta_d__T_l - (work->gain_theta_d * work->pc_T_l);
@@ -1907,7 +1948,8 @@ static inline void correct_coast(hko_Self *self, const hko_In *in, Work *work)
 
 static inline void equations_drive(hko_Self *self, const hko_Cal *cal)
 {
-    self->equation.w_d = (self->state.w_em * constant.per_R) - self->state.w_w; /* hko equations.w_d */
+    /* hko equations.w_d */
+    self->equation.w_d = (self->state.w_em * constant.per_R) - self->state.w_w;
     /* hko equations.a_em */
     self->equation.a_em = (self->latched.y_em - (self->kept ? self->delay_1[self->oldest_1] :
         self->latched.y_em)) / 0.01;
@@ -1946,7 +1988,8 @@ static inline void back_drive_0(hko_Self *self, Work *work)
     if (work->until) {
         for (int32_t look = 0; look < 8; look++) {
             if ((work->back == 0) && (look < self->timer.past)) {
-                work->place = (self->newest >= look) ? (self->newest - look) : (self->newest - look + 8);
+                work->place =
+                    (self->newest >= look) ? (self->newest - look) : (self->newest - look + 8);
                 work->at_w_w = self->past_w_w[work->place];
                 work->at_w_em = self->past_w_em[work->place];
                 work->at_theta_d = self->past_theta_d[work->place];
@@ -1971,8 +2014,8 @@ static inline void back_drive_0(hko_Self *self, Work *work)
             work->after_T_em = self->latched.T_em;
             work->after_T_br = self->latched.T_br;
         } else {
-            work->place = (self->newest >= (work->back - 2)) ? (self->newest - (work->back - 2)) : (self->newest
-                - (work->back - 2) + 8);
+            work->place = (self->newest >= (work->back - 2)) ? (self->newest - (work->back - 2)) :
+                (self->newest - (work->back - 2) + 8);
             work->after_w_w = self->past_w_w[work->place];
             work->after_w_em = self->past_w_em[work->place];
             work->after_theta_d = self->past_theta_d[work->place];
@@ -2081,8 +2124,9 @@ static inline void jump_drive(hko_Self *self, Work *work)
             }
             for (int32_t look = 0; look < 7; look++) {
                 if ((look + 1) < work->back) {
-                    work->place = (self->newest >= (work->back - 2 - look)) ? (self->newest - (work->back - 2 - look)) :
-                        (self->newest - (work->back - 2 - look) + 8);
+                    work->place =
+                        (self->newest >= (work->back - 2 - look)) ? (self->newest - (work->back
+                        - 2 - look)) : (self->newest - (work->back - 2 - look) + 8);
                     self->before.T_em = self->past_T_em[work->place];
                     self->before.T_br = self->past_T_br[work->place];
                     run_gap(self, work);
@@ -2094,7 +2138,8 @@ static inline void jump_drive(hko_Self *self, Work *work)
 
 static inline void equations_gap(hko_Self *self, const hko_Cal *cal)
 {
-    self->equation.w_d = (self->state.w_em * constant.per_R) - self->state.w_w; /* hko equations.w_d */
+    /* hko equations.w_d */
+    self->equation.w_d = (self->state.w_em * constant.per_R) - self->state.w_w;
     /* hko equations.a_em */
     self->equation.a_em = (self->latched.y_em - (self->kept ? self->delay_1[self->oldest_1] :
         self->latched.y_em)) / 0.01;
@@ -2108,7 +2153,8 @@ static inline void equations_gap(hko_Self *self, const hko_Cal *cal)
     self->equation.w_b = (self->run_mode == hko_RUN_no_contact) ? (self->equation.w_d
         + (constant.k_hs_per_c_hs * theta_d_minus_theta_b)) : 0.0;
     /* hko equations.T_hs */
-    self->equation.T_hs = (constant.k_hs * theta_d_minus_theta_b) + (constant.c_hs * (self->equation.w_d
+    self->equation.T_hs =
+        (constant.k_hs * theta_d_minus_theta_b) + (constant.c_hs * (self->equation.w_d
         - self->equation.w_b));
 }
 
@@ -2139,7 +2185,8 @@ static inline void jump_gap(hko_Self *self, Work *work)
         self->fired = 3U; /* hko modes.gap.transitions.coast */
         self->run_mode = hko_RUN_coast_contact; /* hko modes.coast.runs */
     } else if (self->timer.gap_watch_drive > 5U) {
-        work->reset_theta_b = constant.alpha; /* hko modes.gap.transitions.watch_drive.reset.theta_b */
+        /* hko modes.gap.transitions.watch_drive.reset.theta_b */
+        work->reset_theta_b = constant.alpha;
         if (fabs(work->reset_theta_b) <= 0.2) {
             self->state.theta_b = work->reset_theta_b;
         } else {
@@ -2152,7 +2199,8 @@ static inline void jump_gap(hko_Self *self, Work *work)
         self->fired = 4U; /* hko modes.gap.transitions.watch_drive */
         self->run_mode = hko_RUN_drive_contact; /* hko modes.drive.runs */
     } else if (self->timer.gap_watch_coast > 5U) {
-        work->reset_theta_b = -constant.alpha; /* hko modes.gap.transitions.watch_coast.reset.theta_b */
+        /* hko modes.gap.transitions.watch_coast.reset.theta_b */
+        work->reset_theta_b = -constant.alpha;
         if (fabs(work->reset_theta_b) <= 0.2) {
             self->state.theta_b = work->reset_theta_b;
         } else {
@@ -2169,7 +2217,8 @@ static inline void jump_gap(hko_Self *self, Work *work)
 
 static inline void equations_coast(hko_Self *self, const hko_Cal *cal)
 {
-    self->equation.w_d = (self->state.w_em * constant.per_R) - self->state.w_w; /* hko equations.w_d */
+    /* hko equations.w_d */
+    self->equation.w_d = (self->state.w_em * constant.per_R) - self->state.w_w;
     /* hko equations.a_em */
     self->equation.a_em = (self->latched.y_em - (self->kept ? self->delay_1[self->oldest_1] :
         self->latched.y_em)) / 0.01;
@@ -2208,7 +2257,8 @@ static inline void back_coast_0(hko_Self *self, Work *work)
     if (work->until) {
         for (int32_t look = 0; look < 8; look++) {
             if ((work->back == 0) && (look < self->timer.past)) {
-                work->place = (self->newest >= look) ? (self->newest - look) : (self->newest - look + 8);
+                work->place =
+                    (self->newest >= look) ? (self->newest - look) : (self->newest - look + 8);
                 work->at_w_w = self->past_w_w[work->place];
                 work->at_w_em = self->past_w_em[work->place];
                 work->at_theta_d = self->past_theta_d[work->place];
@@ -2233,8 +2283,8 @@ static inline void back_coast_0(hko_Self *self, Work *work)
             work->after_T_em = self->latched.T_em;
             work->after_T_br = self->latched.T_br;
         } else {
-            work->place = (self->newest >= (work->back - 2)) ? (self->newest - (work->back - 2)) : (self->newest
-                - (work->back - 2) + 8);
+            work->place = (self->newest >= (work->back - 2)) ? (self->newest - (work->back - 2)) :
+                (self->newest - (work->back - 2) + 8);
             work->after_w_w = self->past_w_w[work->place];
             work->after_w_em = self->past_w_em[work->place];
             work->after_theta_d = self->past_theta_d[work->place];
@@ -2343,8 +2393,9 @@ static inline void jump_coast(hko_Self *self, Work *work)
             }
             for (int32_t look = 0; look < 7; look++) {
                 if ((look + 1) < work->back) {
-                    work->place = (self->newest >= (work->back - 2 - look)) ? (self->newest - (work->back - 2 - look)) :
-                        (self->newest - (work->back - 2 - look) + 8);
+                    work->place =
+                        (self->newest >= (work->back - 2 - look)) ? (self->newest - (work->back
+                        - 2 - look)) : (self->newest - (work->back - 2 - look) + 8);
                     self->before.T_em = self->past_T_em[work->place];
                     self->before.T_br = self->past_T_br[work->place];
                     run_gap(self, work);

@@ -41,13 +41,15 @@ float ha_sinf(float x)
     const float square = head * head;
     const float half = 0.5F * square;
     const float crest = 1.0F - half;
-    const float sine_series = (-0.16666654F) + (square * (0.008332096F + (square * (-0.00019505627F))));
+    const float sine_series =
+        (-0.16666654F) + (square * (0.008332096F + (square * (-0.00019505627F))));
     const float sine = head + ((tail * crest) + (head * square * sine_series));
-    const float cosine_series = 0.041666646F + (square * ((-0.0013887289F) + (square * 2.4428207e-05F)));
+    const float cosine_series =
+        0.041666646F + (square * ((-0.0013887289F) + (square * 2.4428207e-05F)));
     const float cosine =
         crest + (1.0F - crest - half + ((square * square * cosine_series) - (head * tail)));
-    return (fabsf(x) < 0.00012207031F) ? x : ((quadrant < 0.5F) ? sine : ((quadrant < 1.5F) ? cosine :
-        ((quadrant < 2.5F) ? (-sine) : (-cosine))));
+    return (fabsf(x) < 0.00012207031F) ? x : ((quadrant < 0.5F) ? sine : ((quadrant < 1.5F) ?
+        cosine : ((quadrant < 2.5F) ? (-sine) : (-cosine))));
 }
 
 /* cosine; |x| <= 1000 rad, clamped; error < 0.85 ULP */
@@ -68,13 +70,15 @@ float ha_cosf(float x)
     const float square = head * head;
     const float half = 0.5F * square;
     const float crest = 1.0F - half;
-    const float sine_series = (-0.16666654F) + (square * (0.008332096F + (square * (-0.00019505627F))));
+    const float sine_series =
+        (-0.16666654F) + (square * (0.008332096F + (square * (-0.00019505627F))));
     const float sine = head + ((tail * crest) + (head * square * sine_series));
-    const float cosine_series = 0.041666646F + (square * ((-0.0013887289F) + (square * 2.4428207e-05F)));
+    const float cosine_series =
+        0.041666646F + (square * ((-0.0013887289F) + (square * 2.4428207e-05F)));
     const float cosine =
         crest + (1.0F - crest - half + ((square * square * cosine_series) - (head * tail)));
-    return (quadrant < 0.5F) ? cosine : ((quadrant < 1.5F) ? (-sine) : ((quadrant < 2.5F) ? (-cosine) :
-        sine));
+    return (quadrant < 0.5F) ? cosine : ((quadrant < 1.5F) ? (-sine) : ((quadrant < 2.5F) ?
+        (-cosine) : sine));
 }
 
 /* e^x; -87 <= x <= 88, clamped; error < 0.95 ULP */
@@ -100,7 +104,8 @@ float ha_tanhf(float x)
     const float square = bounded * bounded;
     const float above = 315.0F + (square * 14.0F);
     const float below = 945.0F + (square * (420.0F + (square * 15.0F)));
-    const float magnitude = (bounded < 0.625F) ? (bounded - (bounded * square * above / below)) : (1.0F
+    const float magnitude =
+        (bounded < 0.625F) ? (bounded - (bounded * square * above / below)) : (1.0F
         - (2.0F / (ha_expf(bounded + bounded) + 1.0F)));
     return (size < 0.00012207031F) ? x : ((x < 0.0F) ? (-magnitude) : magnitude);
 }
@@ -123,13 +128,16 @@ float ha_tanf(float x)
     const float square = head * head;
     const float half = 0.5F * square;
     const float crest = 1.0F - half;
-    const float sine_series = (-0.16666654F) + (square * (0.008332096F + (square * (-0.00019505627F))));
+    const float sine_series =
+        (-0.16666654F) + (square * (0.008332096F + (square * (-0.00019505627F))));
     const float sine = head + ((tail * crest) + (head * square * sine_series));
-    const float cosine_series = 0.041666646F + (square * ((-0.0013887289F) + (square * 2.4428207e-05F)));
+    const float cosine_series =
+        0.041666646F + (square * ((-0.0013887289F) + (square * 2.4428207e-05F)));
     const float cosine =
         crest + (1.0F - crest - half + ((square * square * cosine_series) - (head * tail)));
-    return (fabsf(x) < 0.00012207031F) ? x : ((quadrant < 0.5F) ? (sine / cosine) : ((quadrant < 1.5F)
-        ? (-(cosine / sine)) : ((quadrant < 2.5F) ? (sine / cosine) : (-(cosine / sine)))));
+    return (fabsf(x) < 0.00012207031F) ? x : ((quadrant < 0.5F) ? (sine / cosine) :
+        ((quadrant < 1.5F) ? (-(cosine / sine)) : ((quadrant < 2.5F) ? (sine / cosine) :
+        (-(cosine / sine)))));
 }
 
 /* angle of (run, rise), in (-pi, pi] rad; error < 1.5 ULP */
@@ -140,38 +148,39 @@ float ha_atan2f(float rise, float run)
     const float least = (up > along) ? along : up;
     const float most = (up > along) ? up : along;
     const float factor = (most > 1.329228e+36F) ? 9.536743e-07F : 1.0F;
-    const float low = (most > 3.4028235e+38F) ? ((least > 3.4028235e+38F) ? 1.0F : (least * 0.0F)) :
+    const float low =
+        (most > 3.4028235e+38F) ? ((least > 3.4028235e+38F) ? 1.0F : (least * 0.0F)) :
         (least * factor);
     const float high = (most > 3.4028235e+38F) ? 1.0F : (most * factor);
     const float top =
         ((16.0F * low) < (7.0F * high)) ? low : (((16.0F * low) < (11.0F * high)) ? (low + low
         - high) : (low - high));
     const float below =
-        ((16.0F * low) < (7.0F * high)) ? high : (((16.0F * low) < (11.0F * high)) ? (high + high
-        + low) : (high + low));
+        ((16.0F * low) < (7.0F * high)) ? high : (((16.0F * low) < (11.0F * high)) ? (high
+        + high + low) : (high + low));
     const float r = top / ((high <= 0.0F) ? 1.0F : below);
     const float square = r * r;
     const float centre = -0.057816543F;
-    const float series =
-        (-0.33333302F) + (square * (0.1999762F + (square * ((-0.14227404F) + (square * (0.1047528F
-        + (square * centre)))))));
+    const float series = (-0.33333302F) + (square * (0.1999762F + (square * ((-0.14227404F)
+        + (square * (0.1047528F + (square * centre)))))));
     const float core = r + (r * square * series);
     const float turn = (up > along) ? (-core) : core;
     const float arc = (run < 0.0F) ? (-turn) : turn;
-    const float first = (up > along) ? ((run < 0.0F) ? (((16.0F * low) < (7.0F * high)) ? 1.5707964F :
+    const float first =
+        (up > along) ? ((run < 0.0F) ? (((16.0F * low) < (7.0F * high)) ? 1.5707964F :
         (((16.0F * low) < (11.0F * high)) ? 2.0344439F : 2.3561945F)) :
         (((16.0F * low) < (7.0F * high)) ? 1.5707964F : (((16.0F * low) < (11.0F * high)) ?
-        1.1071488F : 0.7853982F))) : ((run < 0.0F) ? (((16.0F * low) < (7.0F * high)) ? 3.1415927F :
-        (((16.0F * low) < (11.0F * high)) ? 2.6779451F : 2.3561945F)) :
-        (((16.0F * low) < (7.0F * high)) ? 0.0F : (((16.0F * low) < (11.0F * high)) ? 0.4636476F :
-        0.7853982F)));
+        1.1071488F : 0.7853982F))) : ((run < 0.0F) ? (((16.0F * low) < (7.0F * high)) ?
+        3.1415927F : (((16.0F * low) < (11.0F * high)) ? 2.6779451F : 2.3561945F)) :
+        (((16.0F * low) < (7.0F * high)) ? 0.0F : (((16.0F * low) < (11.0F * high)) ? 0.4636476F
+        : 0.7853982F)));
     const float rest =
         (up > along) ? ((run < 0.0F) ? (((16.0F * low) < (7.0F * high)) ? (-4.371139e-08F) :
         (((16.0F * low) < (11.0F * high)) ? 8.0510056e-08F : (-5.9624403e-09F))) :
-        (((16.0F * low) < (7.0F * high)) ? (-4.371139e-08F) : (((16.0F * low) < (11.0F * high)) ?
-        (-4.872355e-08F) : (-2.1855694e-08F)))) : ((run < 0.0F) ? (((16.0F * low) < (7.0F * high)) ?
-        (-8.742278e-08F) : (((16.0F * low) < (11.0F * high)) ? (-9.243494e-08F) :
-        (-5.9624403e-09F))) : (((16.0F * low) < (7.0F * high)) ? 0.0F :
+        (((16.0F * low) < (7.0F * high)) ? (-4.371139e-08F) : (((16.0F * low) < (11.0F * high))
+        ? (-4.872355e-08F) : (-2.1855694e-08F)))) : ((run < 0.0F) ?
+        (((16.0F * low) < (7.0F * high)) ? (-8.742278e-08F) : (((16.0F * low) < (11.0F * high))
+        ? (-9.243494e-08F) : (-5.9624403e-09F))) : (((16.0F * low) < (7.0F * high)) ? 0.0F :
         (((16.0F * low) < (11.0F * high)) ? 5.0121587e-09F : (-2.1855694e-08F))));
     const float size = first + (rest + arc);
     return (up <= 0.0F) ? ((run >= 0.0F) ? rise : size) : ((rise < 0.0F) ? (-size) : size);

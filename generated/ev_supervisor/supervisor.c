@@ -143,20 +143,24 @@ static inline void equations_operation_standby(supervisor_Self *self)
     self->equation.pre_command = self->discrete.pre_cmd; /* supervisor equations.pre_command */
     switch (self->mode_main) {
     case supervisor_main_open:
-        self->equation.main_closed = false; /* supervisor regions.main.modes.open.equations.main_closed */
+        /* supervisor regions.main.modes.open.equations.main_closed */
+        self->equation.main_closed = false;
         break;
     case supervisor_main_shut:
-        self->equation.main_closed = true; /* supervisor regions.main.modes.shut.equations.main_closed */
+        /* supervisor regions.main.modes.shut.equations.main_closed */
+        self->equation.main_closed = true;
         break;
     default:
         break;
     }
     switch (self->mode_pre) {
     case supervisor_pre_open:
-        self->equation.pre_closed = false; /* supervisor regions.pre.modes.open.equations.pre_closed */
+        /* supervisor regions.pre.modes.open.equations.pre_closed */
+        self->equation.pre_closed = false;
         break;
     case supervisor_pre_shut:
-        self->equation.pre_closed = true; /* supervisor regions.pre.modes.shut.equations.pre_closed */
+        /* supervisor regions.pre.modes.shut.equations.pre_closed */
+        self->equation.pre_closed = true;
         break;
     default:
         break;
@@ -169,20 +173,24 @@ static inline void equations_operation_precharge(supervisor_Self *self)
     self->equation.pre_command = self->discrete.pre_cmd; /* supervisor equations.pre_command */
     switch (self->mode_main) {
     case supervisor_main_open:
-        self->equation.main_closed = false; /* supervisor regions.main.modes.open.equations.main_closed */
+        /* supervisor regions.main.modes.open.equations.main_closed */
+        self->equation.main_closed = false;
         break;
     case supervisor_main_shut:
-        self->equation.main_closed = true; /* supervisor regions.main.modes.shut.equations.main_closed */
+        /* supervisor regions.main.modes.shut.equations.main_closed */
+        self->equation.main_closed = true;
         break;
     default:
         break;
     }
     switch (self->mode_pre) {
     case supervisor_pre_open:
-        self->equation.pre_closed = false; /* supervisor regions.pre.modes.open.equations.pre_closed */
+        /* supervisor regions.pre.modes.open.equations.pre_closed */
+        self->equation.pre_closed = false;
         break;
     case supervisor_pre_shut:
-        self->equation.pre_closed = true; /* supervisor regions.pre.modes.shut.equations.pre_closed */
+        /* supervisor regions.pre.modes.shut.equations.pre_closed */
+        self->equation.pre_closed = true;
         break;
     default:
         break;
@@ -195,20 +203,24 @@ static inline void equations_operation_ready(supervisor_Self *self)
     self->equation.pre_command = self->discrete.pre_cmd; /* supervisor equations.pre_command */
     switch (self->mode_main) {
     case supervisor_main_open:
-        self->equation.main_closed = false; /* supervisor regions.main.modes.open.equations.main_closed */
+        /* supervisor regions.main.modes.open.equations.main_closed */
+        self->equation.main_closed = false;
         break;
     case supervisor_main_shut:
-        self->equation.main_closed = true; /* supervisor regions.main.modes.shut.equations.main_closed */
+        /* supervisor regions.main.modes.shut.equations.main_closed */
+        self->equation.main_closed = true;
         break;
     default:
         break;
     }
     switch (self->mode_pre) {
     case supervisor_pre_open:
-        self->equation.pre_closed = false; /* supervisor regions.pre.modes.open.equations.pre_closed */
+        /* supervisor regions.pre.modes.open.equations.pre_closed */
+        self->equation.pre_closed = false;
         break;
     case supervisor_pre_shut:
-        self->equation.pre_closed = true; /* supervisor regions.pre.modes.shut.equations.pre_closed */
+        /* supervisor regions.pre.modes.shut.equations.pre_closed */
+        self->equation.pre_closed = true;
         break;
     default:
         break;
@@ -221,20 +233,24 @@ static inline void equations_operation_drive(supervisor_Self *self)
     self->equation.pre_command = self->discrete.pre_cmd; /* supervisor equations.pre_command */
     switch (self->mode_main) {
     case supervisor_main_open:
-        self->equation.main_closed = false; /* supervisor regions.main.modes.open.equations.main_closed */
+        /* supervisor regions.main.modes.open.equations.main_closed */
+        self->equation.main_closed = false;
         break;
     case supervisor_main_shut:
-        self->equation.main_closed = true; /* supervisor regions.main.modes.shut.equations.main_closed */
+        /* supervisor regions.main.modes.shut.equations.main_closed */
+        self->equation.main_closed = true;
         break;
     default:
         break;
     }
     switch (self->mode_pre) {
     case supervisor_pre_open:
-        self->equation.pre_closed = false; /* supervisor regions.pre.modes.open.equations.pre_closed */
+        /* supervisor regions.pre.modes.open.equations.pre_closed */
+        self->equation.pre_closed = false;
         break;
     case supervisor_pre_shut:
-        self->equation.pre_closed = true; /* supervisor regions.pre.modes.shut.equations.pre_closed */
+        /* supervisor regions.pre.modes.shut.equations.pre_closed */
+        self->equation.pre_closed = true;
         break;
     default:
         break;
@@ -247,20 +263,24 @@ static inline void equations_fault(supervisor_Self *self)
     self->equation.pre_command = self->discrete.pre_cmd; /* supervisor equations.pre_command */
     switch (self->mode_main) {
     case supervisor_main_open:
-        self->equation.main_closed = false; /* supervisor regions.main.modes.open.equations.main_closed */
+        /* supervisor regions.main.modes.open.equations.main_closed */
+        self->equation.main_closed = false;
         break;
     case supervisor_main_shut:
-        self->equation.main_closed = true; /* supervisor regions.main.modes.shut.equations.main_closed */
+        /* supervisor regions.main.modes.shut.equations.main_closed */
+        self->equation.main_closed = true;
         break;
     default:
         break;
     }
     switch (self->mode_pre) {
     case supervisor_pre_open:
-        self->equation.pre_closed = false; /* supervisor regions.pre.modes.open.equations.pre_closed */
+        /* supervisor regions.pre.modes.open.equations.pre_closed */
+        self->equation.pre_closed = false;
         break;
     case supervisor_pre_shut:
-        self->equation.pre_closed = true; /* supervisor regions.pre.modes.shut.equations.pre_closed */
+        /* supervisor regions.pre.modes.shut.equations.pre_closed */
+        self->equation.pre_closed = true;
         break;
     default:
         break;
@@ -552,7 +572,8 @@ static inline void choose_fault(const supervisor_In *in, Work *work)
 static inline void count_main_open(supervisor_Self *self, const Work *work)
 {
     if (work->is_first) {
-        if (!self->equation.main_command) { /* supervisor regions.main.modes.open.transitions.shut.when */
+        /* supervisor regions.main.modes.open.transitions.shut.when */
+        if (!self->equation.main_command) {
             self->timer.main_open_shut = 0U;
         } else if (self->timer.main_open_shut < 5U) {
             self->timer.main_open_shut++;
@@ -584,7 +605,8 @@ static inline void choose_main_shut(const supervisor_Self *self, Work *work)
 static inline void count_pre_open(supervisor_Self *self, const Work *work)
 {
     if (work->is_first) {
-        if (!self->equation.pre_command) { /* supervisor regions.pre.modes.open.transitions.shut.when */
+        /* supervisor regions.pre.modes.open.transitions.shut.when */
+        if (!self->equation.pre_command) {
             self->timer.pre_open_shut = 0U;
         } else if (self->timer.pre_open_shut < 3U) {
             self->timer.pre_open_shut++;
@@ -719,7 +741,8 @@ static inline void hear_chart(Work *work)
         && (work->low_operation_drive_torque <= work->high_chart))))) {
         work->keeps = false;
     }
-    if ((work->takes_operation_drive_derating != 0U) && ((work->low_chart <= work->high_chart)
+    if ((work->takes_operation_drive_derating != 0U)
+        && ((work->low_chart <= work->high_chart)
         && (work->low_operation_drive_derating <= work->high_operation_drive_derating)
         && (((work->low_operation_drive_derating <= work->low_chart)
         && (work->low_chart <= work->high_operation_drive_derating))

@@ -27,7 +27,8 @@ double ha_pow2(double k)
 double ha_sin(double x)
 {
     const double bounded = (x > 100000.0) ? 100000.0 : ((x < (-100000.0)) ? (-100000.0) : x);
-    const double quarters = (bounded * 0.6366197723675814) + 6755399441055744.0 - 6755399441055744.0;
+    const double quarters =
+        (bounded * 0.6366197723675814) + 6755399441055744.0 - 6755399441055744.0;
     const double turns = (0.25 * quarters) - 0.375 + 6755399441055744.0 - 6755399441055744.0;
     const double quadrant = quarters - (4.0 * turns);
     const double coarse = bounded - (quarters * 1.5707963267923333);
@@ -40,15 +41,13 @@ double ha_sin(double x)
     const double crest = 1.0 - half;
     const double sine_upper = 2.755731370700222e-06 + (square * ((-2.5050760240823352e-08)
         + (square * 1.5896909130064357e-10)));
-    const double sine_series =
-        (-0.16666666666666632) + (square * (0.00833333333332249 + (square * ((-0.000198412698298578)
-        + (square * sine_upper)))));
+    const double sine_series = (-0.16666666666666632) + (square * (0.00833333333332249
+        + (square * ((-0.000198412698298578) + (square * sine_upper)))));
     const double sine = head + ((tail * crest) + (head * square * sine_series));
     const double cosine_upper = (-2.7557314401028414e-07) + (square * (2.0875729280773627e-09
         + (square * (-1.135993421169908e-11))));
-    const double cosine_series =
-        0.0416666666666666 + (square * ((-0.0013888888888874474) + (square * (2.4801587289671533e-05
-        + (square * cosine_upper)))));
+    const double cosine_series = 0.0416666666666666 + (square * ((-0.0013888888888874474)
+        + (square * (2.4801587289671533e-05 + (square * cosine_upper)))));
     const double cosine =
         crest + (1.0 - crest - half + ((square * square * cosine_series) - (head * tail)));
     return (fabs(x) < 7.450580596923828e-09) ? x : ((quadrant < 0.5) ? sine : ((quadrant < 1.5) ?
@@ -59,7 +58,8 @@ double ha_sin(double x)
 double ha_cos(double x)
 {
     const double bounded = (x > 100000.0) ? 100000.0 : ((x < (-100000.0)) ? (-100000.0) : x);
-    const double quarters = (bounded * 0.6366197723675814) + 6755399441055744.0 - 6755399441055744.0;
+    const double quarters =
+        (bounded * 0.6366197723675814) + 6755399441055744.0 - 6755399441055744.0;
     const double turns = (0.25 * quarters) - 0.375 + 6755399441055744.0 - 6755399441055744.0;
     const double quadrant = quarters - (4.0 * turns);
     const double coarse = bounded - (quarters * 1.5707963267923333);
@@ -72,26 +72,25 @@ double ha_cos(double x)
     const double crest = 1.0 - half;
     const double sine_upper = 2.755731370700222e-06 + (square * ((-2.5050760240823352e-08)
         + (square * 1.5896909130064357e-10)));
-    const double sine_series =
-        (-0.16666666666666632) + (square * (0.00833333333332249 + (square * ((-0.000198412698298578)
-        + (square * sine_upper)))));
+    const double sine_series = (-0.16666666666666632) + (square * (0.00833333333332249
+        + (square * ((-0.000198412698298578) + (square * sine_upper)))));
     const double sine = head + ((tail * crest) + (head * square * sine_series));
     const double cosine_upper = (-2.7557314401028414e-07) + (square * (2.0875729280773627e-09
         + (square * (-1.135993421169908e-11))));
-    const double cosine_series =
-        0.0416666666666666 + (square * ((-0.0013888888888874474) + (square * (2.4801587289671533e-05
-        + (square * cosine_upper)))));
+    const double cosine_series = 0.0416666666666666 + (square * ((-0.0013888888888874474)
+        + (square * (2.4801587289671533e-05 + (square * cosine_upper)))));
     const double cosine =
         crest + (1.0 - crest - half + ((square * square * cosine_series) - (head * tail)));
-    return (quadrant < 0.5) ? cosine : ((quadrant < 1.5) ? (-sine) : ((quadrant < 2.5) ? (-cosine) :
-        sine));
+    return (quadrant < 0.5) ? cosine : ((quadrant < 1.5) ? (-sine) : ((quadrant < 2.5) ? (-cosine)
+        : sine));
 }
 
 /* e^x; -708 <= x <= 709, clamped; error < 0.95 ULP */
 double ha_exp(double x)
 {
     const double bounded = (x > 709.0) ? 709.0 : ((x < (-708.0)) ? (-708.0) : x);
-    const double exponent = (bounded > (-708.0)) ? ((bounded * 1.4426950408889634) + 6755399441055744.0
+    const double exponent =
+        (bounded > (-708.0)) ? ((bounded * 1.4426950408889634) + 6755399441055744.0
         - 6755399441055744.0) : (-1021.0);
     const double head = bounded - (exponent * 0.6931471805598903);
     const double tail = exponent * 5.497923018708371e-14;
@@ -101,7 +100,8 @@ double ha_exp(double x)
     const double middle =
         0.0013888888943694578 + (r * (0.00019841269546225928 + (r * (2.4801493177744308e-05
         + (r * upper)))));
-    const double series = 0.5000000000000011 + (r * (0.16666666666666466 + (r * (0.041666666666528816
+    const double series =
+        0.5000000000000011 + (r * (0.16666666666666466 + (r * (0.041666666666528816
         + (r * (0.00833333333347021 + (r * middle)))))));
     const double scaled = 1.0 + (head + ((r * r * series) - tail));
     return ha_pow2(exponent) * scaled;
@@ -116,7 +116,8 @@ double ha_tanh(double x)
     const double above = 675675.0 + (square * (45045.0 + (square * (594.0 + square))));
     const double below =
         2027025.0 + (square * (945945.0 + (square * (51975.0 + (square * (630.0 + square))))));
-    const double magnitude = (bounded < 0.625) ? (bounded - (bounded * square * above / below)) : (1.0
+    const double magnitude =
+        (bounded < 0.625) ? (bounded - (bounded * square * above / below)) : (1.0
         - (2.0 / (ha_exp(bounded + bounded) + 1.0)));
     return (size < 7.450580596923828e-09) ? x : ((x < 0.0) ? (-magnitude) : magnitude);
 }
@@ -125,7 +126,8 @@ double ha_tanh(double x)
 double ha_tan(double x)
 {
     const double bounded = (x > 100000.0) ? 100000.0 : ((x < (-100000.0)) ? (-100000.0) : x);
-    const double quarters = (bounded * 0.6366197723675814) + 6755399441055744.0 - 6755399441055744.0;
+    const double quarters =
+        (bounded * 0.6366197723675814) + 6755399441055744.0 - 6755399441055744.0;
     const double turns = (0.25 * quarters) - 0.375 + 6755399441055744.0 - 6755399441055744.0;
     const double quadrant = quarters - (4.0 * turns);
     const double coarse = bounded - (quarters * 1.5707963267923333);
@@ -138,15 +140,13 @@ double ha_tan(double x)
     const double crest = 1.0 - half;
     const double sine_upper = 2.755731370700222e-06 + (square * ((-2.5050760240823352e-08)
         + (square * 1.5896909130064357e-10)));
-    const double sine_series =
-        (-0.16666666666666632) + (square * (0.00833333333332249 + (square * ((-0.000198412698298578)
-        + (square * sine_upper)))));
+    const double sine_series = (-0.16666666666666632) + (square * (0.00833333333332249
+        + (square * ((-0.000198412698298578) + (square * sine_upper)))));
     const double sine = head + ((tail * crest) + (head * square * sine_series));
     const double cosine_upper = (-2.7557314401028414e-07) + (square * (2.0875729280773627e-09
         + (square * (-1.135993421169908e-11))));
-    const double cosine_series =
-        0.0416666666666666 + (square * ((-0.0013888888888874474) + (square * (2.4801587289671533e-05
-        + (square * cosine_upper)))));
+    const double cosine_series = 0.0416666666666666 + (square * ((-0.0013888888888874474)
+        + (square * (2.4801587289671533e-05 + (square * cosine_upper)))));
     const double cosine =
         crest + (1.0 - crest - half + ((square * square * cosine_series) - (head * tail)));
     return (fabs(x) < 7.450580596923828e-09) ? x : ((quadrant < 0.5) ? (sine / cosine) :
@@ -163,26 +163,25 @@ double ha_atan2(double rise, double run)
     const double most = (up > along) ? up : along;
     const double factor = (most > 1.0715086071862673e+301) ? 7.888609052210118e-31 : 1.0;
     const double low =
-        (most > 1.7976931348623157e+308) ? ((least > 1.7976931348623157e+308) ? 1.0 : (least * 0.0))
-        : (least * factor);
+        (most > 1.7976931348623157e+308) ? ((least > 1.7976931348623157e+308) ? 1.0 :
+        (least * 0.0)) : (least * factor);
     const double high = (most > 1.7976931348623157e+308) ? 1.0 : (most * factor);
     const double top =
-        ((16.0 * low) < (7.0 * high)) ? low : (((16.0 * low) < (11.0 * high)) ? (low + low - high) :
-        (low - high));
+        ((16.0 * low) < (7.0 * high)) ? low : (((16.0 * low) < (11.0 * high)) ? (low + low
+        - high) : (low - high));
     const double below =
-        ((16.0 * low) < (7.0 * high)) ? high : (((16.0 * low) < (11.0 * high)) ? (high + high + low)
-        : (high + low));
+        ((16.0 * low) < (7.0 * high)) ? high : (((16.0 * low) < (11.0 * high)) ? (high + high
+        + low) : (high + low));
     const double r = top / ((high <= 0.0) ? 1.0 : below);
     const double square = r * r;
-    const double upper =
-        (-0.05200077063553983) + (square * (0.0443291101751916 + (square * ((-0.03191434577731975)
-        + (square * 0.013690660605251368)))));
-    const double centre =
-        (-0.09090907060773325) + (square * (0.07692259559725971 + (square * ((-0.06665902517390095)
-        + (square * (0.05874015985430291 + (square * upper)))))));
-    const double series =
-        (-0.33333333333333315) + (square * (0.19999999999993207 + (square * ((-0.1428571428485282)
-        + (square * (0.1111111105648321 + (square * centre)))))));
+    const double upper = (-0.05200077063553983) + (square * (0.0443291101751916
+        + (square * ((-0.03191434577731975) + (square * 0.013690660605251368)))));
+    const double centre = (-0.09090907060773325) + (square * (0.07692259559725971
+        + (square * ((-0.06665902517390095) + (square * (0.05874015985430291
+        + (square * upper)))))));
+    const double series = (-0.33333333333333315) + (square * (0.19999999999993207
+        + (square * ((-0.1428571428485282) + (square * (0.1111111105648321
+        + (square * centre)))))));
     const double core = r + (r * square * series);
     const double turn = (up > along) ? (-core) : core;
     const double arc = (run < 0.0) ? (-turn) : turn;
@@ -190,18 +189,19 @@ double ha_atan2(double rise, double run)
         (up > along) ? ((run < 0.0) ? (((16.0 * low) < (7.0 * high)) ? 1.5707963267948966 :
         (((16.0 * low) < (11.0 * high)) ? 2.0344439357957027 : 2.356194490192345)) :
         (((16.0 * low) < (7.0 * high)) ? 1.5707963267948966 : (((16.0 * low) < (11.0 * high)) ?
-        1.1071487177940904 : 0.7853981633974483))) : ((run < 0.0) ? (((16.0 * low) < (7.0 * high)) ?
-        3.141592653589793 : (((16.0 * low) < (11.0 * high)) ? 2.677945044588987 :
-        2.356194490192345)) : (((16.0 * low) < (7.0 * high)) ? 0.0 : (((16.0 * low) < (11.0 * high))
-        ? 0.4636476090008061 : 0.7853981633974483)));
+        1.1071487177940904 : 0.7853981633974483))) : ((run < 0.0) ?
+        (((16.0 * low) < (7.0 * high)) ? 3.141592653589793 : (((16.0 * low) < (11.0 * high)) ?
+        2.677945044588987 : 2.356194490192345)) : (((16.0 * low) < (7.0 * high)) ? 0.0 :
+        (((16.0 * low) < (11.0 * high)) ? 0.4636476090008061 : 0.7853981633974483)));
     const double rest =
         (up > along) ? ((run < 0.0) ? (((16.0 * low) < (7.0 * high)) ? 6.123233995736766e-17 :
         (((16.0 * low) < (11.0 * high)) ? 2.841996617907152e-17 : 9.184850993605148e-17)) :
-        (((16.0 * low) < (7.0 * high)) ? 6.123233995736766e-17 : (((16.0 * low) < (11.0 * high)) ?
-        9.40447137356638e-17 : 3.061616997868383e-17))) : ((run < 0.0) ?
-        (((16.0 * low) < (7.0 * high)) ? 1.2246467991473532e-16 : (((16.0 * low) < (11.0 * high)) ?
-        1.5527705369303147e-16 : 9.184850993605148e-17)) : (((16.0 * low) < (7.0 * high)) ? 0.0 :
-        (((16.0 * low) < (11.0 * high)) ? 2.2698777452961687e-17 : 3.061616997868383e-17)));
+        (((16.0 * low) < (7.0 * high)) ? 6.123233995736766e-17 : (((16.0 * low) < (11.0 * high))
+        ? 9.40447137356638e-17 : 3.061616997868383e-17))) : ((run < 0.0) ?
+        (((16.0 * low) < (7.0 * high)) ? 1.2246467991473532e-16 :
+        (((16.0 * low) < (11.0 * high)) ? 1.5527705369303147e-16 : 9.184850993605148e-17)) :
+        (((16.0 * low) < (7.0 * high)) ? 0.0 : (((16.0 * low) < (11.0 * high)) ?
+        2.2698777452961687e-17 : 3.061616997868383e-17)));
     const double size = first + (rest + arc);
     return (up <= 0.0) ? ((run >= 0.0) ? rise : size) : ((rise < 0.0) ? (-size) : size);
 }

@@ -113,7 +113,8 @@ static inline void rates_drive_contact(const blind_driveline_Self *self, Work *w
         - (constant.b_w * work->at_w_w)) * constant.per_J_v;
     work->rate_theta_d = at_w_d; /* blind_driveline flow.theta_d */
     work->rate_theta_b = at_w_b; /* blind_driveline flow.theta_b */
-    work->rate_w_s = (work->at_w_w - work->at_w_s) * constant.per_tau_f; /* blind_driveline flow.w_s */
+    /* blind_driveline flow.w_s */
+    work->rate_w_s = (work->at_w_w - work->at_w_s) * constant.per_tau_f;
 }
 
 static inline void guards_drive_contact(Work *work)
@@ -130,7 +131,8 @@ static inline void rates_no_contact(const blind_driveline_Self *self, Work *work
 {
     /* blind_driveline equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
-    const double theta_d_minus_theta_b = work->at_theta_d - work->at_theta_b; /* theta_d - theta_b */
+    /* theta_d - theta_b */
+    const double theta_d_minus_theta_b = work->at_theta_d - work->at_theta_b;
     /* blind_driveline equations.w_free */
     const double at_w_free = at_w_d + (constant.k_per_c * theta_d_minus_theta_b);
     /* tanh(w_w * per_w_sm) */
@@ -149,7 +151,8 @@ static inline void rates_no_contact(const blind_driveline_Self *self, Work *work
         - (constant.b_w * work->at_w_w)) * constant.per_J_v;
     work->rate_theta_d = at_w_d; /* blind_driveline flow.theta_d */
     work->rate_theta_b = at_w_b; /* blind_driveline flow.theta_b */
-    work->rate_w_s = (work->at_w_w - work->at_w_s) * constant.per_tau_f; /* blind_driveline flow.w_s */
+    /* blind_driveline flow.w_s */
+    work->rate_w_s = (work->at_w_w - work->at_w_s) * constant.per_tau_f;
 }
 
 static inline void guards_no_contact(Work *work)
@@ -185,7 +188,8 @@ static inline void rates_coast_contact(const blind_driveline_Self *self, Work *w
         - (constant.b_w * work->at_w_w)) * constant.per_J_v;
     work->rate_theta_d = at_w_d; /* blind_driveline flow.theta_d */
     work->rate_theta_b = at_w_b; /* blind_driveline flow.theta_b */
-    work->rate_w_s = (work->at_w_w - work->at_w_s) * constant.per_tau_f; /* blind_driveline flow.w_s */
+    /* blind_driveline flow.w_s */
+    work->rate_w_s = (work->at_w_w - work->at_w_s) * constant.per_tau_f;
 }
 
 static inline void guards_coast_contact(Work *work)
@@ -247,15 +251,14 @@ static inline void step_drive_contact(const blind_driveline_Self *self, Work *wo
     const double k4_w_s = work->rate_w_s;
     const double h_per_6 = work->h / 6.0; /* h / 6 */
     work->end_w_em =
-        self->state.w_em + (h_per_6 * (work->k1_w_em + (2.0 * k2_w_em) + (2.0 * k3_w_em) + k4_w_em));
+        self->state.w_em + (h_per_6 * (work->k1_w_em + (2.0 * k2_w_em) + (2.0 * k3_w_em)
+        + k4_w_em));
     work->end_w_w =
         self->state.w_w + (h_per_6 * (work->k1_w_w + (2.0 * k2_w_w) + (2.0 * k3_w_w) + k4_w_w));
-    work->end_theta_d =
-        self->state.theta_d + (h_per_6 * (work->k1_theta_d + (2.0 * k2_theta_d) + (2.0 * k3_theta_d)
-        + k4_theta_d));
-    work->end_theta_b =
-        self->state.theta_b + (h_per_6 * (work->k1_theta_b + (2.0 * k2_theta_b) + (2.0 * k3_theta_b)
-        + k4_theta_b));
+    work->end_theta_d = self->state.theta_d + (h_per_6 * (work->k1_theta_d + (2.0 * k2_theta_d)
+        + (2.0 * k3_theta_d) + k4_theta_d));
+    work->end_theta_b = self->state.theta_b + (h_per_6 * (work->k1_theta_b + (2.0 * k2_theta_b)
+        + (2.0 * k3_theta_b) + k4_theta_b));
     work->end_w_s =
         self->state.w_s + (h_per_6 * (work->k1_w_s + (2.0 * k2_w_s) + (2.0 * k3_w_s) + k4_w_s));
 }
@@ -344,15 +347,14 @@ static inline void step_no_contact(const blind_driveline_Self *self, Work *work)
     const double k4_w_s = work->rate_w_s;
     const double h_per_6 = work->h / 6.0; /* h / 6 */
     work->end_w_em =
-        self->state.w_em + (h_per_6 * (work->k1_w_em + (2.0 * k2_w_em) + (2.0 * k3_w_em) + k4_w_em));
+        self->state.w_em + (h_per_6 * (work->k1_w_em + (2.0 * k2_w_em) + (2.0 * k3_w_em)
+        + k4_w_em));
     work->end_w_w =
         self->state.w_w + (h_per_6 * (work->k1_w_w + (2.0 * k2_w_w) + (2.0 * k3_w_w) + k4_w_w));
-    work->end_theta_d =
-        self->state.theta_d + (h_per_6 * (work->k1_theta_d + (2.0 * k2_theta_d) + (2.0 * k3_theta_d)
-        + k4_theta_d));
-    work->end_theta_b =
-        self->state.theta_b + (h_per_6 * (work->k1_theta_b + (2.0 * k2_theta_b) + (2.0 * k3_theta_b)
-        + k4_theta_b));
+    work->end_theta_d = self->state.theta_d + (h_per_6 * (work->k1_theta_d + (2.0 * k2_theta_d)
+        + (2.0 * k3_theta_d) + k4_theta_d));
+    work->end_theta_b = self->state.theta_b + (h_per_6 * (work->k1_theta_b + (2.0 * k2_theta_b)
+        + (2.0 * k3_theta_b) + k4_theta_b));
     work->end_w_s =
         self->state.w_s + (h_per_6 * (work->k1_w_s + (2.0 * k2_w_s) + (2.0 * k3_w_s) + k4_w_s));
 }
@@ -441,15 +443,14 @@ static inline void step_coast_contact(const blind_driveline_Self *self, Work *wo
     const double k4_w_s = work->rate_w_s;
     const double h_per_6 = work->h / 6.0; /* h / 6 */
     work->end_w_em =
-        self->state.w_em + (h_per_6 * (work->k1_w_em + (2.0 * k2_w_em) + (2.0 * k3_w_em) + k4_w_em));
+        self->state.w_em + (h_per_6 * (work->k1_w_em + (2.0 * k2_w_em) + (2.0 * k3_w_em)
+        + k4_w_em));
     work->end_w_w =
         self->state.w_w + (h_per_6 * (work->k1_w_w + (2.0 * k2_w_w) + (2.0 * k3_w_w) + k4_w_w));
-    work->end_theta_d =
-        self->state.theta_d + (h_per_6 * (work->k1_theta_d + (2.0 * k2_theta_d) + (2.0 * k3_theta_d)
-        + k4_theta_d));
-    work->end_theta_b =
-        self->state.theta_b + (h_per_6 * (work->k1_theta_b + (2.0 * k2_theta_b) + (2.0 * k3_theta_b)
-        + k4_theta_b));
+    work->end_theta_d = self->state.theta_d + (h_per_6 * (work->k1_theta_d + (2.0 * k2_theta_d)
+        + (2.0 * k3_theta_d) + k4_theta_d));
+    work->end_theta_b = self->state.theta_b + (h_per_6 * (work->k1_theta_b + (2.0 * k2_theta_b)
+        + (2.0 * k3_theta_b) + k4_theta_b));
     work->end_w_s =
         self->state.w_s + (h_per_6 * (work->k1_w_s + (2.0 * k2_w_s) + (2.0 * k3_w_s) + k4_w_s));
 }
@@ -964,7 +965,8 @@ void blind_driveline_Step(blind_driveline_Self *self, const blind_driveline_Cal 
         if (work->left > 0.0) {
             self->faults |= blind_driveline_FAULT_zeno;
         }
-        work->event = work->event || (in->T_em != self->before.T_em) || (in->T_br != self->before.T_br);
+        work->event =
+            work->event || (in->T_em != self->before.T_em) || (in->T_br != self->before.T_br);
         latch(self, in);
     } else {
         latch(self, in);

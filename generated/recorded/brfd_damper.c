@@ -107,7 +107,8 @@ static inline void step_stick(const brfd_damper_Self *self, Work *work)
     work->at_z = self->state.z + (work->h * k3_z);
     rates_stick(self, work);
     const double k4_z = work->rate_z;
-    work->end_z = self->state.z + (work->h / 6.0 * (work->k1_z + (2.0 * k2_z) + (2.0 * k3_z) + k4_z));
+    work->end_z =
+        self->state.z + (work->h / 6.0 * (work->k1_z + (2.0 * k2_z) + (2.0 * k3_z) + k4_z));
 }
 
 static inline void series_stick(const brfd_damper_Self *self, Work *work)
@@ -135,7 +136,8 @@ static inline void step_slip_up(const brfd_damper_Self *self, Work *work)
     work->at_z = self->state.z + (work->h * k3_z);
     rates_slip_up(work);
     const double k4_z = work->rate_z;
-    work->end_z = self->state.z + (work->h / 6.0 * (work->k1_z + (2.0 * k2_z) + (2.0 * k3_z) + k4_z));
+    work->end_z =
+        self->state.z + (work->h / 6.0 * (work->k1_z + (2.0 * k2_z) + (2.0 * k3_z) + k4_z));
 }
 
 static inline void series_slip_up(const brfd_damper_Self *self, Work *work)
@@ -163,7 +165,8 @@ static inline void step_slip_lo(const brfd_damper_Self *self, Work *work)
     work->at_z = self->state.z + (work->h * k3_z);
     rates_slip_lo(work);
     const double k4_z = work->rate_z;
-    work->end_z = self->state.z + (work->h / 6.0 * (work->k1_z + (2.0 * k2_z) + (2.0 * k3_z) + k4_z));
+    work->end_z =
+        self->state.z + (work->h / 6.0 * (work->k1_z + (2.0 * k2_z) + (2.0 * k3_z) + k4_z));
 }
 
 static inline void series_slip_lo(const brfd_damper_Self *self, Work *work)
@@ -178,9 +181,8 @@ static inline void series_slip_lo(const brfd_damper_Self *self, Work *work)
 
 static inline void point(const brfd_damper_Self *self, Work *work)
 {
-    work->at_z =
-        self->state.z + (work->s * ((((work->series_z[2] * work->s) + work->series_z[1]) * work->s)
-        + work->series_z[0]));
+    work->at_z = self->state.z + (work->s * ((((work->series_z[2] * work->s)
+        + work->series_z[1]) * work->s) + work->series_z[0]));
 }
 
 static inline void locate_stick(const brfd_damper_Self *self, Work *work)

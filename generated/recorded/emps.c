@@ -224,8 +224,8 @@ static inline void start(emps_Self *self)
 static inline void equations_always(emps_Self *self)
 {
     /* emps equations.u_dr */
-    self->equation.u_dr =
-        (constant.k_p_k_v * (self->before.q_ref - self->state.q)) - (constant.k_v * self->state.v);
+    self->equation.u_dr = (constant.k_p_k_v * (self->before.q_ref - self->state.q))
+        - (constant.k_v * self->state.v);
     self->equation.F_m = constant.G_f * self->equation.u_dr; /* emps equations.F_m */
 }
 

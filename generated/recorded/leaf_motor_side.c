@@ -221,7 +221,8 @@ static inline void equations_always(leaf_motor_side_Self *self)
     /* leaf_motor_side equations.w_d */
     self->equation.w_d = (self->state.w_em * constant.per_R) - self->before.v_wh_per_r_w;
     /* leaf_motor_side equations.T_hs */
-    self->equation.T_hs = (constant.k_hs * self->state.theta_d) + (constant.c_hs * self->equation.w_d);
+    self->equation.T_hs =
+        (constant.k_hs * self->state.theta_d) + (constant.c_hs * self->equation.w_d);
 }
 
 static inline void equations(leaf_motor_side_Self *self)
@@ -275,7 +276,8 @@ void leaf_motor_side_Step(leaf_motor_side_Self *self, const leaf_motor_side_Cal 
         if (work->left > 0.0) {
             self->faults |= leaf_motor_side_FAULT_zeno;
         }
-        work->event = work->event || (in->T_em != self->before.T_em) || (in->v_wh != self->before.v_wh);
+        work->event =
+            work->event || (in->T_em != self->before.T_em) || (in->v_wh != self->before.v_wh);
         latch(self, in);
     } else {
         latch(self, in);

@@ -117,7 +117,8 @@ static inline void step_always(const leaf_vehicle_Self *self, Work *work)
     const double h_per_6 = work->h / 6.0; /* h / 6 */
     work->end_w_em =
         self->state.w_em + (h_per_6 * (k1_w_em + (2.0 * k2_w_em) + (2.0 * k3_w_em) + k4_w_em));
-    work->end_w_w = self->state.w_w + (h_per_6 * (k1_w_w + (2.0 * k2_w_w) + (2.0 * k3_w_w) + k4_w_w));
+    work->end_w_w =
+        self->state.w_w + (h_per_6 * (k1_w_w + (2.0 * k2_w_w) + (2.0 * k3_w_w) + k4_w_w));
     work->end_theta_d =
         self->state.theta_d + (h_per_6 * (k1_theta_d + (2.0 * k2_theta_d) + (2.0 * k3_theta_d)
         + k4_theta_d));
@@ -243,7 +244,8 @@ static inline void equations_always(leaf_vehicle_Self *self)
     /* leaf_vehicle equations.w_d */
     self->equation.w_d = (self->state.w_em * constant.per_R) - self->state.w_w;
     /* leaf_vehicle equations.T_hs */
-    self->equation.T_hs = (constant.k_hs * self->state.theta_d) + (constant.c_hs * self->equation.w_d);
+    self->equation.T_hs =
+        (constant.k_hs * self->state.theta_d) + (constant.c_hs * self->equation.w_d);
     /* leaf_vehicle equations.T_v */
     self->equation.T_v = (constant.r_w_f0 * ha_tanh(self->state.w_w * constant.per_w_sm))
         + (constant.a_aer_r_w_cubed * self->state.w_w * fabs(self->state.w_w));
