@@ -19,6 +19,7 @@ from codegen.names import REAL, c_member, c_type
 from codegen.rendering import render, version
 from codegen.run_module import module_of, varying
 from codegen.run_places import INSTANCE, Clock, Places, formula_of, row_width
+from codegen.source import page_of
 from language.assembly import Assembly, Course, Feed, ranged, short_input
 from language.continuous import PARTS
 from language.number import NumberType
@@ -131,7 +132,7 @@ def _happenings(assembly: Assembly) -> list[tuple[int, str]]:
 
 def _instance(assembly: Assembly, name: str, program: Program, places: Places) -> dict[str, Any]:
     is_flow = program.period is None
-    varied = {c.name for owner, c in assembly.tunables() if owner == name}
+    varied = {c_member(c.name) for owner, c in assembly.tunables() if owner == name}
     flags = [
         {
             "name": short_input(feed),
@@ -153,11 +154,7 @@ def _instance(assembly: Assembly, name: str, program: Program, places: Places) -
         "feeds": [_fed(feed, program, places) for feed in assembly.feeds[name]],
         "flags": flags,
         "varying": varying(assembly, name, program, places),
-        "fixed_tunables": [
-            f"{c_member(c.name)} = {literal(c.value, program.number)}"
-            for c in program.constants
-            if c.kind == "tunable" and c.name not in varied and not c.items
-        ],
+        "page": [field for field in page_of(program) if field.name not in varied],
     }
 
 

@@ -131,11 +131,16 @@ def _names(program: Program) -> dict[str, Any]:
     }
 
 
+def page_of(program: Program) -> list[Field]:
+    """Return the members of the calibration page, tables among them, with their defaults."""
+    return [_constant(c, program.number) for c in program.constants if c.kind == "tunable"]
+
+
 def _members(program: Program) -> dict[str, Any]:
     """The members of the structures."""
     number, constants, variables = program.number, program.constants, program.variables
     return {
-        "calibration": [_constant(c, number) for c in constants if c.kind == "tunable"],
+        "calibration": page_of(program),
         "derived": [_constant(c, number) for c in constants if c.kind == "derived"],
         "constants": [_constant(c, number) for c in constants if c.name.startswith("constant.")],
         "axes": [_constant(c, number) for c in constants if c.name.startswith("axis.")],

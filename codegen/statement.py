@@ -160,9 +160,7 @@ def wrapped(left: str, text: str, key: str, room: int = WIDTH) -> Iterator[str]:
     )
     joined = "\n".join(pieces).replace("\1", " ")
     first, *rest = joined.split("\n")
-    lines = (
-        [f"{left}{first}"] if len(left) + len(first) < room else [left.rstrip(), INDENT + first]
-    )
+    lines = [f"{left}{first}"] if len(left) + len(first) < room else [left.rstrip(), INDENT + first]
     lines += [INDENT + line for line in rest]
     lines[-1] += ";"
     yield from (line.rstrip() for line in lines)

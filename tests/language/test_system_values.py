@@ -53,6 +53,46 @@ def test_a_derived_parameter_is_not_set(folder: Path) -> None:
     assert found == ["`derived_one` is derived: its value follows from others"]
 
 
+CHARGER = """language: 1
+automaton: charger
+period: 10 ms
+numbers: float64
+parameters:
+  retries: {value: 3, type: int, range: [0, 9]}
+  key: {value: parked, type: enum, values: [parked, ready]}
+  hot: {value: false, type: bool}
+discrete: {count: {type: int, initial: 0, range: [0, 9]}}
+initial: waiting
+modes:
+  waiting: {transitions: {over: {when: count >= retries or key == ready or hot}}}
+  over: {}
+outputs: [mode]
+"""
+
+
+def charger(folder: Path, values: str = "", **given: str) -> System:
+    rig = f"language: 1\nsystem: rig\ninstances: {{chg: {{of: charger, values: {{{values}}}}}}}\n"
+    project = project_of(folder, charger=CHARGER, rig=rig)
+    overrides = {f"chg.{name}": scalar(text, "--set") for name, text in given.items()}
+    return read_system(read_document(project.path_of("rig")), project, overrides)
+
+
+def test_what_is_no_real_has_values_of_its_own(tmp_path: Path) -> None:
+    """They have no unit, so none is taken over."""
+    inside = charger(tmp_path, "retries: 2, key: ready, hot: true")
+    outside = charger(tmp_path, retries="2", key="ready", hot="true")
+    for made in (inside, outside):
+        parameters = made.instances["chg"].automaton.parameters
+        assert [parameters[name].value for name in ("retries", "key", "hot")] == [2, 1, 1]
+    told = refusal(lambda: charger(tmp_path, retries="2 V"))
+    assert [(one.span.source.name, one.label) for one in told] == [
+        (
+            "--set",
+            "`parameters.retries.value` is a whole number from -2147483647 to 2147483647",
+        )
+    ]
+
+
 def test_an_offset_is_a_time(folder: Path) -> None:
     made = rig(folder, JOINED, "p: {of: plant}, f: {of: filter, offset: 2.5 ms}")
     assert made.instances["f"].offset == Fraction(25, 10**4)
