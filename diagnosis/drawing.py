@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import html
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -12,8 +12,12 @@ import numpy as np
 from diagnosis import wording
 from diagnosis.digits import per_cent, significant
 from diagnosis.dossier import Dossier
+from diagnosis.location import acting
 from diagnosis.locus_picture import locus_picture
+from diagnosis.missing_picture import missing_picture
+from diagnosis.place_sentence import PLACES
 from diagnosis.plan_picture import plan_picture
+from diagnosis.scale import unit_of
 from diagnosis.shown import Shown
 from diagnosis.shuffle_picture import shuffle_picture
 from diagnosis.whiteness_picture import whiteness_picture
@@ -51,6 +55,7 @@ def drawings_of(dossier: Dossier, shown: Sequence[Shown]) -> list[Drawing]:
     found.append(_whiteness(shown[0], is_same))
     if any(locus.gain > 0.0 for locus in dossier.verdict.location):
         found.append(_places(dossier))
+        found += _missing(dossier, inputs)
     found += _shuffle(dossier, shown[0])
     if dossier.diagnosis.plan is not None and dossier.diagnosis.plan.tells:
         signals = list(zip(shown[0].window.signals, shown[0].window.units, strict=True))
@@ -106,6 +111,27 @@ def _places(dossier: Dossier) -> Drawing:
     ranked = ", ".join(f"{one.path} {max(one.gain, 0.0):.0f}" for one in loci)
     alternative = f"{caption}, in nats: {ranked}."
     return Drawing("places", f"{caption}.", alternative, locus_picture(loci))
+
+
+def _missing(dossier: Dossier, inputs: Mapping[str, str]) -> list[Drawing]:
+    """Return what the base lacks over time, in the recording in which that is loud for longest."""
+    best = dossier.verdict.location[0]
+    if dossier.diagnosis is None or dossier.verdict.verdict == "nothing_missing":
+        return []
+    if best.free is None or not best.windows:
+        return []
+    bench = dossier.diagnosis.bench
+    names = [one.name for one in bench.series]
+    place = names.index(best.windows[0][2])
+    section, _, name = acting(bench, best.section, best.place).partition(".")
+    unit = unit_of(bench, section, name)
+    what = f"missing {PLACES[section]} {name}"
+    caption = (
+        f"What is {what} over time, before effects are laid: the unknown that would explain what "
+        f"is recorded in {names[place]}, as an observer finds it."
+    )
+    picture = missing_picture(best, bench.series[place], place, what, unit, inputs)
+    return [Drawing("missing", caption, caption, picture)]
 
 
 def embedded(drawing: Drawing, data: bytes) -> str:

@@ -15,9 +15,9 @@ from diagnosis.bench import Bench
 from diagnosis.estimation import Estimate, estimated, with_normal
 from diagnosis.evidence import evidence, inflation
 from diagnosis.freedom import SMALL_LEVEL, freed, with_levels
-from diagnosis.layers import DRIFT, Layer, fitting
+from diagnosis.layers import Layer, fitting
 from diagnosis.level import units_of
-from diagnosis.locus import Locus
+from diagnosis.locus import Locus, drifts_of
 from diagnosis.search import Tell, Tried
 from diagnosis.selection import Selection, counted
 
@@ -52,8 +52,7 @@ def with_hidden(
         return selection
     locus, layer = loud[0], known[loud[0].path]
     assert locus.free is not None, "a locus with a gain was let free"
-    drift = next(one for one in bench.drifts if one.place == locus.place)
-    if not acts_in_windows(locus.free, drift.named(DRIFT)):
+    if not acts_in_windows(locus.free, locus.drift):
         return selection
     quiet, model = freed(bench, selection.base), with_normal(locus.free, bench.series)
     if selection.accepted:
@@ -80,10 +79,7 @@ def _quieted(bench: Bench, model: Estimate) -> Estimate:
 
 def acts_in_windows(model: Estimate, name: str) -> bool:
     """Tell whether a drift is silent most of the time."""
-    place = model.candidate.predictor.states.index(name)
-    squares = np.concatenate(
-        [one.states[: one.done, place] ** 2 for one in model.outcome.predictions]
-    )
+    squares = np.concatenate(drifts_of(model, name)) ** 2
     whole = np.cumsum(np.sort(squares)[::-1])
     loudest = int(np.searchsorted(whole, MOST * whole[-1])) + 1
     return loudest < SHORT * len(squares)

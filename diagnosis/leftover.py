@@ -10,7 +10,9 @@ from diagnosis.rerun import SCENARIO, VARIANT, WINDOW
 from diagnosis.threshold import FORMAT as THRESHOLDS
 from diagnosis.verdict import FORMAT as VERDICT
 
-FIGURES = ("window_train", "window_held_out", "whiteness", "places", "shuffle", "plan")
+FIGURES = (
+    *("window_train", "window_held_out", "missing", "whiteness", "places", "shuffle", "plan"),
+)
 """The figures of a report; which of them are drawn follows from the verdict."""
 
 

@@ -29,7 +29,7 @@ class Locus:
     """One place: `gain` [nats] of its freedom over none; `rms` of its drift [SI], and that as a
     `part` of what acts there; the `windows` (start, end, recording) in which it is loud, its share
     by mode, and what it goes `along` with. At a `named` one stands an effect that was accepted.
-    `free` is the base with this freedom, its parameters fitted beside it.
+    `free` is the base with this freedom - its state `drift` - and its parameters fitted beside it.
     """
 
     section: str
@@ -42,6 +42,7 @@ class Locus:
     part: float = 0.0
     named: bool = False
     free: Estimate | None = dataclasses.field(default=None, repr=False, compare=False)
+    drift: str = ""
 
     @property
     def path(self) -> str:
@@ -51,9 +52,8 @@ class Locus:
 
 def locus_of(bench: Bench, section: str, layer: Layer, free: Estimate) -> Locus:
     """Return what the drift of a layer does at a place where it is free; the gains are not set."""
-    place = free.candidate.predictor.states.index(layer.named(DRIFT))
+    drifts = drifts_of(free, layer.named(DRIFT))
     predictions = free.outcome.predictions
-    drifts = [one.states[: one.done, place] for one in predictions]
     modes = [one.modes[: one.done] for one in predictions]
     size = float(np.sqrt(np.mean(np.concatenate(drifts) ** 2)))
     windows = [
@@ -73,7 +73,14 @@ def locus_of(bench: Bench, section: str, layer: Layer, free: Estimate) -> Locus:
         along(bench, free, drifts),
         part=size / scale if scale > 0.0 else 0.0,
         free=free,
+        drift=layer.named(DRIFT),
     )
+
+
+def drifts_of(free: Estimate, name: str) -> list[Reals]:
+    """Return the drift of a name [SI] in each recording (samples,)."""
+    place = free.candidate.predictor.states.index(name)
+    return [one.states[: one.done, place] for one in free.outcome.predictions]
 
 
 def _windows(values: Reals, size: float, series: Series) -> list[tuple[float, float, str]]:

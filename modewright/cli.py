@@ -39,6 +39,7 @@ from modewright.commands.trace import trace
 from modewright.console import configure
 from modewright.exits import EXIT_CODES, exit_code
 from modewright.files import require_writable
+from modewright.spread import spread
 
 YOUNG_OBJECTS = 100_000
 """New objects after which garbage is looked for: trees of expressions have no circles."""
@@ -85,4 +86,4 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # names of files need not be text
-    sys.exit(exit_code(lambda: app(standalone_mode=False)))
+    sys.exit(exit_code(lambda: app(spread(sys.argv[1:]), standalone_mode=False)))

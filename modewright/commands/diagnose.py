@@ -84,7 +84,7 @@ def diagnose(
     a verdict was written.
 
     \b
-    modewright diagnose blind_driveline --train a.csv --train b.csv --held-out c.csv --out found
+    modewright diagnose blind_driveline --train runs/*.csv --held-out c.csv --out found
     modewright diagnose emps --train run.csv --map my_columns --effects my_effects --out found
     modewright diagnose plant.yaml --train a.csv --train b.csv --thresholds bootstrap --out found
     modewright diagnose plant.yaml --train night.csv --out found --fail-on effect --json

@@ -37,7 +37,7 @@ def fit(
     """Fit parameters within their ranges to recordings; tell what these cannot determine.
 
     \b
-    modewright fit blind_driveline --train a.csv --train b.csv --parameters k,c --out rig_7.yaml
+    modewright fit blind_driveline --train runs/*.csv --parameters k,c --out rig_7.yaml
     modewright fit emps --train run.csv --map my_columns --json
     """
     from language.calibration import DATE
