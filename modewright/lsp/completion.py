@@ -78,15 +78,16 @@ def _marked(
     What is being written is seldom YAML: a colon, or the ends of brackets, may be missing.
     """
     lines = text.splitlines() or [""]
-    lines += [""] * (position.line + 1 - len(lines))
-    line = lines[position.line]
+    lines.append("")
+    at = min(position.line, len(lines) - 1)
+    line = lines[at]
     column = column_of(line, position, encoding)
     start = column - len(re.search(r"[\w$.]*$", line[:column]).group())  # type: ignore[union-attr]
     end = column + len(re.match(r"\w*", line[column:]).group())  # type: ignore[union-attr]
     before, after = line[:start], line[end:]
     closing = _closing(before)
     for tail in (after, f": {after}", closing, f": {closing}"):
-        lines[position.line] = f"{before}{MARK}{tail}"
+        lines[at] = f"{before}{MARK}{tail}"
         whole = "\n".join(lines) + "\n"
         try:
             return document_of(source_of(path, whole), whole), before

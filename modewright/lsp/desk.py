@@ -61,7 +61,7 @@ class Desk:
     def changed(self, uri: str, version: int | None, text: str | None) -> None:
         """Take a new text of a file (None: it is closed); it is checked soon, others after it."""
         world, path = self.world(uri)
-        world.open(path, text)
+        world.open(path, None if text is None else _whole(text))
         if text is None:
             self.opened.pop(path, None)
             self.waiting.pop(path, None)
@@ -113,6 +113,11 @@ class Desk:
                     self.proofs[path] = Proven(lines_of(world.texts[path]), more)
                     self.publish(uri, version, found)
             self.unproven.pop(path, None)
+
+
+def _whole(text: str) -> str:
+    """Return a text with a sign in place of each half of a character, which no file can hold."""
+    return text.encode("utf-16", "surrogatepass").decode("utf-16", "replace")
 
 
 def _has_no_error(found: list[types.Diagnostic]) -> bool:

@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+from language.model import CHART
 from language.problem import Span
+from modewright.lsp.mode_name import Meaning, Part, mode_parts, parts_of
 from modewright.lsp.name import Name
-from modewright.lsp.namespace import Declared, Namespace, column_name, lookup, namespace
+from modewright.lsp.namespace import Declared, Namespace, column_name, mode_path, namespace
 from modewright.lsp.world import World
 
 PREFIXES = ("initial", "inputs")
 """What stands before names in studies: `initial.plant.theta_d`, `inputs.T_req.start`."""
-OWN = ("template", "fault", "region")
+OWN = ("template", "fault")
 """What is named inside one spec only; an event of a study is a mode that is entered."""
 OF_INSTANCE = (("values",), ("inputs",))
 """Sections of an instance whose keys are its names, not ours."""
 SPECS = ("automaton", "system", "scenario", "map", "calibration", "spec", "effect")
-
-Part = tuple[int, str]
-"""A part of a dotted name: where it begins, and its text."""
-Meaning = Iterator[tuple[Part, Declared | None]]
 
 
 @dataclass(frozen=True)
@@ -74,22 +72,18 @@ def meaning(world: World, space: Namespace, name: Name) -> Meaning:
     whole = (0, name.text)
     if name.of in SPECS:
         yield whole, _spec(world, space, name)
+    elif name.of in ("mode", "region") and name.path[-2:-1] in (("modes",), ("regions",)):
+        yield whole, _of_key(space, name)
     elif name.of == "mode" and name.owner is not None:
-        yield whole, _mode_of_owner(space, name)
+        yield from _mode_of_owner(space, name)
     elif name.of == "mode":
-        is_key = name.path[-2:-1] == ("modes",) or name.path[-2:-1] == ("transitions",)
-        last = name.text.rpartition(".")[2]
-        part = (len(name.text) - len(last), last)
-        if is_key and name.path[-2] == "modes":
-            yield part, lookup(space, name.text, name.path[:-2])
-        else:
-            yield part, lookup(space, name.text, name.path[:-1])
+        yield from mode_parts(space, parts_of(name.text), name.path)
     elif name.of == "column":
         yield whole, space.names.get(("column", column_name(name.path, name.text)))
     elif name.of in OWN or (name.of == "event" and (name.of, name.text) in space.names):
         yield whole, space.names.get((name.of, name.text))
     else:
-        parts = _parts(name.text)
+        parts = parts_of(name.text)
         if name.of == "model_mode":
             yield from _of_model(space, parts)
             return
@@ -99,15 +93,7 @@ def meaning(world: World, space: Namespace, name: Name) -> Meaning:
             space = space.instances.get(name.path[1], space)
         if space.document.kind == "study" and parts[0][1] in PREFIXES:
             parts = parts[1:]
-        yield from _value(space, parts, name.path)
-
-
-def _parts(text: str) -> list[Part]:
-    found, offset = [], 0
-    for part in text.split("."):
-        found.append((offset, part))
-        offset += len(part) + 1
-    return found
+        yield from _value(space, parts, name)
 
 
 def _spec(world: World, space: Namespace, name: Name) -> Declared | None:
@@ -120,41 +106,45 @@ def _spec(world: World, space: Namespace, name: Name) -> Declared | None:
     return Declared(path, "spec", name.text, document.kind, document.name_span, document)
 
 
-def _value(space: Namespace, parts: Sequence[Part], path: tuple[str, ...]) -> Meaning:
+def _of_key(space: Namespace, name: Name) -> Declared | None:
+    """Return the mode or region that a key declares."""
+    inner = mode_path(name.path) if name.path[-2:] != ("regions", CHART) else CHART
+    return space.names.get((name.of, inner))
+
+
+def _value(space: Namespace, parts: Sequence[Part], name: Name) -> Meaning:
+    """Yield what a name in an expression stands for; inside `in(...)` it is a mode."""
     if not parts:
         return
     head, *rest = parts
-    declared = space.names.get(("value", head[1]))
+    declared = space.names.get(("value", head[1])) if name.of != "asked_mode" or rest else None
     if head[1] in space.instances and rest:
         yield head, declared
-        yield from _value(space.instances[head[1]], rest, ())
-    elif declared:
-        yield head, declared
+        yield from _value(space.instances[head[1]], rest, replace(name, path=()))
     elif space.model and rest and head[1] == space.model.document.name:
         yield from _of_model(space, parts)
+    elif declared and not rest:
+        yield head, declared
     else:
-        yield from _mode(space, parts, path)
+        found = list(mode_parts(space, parts, name.path))
+        event = None if rest or found else space.names.get(("event", head[1]))
+        yield from found or [(head, event or declared)]
 
 
-def _mode(space: Namespace, parts: Sequence[Part], path: tuple[str, ...]) -> Meaning:
-    """A mode by its path, behind the name of a region perhaps."""
-    if len(parts) > 1:
-        yield parts[0], space.names.get(("region", parts[0][1]))
-    yield parts[-1], lookup(space, ".".join(text for _, text in parts), path)
-
-
-def _mode_of_owner(space: Namespace, name: Name) -> Declared | None:
-    """Return the mode of an instance, or of a region of one."""
+def _mode_of_owner(space: Namespace, name: Name) -> Meaning:
+    """Yield what a mode of an instance stands for, or of a region of one."""
     head, _, region = (name.owner or "").partition(".")
     if head in space.instances:
         space = space.instances[head]
     else:
-        region = head
-    return lookup(space, f"{region}.{name.text}" if region else name.text)
+        region = ".".join(filter(None, (head, region)))
+    before = parts_of(region) if region else []
+    found = list(mode_parts(space, [*before, *parts_of(name.text)]))
+    yield from found[len(before) :]
 
 
 def _of_model(space: Namespace, parts: Sequence[Part]) -> Meaning:
     model = space.model
     if model and len(parts) > 1 and parts[0][1] == model.document.name:
         yield parts[0], model.names.get(("spec", parts[0][1]))
-        yield from _mode(model, parts[1:], ())
+        yield from mode_parts(model, parts[1:])

@@ -8,11 +8,14 @@ from dataclasses import dataclass
 from language.document import Document, Entry, Items, Scalar, Table
 from language.parse import parse_balance, parse_expression
 from language.problem import Span, SpecError
-from language.syntax import Name as Read, Relation, walk
+from language.syntax import Application, Name as Read, Relation, walk
 from modewright.editing.guide import Place, places
 from modewright.editing.shape import MappingOf, Part, Value
 
-FREE = ("points", "rows", "columns", "redirect", "steps", "table", "pages", "windows")
+FREE = (
+    *("points", "rows", "columns", "redirect", "steps", "table", "pages", "windows"),
+    *("if", "invariant", "expect"),
+)
 """Sections whose keys are no names of the spec."""
 
 
@@ -78,6 +81,9 @@ def _in_key(place: Place, entry: Entry) -> Iterator[Name]:
         effect, _, at = entry.key.partition("@")
         yield Name(effect, entry.span.inside(0, len(effect)), path, "effect")
         yield Name(at, entry.span.inside(len(effect) + 1, len(at)), path)
+    elif place.path[:1] == ("tables",):
+        if len(place.path) == len(("tables", "a name", "rows", "a row")):
+            yield Name(entry.key, entry.span, path, is_key=True)
     elif not any(key in FREE for key in place.path):
         yield Name(entry.key, entry.span, path, is_key=True)
 
@@ -85,32 +91,42 @@ def _in_key(place: Place, entry: Entry) -> Iterator[Name]:
 def _in_scalar(place: Place, scalar: Scalar) -> Iterator[Name]:
     match place.kind:
         case Value("name", "event"):
-            offset = 0
-            for part in scalar.text.split("->"):
-                text = part.strip()
-                start = scalar.text.index(text, offset)
-                offset = start + len(text)
-                yield Name(text, scalar.text_span.inside(start, len(text)), place.path, "event")
+            yield from _events(place, scalar)
+        case Value("expression", _) if "->" in scalar.text:
+            yield from _events(place, scalar)
         case Value("name", of) if of:
             yield Name(scalar.text, scalar.text_span, place.path, of)
         case Value(("expression" | "balance" | "literal") as word, _):
             yield from _in_expression(place, scalar, word)
 
 
+def _events(place: Place, scalar: Scalar) -> Iterator[Name]:
+    """An event, or a transition from one mode to another."""
+    offset = 0
+    for part in scalar.text.split("->"):
+        text = part.strip()
+        start = scalar.text.index(text, offset)
+        offset = start + len(text)
+        yield Name(text, scalar.text_span.inside(start, len(text)), place.path, "event")
+
+
 def _in_expression(place: Place, scalar: Scalar, word: str) -> Iterator[Name]:
-    """What stands beside `est.mode ==` is a mode of `est`."""
+    """What stands beside `est.mode ==` is a mode of `est`, what `in(...)` asks for is a mode."""
     try:
         trees = parse_balance(scalar) if word == "balance" else (parse_expression(scalar),)
     except SpecError:
         return
     parts = [part for tree in trees for part in walk(tree)]
     owners: dict[Span, str] = {}
+    asked: set[Span] = set()
     for part in parts:
         match part:
             case Relation(_, Read(path, _), Read(_, span), _) if path.split(".")[-1] == "mode":
                 owners[span] = path.removesuffix("mode").removesuffix(".")
+            case Application("in", arguments):
+                asked.update(each.span for each in arguments)
     for part in parts:
         if isinstance(part, Read):
             owner = owners.get(part.span)
-            of = "value" if owner is None else "mode"
+            of = "asked_mode" if part.span in asked else "value" if owner is None else "mode"
             yield Name(part.path, part.span, place.path, of, owner=owner)

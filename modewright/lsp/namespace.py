@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -42,7 +42,7 @@ class Declared:
     """Something that has a name: where it is declared and what as.
 
     `group` is `value`, `mode`, `region`, `template`, `fault`, `event`, `column` or `spec`;
-    a mode has its path as its name.
+    a mode and a region have their path as their name.
     """
 
     file: Path
@@ -167,9 +167,15 @@ def _one(file: Path, path: tuple[str, ...], entry: Entry) -> Declared | None:
         return Declared(file, "column", name, "column of a table", entry.span, entry.node)
     if section in OTHERS:
         word = OTHERS[section]
-        name = mode_path((*path, entry.key)) if word == "mode" else entry.key
+        name = _name(word, path, entry.key)
         return Declared(file, word, name, word, entry.span, entry.node)
     return None
+
+
+def _name(word: str, path: tuple[str, ...], key: str) -> str:
+    if word == "mode" or (word == "region" and key != CHART):
+        return mode_path((*path, key))
+    return key
 
 
 def mode_path(path: tuple[str, ...]) -> str:
@@ -189,15 +195,3 @@ def mode_path(path: tuple[str, ...]) -> str:
 def column_name(path: tuple[str, ...], key: str) -> str:
     """Return the name of a column with the place of its table: others may have one like it."""
     return f"{mode_path(path)}.{key}"
-
-
-def lookup(space: Namespace, name: str, path: tuple[str, ...] = ()) -> Declared | None:
-    """Return the mode of a name, looked up from a place outwards."""
-    scope = mode_path(path).split(".") if path else []
-    modes: Mapping[tuple[str, str], Declared] = space.names
-    name = name.removeprefix(f"{CHART}.")
-    while True:
-        found = modes.get(("mode", ".".join((*scope, name))))
-        if found or not scope:
-            return found
-        scope.pop()

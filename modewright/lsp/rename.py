@@ -6,6 +6,7 @@ from pathlib import Path
 
 from lsprotocol import types
 
+from language.model import CHART
 from language.names import check_name
 from language.problem import Problems
 from language.project import shown
@@ -13,11 +14,8 @@ from modewright.lsp.hover import mention_at
 from modewright.lsp.mention import Mention, mentions, mentions_of
 from modewright.lsp.namespace import namespace
 from modewright.lsp.positions import range_of, uri_of, written_at
+from modewright.lsp.renamed import RenameRefused, renamed, require_same_meaning
 from modewright.lsp.world import World
-
-
-class RenameRefused(Exception):
-    """A name cannot be given; the message says why."""
 
 
 def definition(world: World, path: Path, position: types.Position) -> list[types.Location]:
@@ -46,15 +44,19 @@ def rename(world: World, path: Path, position: types.Position, name: str) -> typ
     if mention is None:
         raise RenameRefused("there is nothing here that has a name")
     _check(world, mention, name)
+    declared = mention.declared
+    last = declared.name.rpartition(".")[2]
+    if not last:
+        raise RenameRefused("what stands inside a template is not followed")
+    spans = list(dict.fromkeys(each.span for each in mentions_of(world, declared)))
+    for span in spans:
+        if written_at(span) != last:
+            raise RenameRefused(f"{span}: the name is written over several lines")
+    require_same_meaning(world, declared, spans, name)
     changes: dict[str, list[types.TextEdit]] = {}
-    last = mention.declared.name.rpartition(".")[2]
-    for each in mentions_of(world, mention.declared):
-        if written_at(each.span) != last:
-            raise RenameRefused(f"{each.span}: the name is written over several lines")
-        uri = uri_of(Path(each.span.source.name))
-        edit = types.TextEdit(range_of(each.span, world.encoding), name)
-        if edit not in changes.setdefault(uri, []):
-            changes[uri].append(edit)
+    for span in spans:
+        edit = types.TextEdit(range_of(span, world.encoding), name)
+        changes.setdefault(uri_of(Path(span.source.name)), []).append(edit)
     return types.WorkspaceEdit(changes=changes)
 
 
@@ -66,8 +68,9 @@ def _check(world: World, mention: Mention, name: str) -> None:
         raise RenameRefused(problems.found[0].label)
     if not world.is_ours(declared.file):
         raise RenameRefused(f"`{declared.name}` is declared in {shown(declared.file)}, not here")
-    outer = declared.name.rpartition(".")[0]
-    new = f"{outer}.{name}" if outer else name
+    if (declared.group, declared.name) == ("region", CHART):
+        raise RenameRefused(f"`{CHART}` is a word of the language: the region that `mode` tells of")
+    new = renamed(declared.name, name)
     files = {Path(each.span.source.name).resolve() for each in mentions_of(world, declared)}
     for file in sorted(files):
         space = namespace(world, file)

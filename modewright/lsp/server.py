@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from importlib.metadata import version
 
 from lsprotocol import types
@@ -14,7 +15,8 @@ from modewright.lsp.completion import complete
 from modewright.lsp.desk import Desk
 from modewright.lsp.hover import hover, mention_at
 from modewright.lsp.positions import range_of
-from modewright.lsp.rename import RenameRefused, definition, references, rename
+from modewright.lsp.rename import definition, references, rename
+from modewright.lsp.renamed import RenameRefused
 from modewright.lsp.repair import repairs
 
 TRIGGERS = [" ", ".", "{", ","]
@@ -23,6 +25,7 @@ TRIGGERS = [" ", ".", "{", ","]
 
 def language_server() -> LanguageServer:
     """Return a server that knows no text yet."""
+    logging.getLogger("pygls.protocol.json_rpc").addFilter(_is_unforeseen)
     server = LanguageServer("modewright", version("modewright"))
 
     def publish(uri: str, number: int | None, found: list[types.Diagnostic]) -> None:
@@ -34,6 +37,12 @@ def language_server() -> LanguageServer:
     _answer_while_writing(server, desk)
     _answer_about_names(server, desk)
     return server
+
+
+def _is_unforeseen(record: logging.LogRecord) -> bool:
+    """Tell whether a record is of more than an answer that refuses."""
+    kind = record.exc_info[0] if record.exc_info else None
+    return kind is None or not issubclass(kind, JsonRpcInvalidParams)
 
 
 def _answer_changes(server: LanguageServer, desk: Desk) -> None:

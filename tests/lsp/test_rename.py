@@ -5,8 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from lsprotocol import types
 
 import modewright as mw
+from modewright.lsp.mention import Mention, mentions_of
+from modewright.lsp.namespace import Declared
+from modewright.lsp.rename import rename
+from modewright.lsp.renamed import RenameRefused
+from modewright.lsp.world import World
 from tests.lsp.heating import applied, where
 from tests.lsp.talk import Talk
 
@@ -146,3 +152,112 @@ def test_a_mode_inside_a_mode_is_found_and_renamed(talk: Talk, tmp_path: Path) -
     (edits,) = talk.ask("textDocument/rename", asked)["changes"].values()
     renamed = applied(NESTED, edits)
     assert renamed == NESTED.replace("slow", "low").replace("low: {to: busy", "slow: {to: busy")
+
+
+DEEP = """\
+language: 1
+automaton: deep
+period: 10 ms
+numbers: float64
+micro_steps: 3
+inputs: {u: {unit: 1, range: [0, 9]}}
+discrete: {x: {unit: 1, initial: 0, range: [0, 9]}}
+events: {go: {from: input}}
+tables: {tab: {if: {c: u > 1}, rows: {"T": {x: 1}, "F": {x: 0}}}}
+initial: a
+modes:
+  a: {transitions: {s: {event: go, priority: 1}, l2: {to: par.l.q, when: in(par.l.q), priority: 2}}}
+  s:
+    initial: p
+    modes: {p: {transitions: {q: {when: u > 3}}}, q: {}}
+    transitions: {a: {when: in(s.q), wait: 20 ms}}
+  par: {regions: {l: {initial: p, modes: {p: {}, q: {}}}, r: {initial: p, modes: {p: {}}}}}
+transition_table:
+  columns: {lo: {when: u < 2, priority: 3}, hi: {when: u > 5, priority: 4}}
+  rows: {a: {lo: s.q, hi: par.l.q}, s: {lo: stay, hi: stay}, par: {lo: a, hi: stay}}
+outputs: [mode, x]
+"""
+AROUND = """\
+language: 1
+system: around
+inputs: {go: {type: bool}}
+instances: {d: {of: deep}}
+connections: {d.u: 2, d.go: go}
+"""
+SEEN = """\
+language: 1
+test: seen
+scenario: {of: around, horizon: 1 s, inputs: {go: "false"}}
+expect:
+  s: {never: in(d.par.l.q) or in(d.s.q)}
+  t: {event: d.s.q, count: 0}
+  u: {never: d.mode == s.q}
+  v: {modes: [a, s.p], of: d}
+"""
+
+
+@pytest.fixture
+def deep(talk: Talk, tmp_path: Path) -> Path:
+    path = tmp_path / "spec" / "deep.yaml"
+    path.parent.mkdir()
+    for name, text in (("around", AROUND), ("seen", SEEN), ("deep", DEEP)):
+        path.with_name(f"{name}.yaml").write_text(text)
+    assert [each for each in talk.open(path, DEEP) if each["severity"] == 1] == []
+    return path
+
+
+@pytest.mark.parametrize(
+    ("part", "inside", "old", "lines"),
+    [
+        ("  s:\n", 2, "s", {"deep": [12, 13, 16, 20, 20], "seen": [5, 6, 7, 8]}),
+        ("  par: {", 2, "par", {"deep": [12, 12, 17, 20, 20], "seen": [5]}),
+        ("{l: {initial", 1, "l", {"deep": [12, 12, 17, 20], "seen": [5]}),
+        ("{x: {unit", 1, "x", {"deep": [7, 9, 9, 21]}),
+        ("{go: {from", 1, "go", {"deep": [8, 12], "around": [5]}),
+    ],
+)
+def test_what_has_something_inside_is_renamed_in_paths_tables_systems_and_tests(
+    talk: Talk, deep: Path, part: str, inside: int, old: str, lines: dict[str, list[int]]
+) -> None:
+    asked = {**talk.at(deep, *where(DEEP, part, inside)), "newName": "zz"}
+    changes = talk.ask("textDocument/rename", asked)["changes"]
+    found = {
+        Path(uri).stem: sorted(each["range"]["start"]["line"] + 1 for each in edits)
+        for uri, edits in changes.items()
+    }
+    assert found == lines
+    for uri, edits in changes.items():
+        file = deep.with_name(Path(uri).name)
+        file.write_text(applied(file.read_text(), edits))
+    for file in deep.parent.glob("*.yaml"):
+        errors = [p for p in mw.check(str(file), deep.parent.parent) if p.severity == "error"]
+        assert errors == [], mw.render_all(errors)
+
+
+@pytest.mark.parametrize(
+    ("part", "name", "reason"),
+    [
+        ("s:\n    initial", "par", "is a name already"),
+        ("l: {initial", "chart", "would mean something else"),
+        ("x: {unit", "go", "would mean something else"),
+    ],
+)
+def test_a_rename_that_changes_a_meaning_is_refused(
+    talk: Talk, deep: Path, part: str, name: str, reason: str
+) -> None:
+    asked = {**talk.at(deep, *where(DEEP, part)), "newName": name}
+    assert reason in talk.answer("textDocument/rename", asked)["error"]["message"]
+
+
+def test_a_rename_that_leaves_an_old_name_behind_is_refused(
+    deep: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def without_tables(world: World, declared: Declared) -> list[Mention]:
+        return [each for each in mentions_of(world, declared) if each.path[0] != "tables"]
+
+    monkeypatch.setattr("modewright.lsp.rename.mentions_of", without_tables)
+    monkeypatch.setattr("modewright.lsp.renamed.mentions_of", without_tables)
+    line, column = where(DEEP, "x: {unit")
+    world = World(deep.parent.parent)
+    with pytest.raises(RenameRefused, match=r"not followed: .*deep.yaml:9:"):
+        rename(world, deep, types.Position(line - 1, column), "zz")

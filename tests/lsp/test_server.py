@@ -184,3 +184,25 @@ def test_no_text_makes_the_server_fail(seed: int) -> None:
         hover_at(world, path, position)
         definition(world, path, position)
         world.open(path, None)
+
+
+def test_places_that_no_text_has_are_taken_for_its_end(talk: Talk, heater: Path) -> None:
+    for line, character in ((2**31 - 1, 0), (3, 2**31 - 1), (2**31 - 1, 2**31 - 1)):
+        place = talk.at(heater, line + 1, character)
+        for question in ("completion", "hover", "definition", "prepareRename"):
+            talk.ask(f"textDocument/{question}", place)
+
+
+def test_half_a_character_is_no_end_of_the_server(talk: Talk, heater: Path) -> None:
+    talk.begin_change(heater, HEATER.replace("this it", "\ud800   it") + "\n\n")
+    layout = {"tabSize": 2, "insertSpaces": True}
+    asked = {"textDocument": {"uri": heater.as_uri()}, "options": layout}
+    (edit,) = talk.ask("textDocument/formatting", asked)
+    assert "\ufffd   it" in edit["newText"]
+
+
+def test_a_refused_rename_is_no_failure_of_the_server(capfd: pytest.CaptureFixture[str]) -> None:
+    with Talk() as talk:
+        asked = {**talk.at(ROOT / "spec" / "absent.yaml", 1, 0), "newName": "b"}
+        assert "nothing here" in talk.answer("textDocument/rename", asked)["error"]["message"]
+    assert "Traceback" not in capfd.readouterr().err
