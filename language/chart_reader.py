@@ -11,9 +11,8 @@ from language.chart import ROOT, Chart, Keeping, Kind, Node, Order, Signal
 from language.chart_initial import RawNode, set_initials
 from language.chart_way import ways_of
 from language.document import Entry, Items, Node as YamlNode, Table
-from language.mode import INNER_KEYS, REGION_KEYS, ModeReader, check_numbers
+from language.mode import ALWAYS, INNER_KEYS, REGION_KEYS, ModeReader, check_numbers
 from language.model import CHART, Mode, Region
-from language.names import check_region_name
 from language.problem import Span
 from language.reader import TEXT_KEYS
 from language.site import Site
@@ -86,12 +85,13 @@ class ChartReader:
     def _read_tree(self, at: Span) -> None:
         """Read all nodes below a root, in the order of their numbers, and what is initial."""
         self.raw.append(RawNode("", "", "parallel", NOWHERE, "", False, at, Table({}, at)))
-        entries = list(self.modes.table(self.root.get("regions"), "regions"))
-        for entry in entries:
-            check_region_name(entry.key, entry.span, self.problems)
-        if "modes" in self.root.entries:
-            kept = {k: e for k, e in self.root.entries.items() if k in ("modes", "initial")}
-            self._region(Entry(CHART, at, Table(kept, at)), ROOT, "")
+        entries = self.modes.root_regions()
+        own = {k: e for k, e in self.root.entries.items() if k in ("modes", "initial")}
+        if entries and "modes" not in own:
+            always = Table({ALWAYS: Entry(ALWAYS, at, Table({}, at))}, at)
+            own["modes"] = Entry("modes", at, always)
+        if "modes" in own and all(entry.key != CHART for entry in entries):
+            self._region(Entry(CHART, at, Table(own, at)), ROOT, "")
         entries.sort(key=lambda entry: entry.key != CHART)
         for entry in entries:
             self._region(entry, ROOT, "")

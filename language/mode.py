@@ -41,22 +41,28 @@ class ModeReader(Reader):
 
     def regions(self, at: Span) -> tuple[Region, ...]:
         """Return the chart and the regions beside it; one mode `always` where none is written."""
-        entries = list(self.table(self.root.get("regions"), "regions"))
-        for entry in entries:
-            check_region_name(entry.key, entry.span, self.problems)
+        entries = self.root_regions()
         chart = next((entry for entry in entries if entry.key == CHART), None)
         beside = tuple(self._region(entry) for entry in entries if entry is not chart)
         if chart is not None:
-            for key in ("modes", "initial"):
-                if key in self.root.entries:
-                    label = f"`{key}` stands at the root and in region `{CHART}`"
-                    self.problems.error("duplicate", self.root.entries[key].span, label)
             return (self._region(chart), *beside)
         modes = self._modes(self.root.get("modes"), CHART)
         if not modes:
             always = Entry(ALWAYS, at, Table({}, at))
             modes = {ALWAYS: self.mode(always, Site(f"modes.{ALWAYS}", CHART, 0))}
         return (Region(CHART, modes, self._initial(self.root, modes, at), at), *beside)
+
+    def root_regions(self) -> list[Entry]:
+        """Return the regions at the root; the modes of one called `chart` stand nowhere else."""
+        entries = list(self.table(self.root.get("regions"), "regions"))
+        for entry in entries:
+            check_region_name(entry.key, entry.span, self.problems)
+        if any(entry.key == CHART for entry in entries):
+            for key in ("modes", "initial"):
+                if key in self.root.entries:
+                    label = f"`{key}` stands at the root and in region `{CHART}`"
+                    self.problems.error("duplicate", self.root.entries[key].span, label)
+        return entries
 
     def _region(self, entry: Entry) -> Region:
         table = self.table(entry.node, f"regions.{entry.key}", REGION_KEYS)

@@ -104,7 +104,7 @@ def _sort(automaton: Automaton, name: str) -> tuple[ValueType, str, tuple[str, .
 
 
 def output_wires(automaton: Automaton) -> tuple[Wire, ...]:
-    """Return the outputs in the order of the file."""
+    """Return the outputs in the order of the file; `mode` brings the regions not named there."""
     found = []
     for output in automaton.outputs:
         name = automaton.source_of(output)
@@ -115,7 +115,8 @@ def output_wires(automaton: Automaton) -> tuple[Wire, ...]:
             for region in automaton.all_regions:
                 variable = mode_variable("memory.mode", region.name)
                 wire = output if region.name == CHART else region.name.replace(".", "_")
-                found.append(Wire(wire, variable, "whole", "1"))
+                if wire == output or wire not in automaton.outputs:
+                    found.append(Wire(wire, variable, "whole", "1"))
             continue
         if name in (region.name for region in automaton.all_regions):
             found.append(Wire(output, mode_variable("memory.mode", name), "whole", "1"))
