@@ -1,13 +1,20 @@
-"""Check of domains: a divisor that may be 0, a square root of what may be below 0."""
+"""Check of domains: a divisor that may be 0, a square root of what may be below 0.
+
+Intervals decide most; where they cannot, the solver is asked, with the conditions around the place.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 
 from language.balance import coefficient_of
+from language.inquiry import Inquiry
 from language.interval import ANYTHING, Interval, Ranging
 from language.memory import actions
 from language.model import CHART, Automaton, Mode
+from language.moment import Moment
+from language.operation import Compare, Unary, real
 from language.order import equation_order
 from language.parameter import parameter_order
 from language.problem import Problems, SpecError
@@ -121,8 +128,22 @@ class _ModeDomains:
     def _report(self, what: str, tree: Tree, interval: Interval) -> None:
         if not interval.known:
             return
+        if self._is_excluded(what, tree):
+            return
         span = f"{interval.low:.4g} to {interval.high:.4g}"
         label = f"this divisor may be 0: it lies from {span}"
         if what == "root":
             label = f"this may be below 0, which has no square root: it lies from {span}"
         self.problems.error("domain", tree.span, label, HELP[what])
+
+    def _is_excluded(self, what: str, tree: Tree) -> bool:
+        """Tell whether what is around a place excludes what is outside of the domain there."""
+        with suppress(KeyError, SpecError):
+            moment = Moment(self.automaton, self.mode)
+            around = [(moment.expression(part), holds) for part, holds in self.ranging.path]
+            conditions = [part if holds else Unary("not", part) for part, holds in around]
+            value = moment.expression(tree)
+            conditions.append(Compare("==" if what == "divisor" else "<", value, real(0)))
+            inquiry = Inquiry(self.automaton)
+            return inquiry.never(inquiry.question(moment.story, conditions))
+        return False

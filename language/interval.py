@@ -34,29 +34,35 @@ MIRRORED = {"<": ">", "<=": ">=", ">": "<", ">=": "<="}
 
 @dataclass(frozen=True)
 class Interval:
-    """All values from `low` to `high`; `known` if they follow from declared ranges alone."""
+    """All values from `low` to `high`; `known` if they follow from declared ranges alone.
+
+    One that is `broken` does not hold 0, though it may lie on both sides of it.
+    """
 
     low: float = -math.inf
     high: float = math.inf
     known: bool = False
+    broken: bool = False
 
     @property
     def meets_zero(self) -> bool:
         """Tell whether 0 is among the values."""
-        return self.low <= 0.0 <= self.high
+        return self.low <= 0.0 <= self.high and not self.broken
 
     def within(self, other: Interval) -> Interval:
         """Return the part that lies in another one too."""
-        return Interval(max(self.low, other.low), min(self.high, other.high), self.known)
+        broken = self.broken or other.broken
+        return Interval(max(self.low, other.low), min(self.high, other.high), self.known, broken)
 
     def joined(self, other: Interval) -> Interval:
         """Return what holds the values of both."""
         known = self.known and other.known
-        return Interval(min(self.low, other.low), max(self.high, other.high), known)
+        broken = not (self.meets_zero or other.meets_zero)
+        return Interval(min(self.low, other.low), max(self.high, other.high), known, broken)
 
 
 ANYTHING = Interval()
-Limits = Mapping[object, Interval]
+Limits = Mapping[int, Interval]
 """What enclosing conditions say of expressions, by the number of what is written alike."""
 NO_LIMITS: Limits = {}
 Look = Callable[[str], Interval]
@@ -67,6 +73,7 @@ class Ranging:
     """Finds intervals; `look` gives those of names, `report` takes divisors and roots.
 
     A quiet one has no `report`: what conditions say is not looked into, only what they exclude.
+    While it reports, `path` holds the conditions around a place and whether they hold there.
     """
 
     def __init__(
@@ -79,11 +86,15 @@ class Ranging:
         self.report = report
         self.quiet = Ranging(look, table, likeness) if report else self
         self.bounds: dict[tuple[int, int], tuple[Limits, Interval]] = {}
+        self.path: list[tuple[Tree, bool]] = []
 
     def expression(self, tree: Tree) -> Interval:
         """Return the interval of an expression, reporting what is outside a domain inside it."""
         self.quiet.bounds.clear()
-        return self.of(tree, NO_LIMITS)
+        before, self.path = self.path, []
+        found = self.of(tree, NO_LIMITS)
+        self.path = before
+        return found
 
     def of(self, tree: Tree, limits: Limits) -> Interval:
         """Return the interval of a part of an expression within the limits that hold there."""
@@ -104,22 +115,26 @@ class Ranging:
                 return self.look(path)
             case Negative(operand, _):
                 inner = self.of(operand, limits)
-                return Interval(-inner.high, -inner.low, inner.known)
+                return Interval(-inner.high, -inner.low, inner.known, inner.broken)
             case Arithmetic():
                 return self._arithmetic(tree, limits)
             case Power(base, exponent, _):
-                inner = self.of(base, limits)
-                if exponent < 0 and inner.meets_zero and self._excluded(base, limits):
-                    return ANYTHING
-                return self._power(tree, inner, exponent)
+                return self._power(tree, self.of(base, limits), exponent)
             case Choice(condition, then, other, _):
                 if self.report:
                     self.of(condition, limits)
-                held = self.of(then, self._limited(condition, True, limits))
-                return held.joined(self.of(other, self._limited(condition, False, limits)))
+                held = self._where(condition, True, then, limits)
+                return held.joined(self._where(condition, False, other, limits))
             case Application():
                 return self._application(tree, limits)
         return ANYTHING
+
+    def _where(self, condition: Tree, holds: bool, tree: Tree, limits: Limits) -> Interval:
+        """Return the interval of an alternative of a choice."""
+        self.path.append((condition, holds))
+        found = self.of(tree, self._limited(condition, holds, limits))
+        self.path.pop()
+        return found
 
     def _arithmetic(self, tree: Arithmetic, limits: Limits) -> Interval:
         left, right = self.of(tree.left, limits), self.of(tree.right, limits)
@@ -133,16 +148,16 @@ class Ranging:
                 if alike(tree.left, tree.right):
                     return _even(left, 2)
                 return _corners(left, right, lambda a, b: a * b)
-        if right.meets_zero:
-            if self.report and not self._excluded(tree.right, limits):
-                self.report("divisor", tree.right, right)
+        if right.meets_zero and self.report:
+            self.report("divisor", tree.right, right)
+        if right.low <= 0.0 <= right.high:
             return ANYTHING
         return _corners(left, right, lambda a, b: a / b)
 
     def _power(self, tree: Power, base: Interval, exponent: int) -> Interval:
-        if exponent < 0 and base.meets_zero:
-            if self.report:
-                self.report("divisor", tree.base, base)
+        if exponent < 0 and base.meets_zero and self.report:
+            self.report("divisor", tree.base, base)
+        if exponent < 0 and base.low <= 0.0 <= base.high:
             return ANYTHING
         if exponent < 0:
             whole = self._power(tree, base, -exponent)
@@ -172,11 +187,19 @@ class Ranging:
                 return self._limited(operand, not holds, limits)
             case Logic(operator, left, right, _) if (operator == "and") == holds:
                 return self._limited(right, holds, self._limited(left, holds, limits))
+            case Logic(_, left, right, _):
+                either = self._limited(left, holds, limits)
+                other = self._limited(right, holds, self._limited(left, not holds, limits))
+                return {key: either[key].joined(other[key]) for key in either if key in other}
             case Relation(operator, left, right, _) if operator in OPPOSITE:
                 operator = operator if holds else OPPOSITE[operator]
                 first, second = self.quiet.bound(left, limits), self.quiet.bound(right, limits)
                 limits = self._bounded(left, operator, second, limits)
                 return self._bounded(right, MIRRORED[operator], first, limits)
+            case Relation(operator, left, right, _) if operator in ("==", "!="):
+                sides = self.quiet.bound(left, limits), self.quiet.bound(right, limits)
+                bounded = self._same if (operator == "==") == holds else self._other
+                return bounded(right, sides[0], bounded(left, sides[1], limits))
         return limits
 
     def bound(self, side: Tree, limits: Limits) -> Interval:
@@ -187,8 +210,6 @@ class Ranging:
         return self.bounds[key][1]
 
     def _bounded(self, side: Tree, operator: str, bound: Interval, limits: Limits) -> Limits:
-        number = self.likeness.number(side)
-        before = limits.get(number, ANYTHING)
         low, high = -math.inf, math.inf
         if operator == ">":
             low = math.nextafter(bound.low, math.inf)
@@ -198,17 +219,23 @@ class Ranging:
             high = math.nextafter(bound.high, -math.inf)
         else:
             high = bound.high
-        made = {**limits, number: before.within(Interval(low, high))}
+        made = self._within(side, Interval(low, high), limits)
         if isinstance(side, Application) and side.function == "abs" and low > 0.0:
-            made[self._not_zero(side.arguments[0])] = ANYTHING
+            return self._within(side.arguments[0], Interval(broken=True), made)
         return made
 
-    def _not_zero(self, tree: Tree) -> object:
-        """The key under which limits say that an expression is not 0: `abs(x) > limit`."""
-        return ("not zero", self.likeness.number(tree))
+    def _same(self, side: Tree, bound: Interval, limits: Limits) -> Limits:
+        """Return the limits where a side is equal to what has a bound."""
+        return self._within(side, Interval(bound.low, bound.high, broken=bound.broken), limits)
 
-    def _excluded(self, tree: Tree, limits: Limits) -> bool:
-        return bool(limits) and self._not_zero(tree) in limits
+    def _other(self, side: Tree, bound: Interval, limits: Limits) -> Limits:
+        """Return the limits where a side is not equal to what has a bound: here only 0 counts."""
+        is_zero = bound.low == bound.high == 0.0
+        return self._within(side, Interval(broken=True), limits) if is_zero else limits
+
+    def _within(self, side: Tree, bound: Interval, limits: Limits) -> Limits:
+        number = self.likeness.number(side)
+        return {**limits, number: limits.get(number, ANYTHING).within(bound)}
 
 
 def _corners(left: Interval, right: Interval, join: Callable[[float, float], float]) -> Interval:
@@ -219,7 +246,7 @@ def _corners(left: Interval, right: Interval, join: Callable[[float, float], flo
 
 def _even(base: Interval, exponent: int) -> Interval:
     ends = [_raised(base.low, exponent), _raised(base.high, exponent)]
-    return Interval(0.0 if base.meets_zero else min(ends), max(ends), base.known)
+    return Interval(0.0 if base.low <= 0.0 <= base.high else min(ends), max(ends), base.known)
 
 
 def _raised(value: float, exponent: int) -> float:
@@ -234,7 +261,8 @@ def _function(name: str, parts: list[Interval]) -> Interval:
     match name:
         case "abs":
             sizes = abs(first.low), abs(first.high)
-            return Interval(0.0 if first.meets_zero else min(sizes), max(sizes), known)
+            low = 0.0 if first.low <= 0.0 <= first.high else min(sizes)
+            return Interval(low, max(sizes), known, first.broken)
         case "min" | "max":
             pick = min if name == "min" else max
             return Interval(pick(p.low for p in parts), pick(p.high for p in parts), known)
