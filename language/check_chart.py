@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Set
 
 from language.activity import may_complete
 from language.chart import ROOT, Chart, Node
@@ -30,8 +30,11 @@ def check_chart(automaton: Automaton, problems: Problems) -> None:
                 _check_memory(automaton, chart, transition, problems)
 
 
-def never_entered(automaton: Automaton, chart: Chart) -> list[Mode]:
-    """Return the modes that nothing leads to: entering over-estimates what a history may enter."""
+def never_entered(automaton: Automaton, chart: Chart, silent: Set[str]) -> list[Mode]:
+    """Return the modes that nothing leads to but silent transitions, given by their key paths.
+
+    Entering over-estimates what a history may enter.
+    """
     seen = {node.index for node in chart.started()}
     if automaton.fault_mode:
         seen.update(
@@ -42,7 +45,8 @@ def never_entered(automaton: Automaton, chart: Chart) -> list[Mode]:
         for node in chart.nodes[ROOT + 1 :]:
             mode = automaton.by_key.get(node.mode)
             if node.index in seen and mode:
-                targets += [t for way in mode.transitions for t in chart.ways[way.key].targets]
+                ways = (way for way in mode.transitions if way.key not in silent)
+                targets += [t for way in ways for t in chart.ways[way.key].targets]
         more = seen | _entered(chart, targets)
         if more == seen:
             break

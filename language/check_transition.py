@@ -14,8 +14,12 @@ from language.inquiry import Inquiry
 from language.model import Automaton, Mode, Transition
 from language.moment import ELAPSED, Moment
 from language.operation import Compare, Expr, Ref, Unary, Value, real, whole
+from language.precedence import comes_along, inside_first, winners
 from language.problem import Problems, SpecError
 from language.region import by_priority
+
+BY_PRIORITY = "give it a smaller priority, or remove it"
+BY_ORDER = "let the other guard exclude it, choose the other `order`, or remove it"
 
 
 def check_transitions(automaton: Automaton, inquiry: Inquiry, problems: Problems) -> set[str]:
@@ -23,17 +27,39 @@ def check_transitions(automaton: Automaton, inquiry: Inquiry, problems: Problems
     silent: set[str] = set()
     for mode in automaton.all_modes:
         guards = _Guards(automaton, mode, inquiry)
-        for position, (_, transition) in enumerate(by_priority(mode)):
-            if not guards.is_silent(transition, position):
+        for _, transition in by_priority(mode):
+            if _never_raised(automaton, transition):
+                names = " or ".join(f"`{name}`" for name in transition.events)
+                label = f"this never fires: nothing raises {names}, and no input is it"
+                one = transition.events[0]
+                hint = f"`raise: {one}` on a transition, or `events: {{{one}: {{from: input}}}}`"
+                problems.warning("dead", transition.span, label, hint)
+                silent.add(transition.key)
+                continue
+            if guards.is_first_inside(transition, problems):
+                silent.add(transition.key)
+                continue
+            if not guards.is_silent(transition):
                 continue
             if guards.never(transition):
                 label = "this never holds within the declared ranges"
                 hint = "they exclude it, with the equations of the mode: correct one of them"
                 problems.warning("dead", transition.when.span, label, hint)
-            elif not guards.report_shadow(transition, position, problems):
+            elif not guards.report_shadow(transition, problems):
                 continue
             silent.add(transition.key)
     return silent
+
+
+def _never_raised(automaton: Automaton, transition: Transition) -> bool:
+    """Tell whether a transition waits for events that never come."""
+    chart = automaton.tree
+    if chart is None or not transition.events:
+        return False
+    ways = (way for mode in automaton.all_modes for way in mode.transitions)
+    come = {name for name, signal in chart.signals.items() if signal.is_input}
+    come.update(name for way in ways for name in way.raises)
+    return not come & {*transition.events}
 
 
 def check_waits(automaton: Automaton, inquiry: Inquiry, problems: Problems) -> None:
@@ -92,7 +118,7 @@ class _Guards:
         """Return a guard, None if it has no form that questions can be asked of."""
         if transition.key not in self.known:
             self.known[transition.key] = None
-            if transition.events or transition.completes:
+            if transition.completes:
                 return None
             with suppress(KeyError, SpecError):
                 self.known[transition.key] = self.moment.expression(transition.when.tree)
@@ -105,15 +131,27 @@ class _Guards:
             return False
         return self.inquiry.never(self.inquiry.question(self.moment.story, found))
 
-    def is_silent(self, transition: Transition, position: int) -> bool:
+    def is_first_inside(self, transition: Transition, problems: Problems) -> bool:
+        """Warn of a superstate's transition before which one inside always fires."""
+        found = list(inside_first(self.automaton, self.mode))
+        held = _held(self.automaton, transition)
+        for leaf, ways in found:
+            inside = _Guards(self.automaton, leaf, self.inquiry)
+            first = [way for way in ways if not _held(self.automaton, way)]
+            first = [way for way in first if comes_along(way, transition)]
+            others = [_not(guard) for guard in map(inside.of, first) if guard is not None]
+            if not others or not inside.together_never(inside.of(transition), *others):
+                return False
+        what = "one of the transitions inside, which win by `order`, fires"
+        return bool(found) and _report_shadow(transition, what, bool(held), problems, BY_ORDER)
+
+    def is_silent(self, transition: Transition) -> bool:
         """Tell whether a guard never holds where none does that comes first.
 
         Where that is not so it is neither dead nor shadowed: one question for most transitions.
         """
-        before = [way for _, way in by_priority(self.mode)[:position]]
         held = _held(self.automaton, transition)
-        first = [way for way in self.mode.transitions if self._comes_first(way, before, held)]
-        others = (_not(self.of(way)) for way in first)
+        others = (_not(self.of(way)) for way in self._first(transition))
         return self.together_never(self.of(transition), *self._lasted(held), *others)
 
     def never(self, transition: Transition) -> bool:
@@ -124,30 +162,44 @@ class _Guards:
         """Tell whether two guards never hold together."""
         return self.together_never(self.of(first), self.of(second))
 
-    def report_shadow(self, transition: Transition, position: int, problems: Problems) -> bool:
+    def report_shadow(self, transition: Transition, problems: Problems) -> bool:
         """Warn of a transition before which others always fire; tell whether it was so."""
         guard = self.of(transition)
         if guard is None:
             return False
-        before = [way for _, way in by_priority(self.mode)[:position]]
+        before = winners(self.automaton, self.mode, transition)
         wait = _held(self.automaton, transition)
-        at_once = [way for way in before if not _held(self.automaton, way)]
-        single = [way for way in self.mode.transitions if self._comes_first(way, before, wait)]
+        first = self._first(transition)
+        at_once = [way for way in first if way in before and not _held(self.automaton, way)]
         lasted = self._lasted(wait)
-        for way in single:
+        for way in first:
             own = lasted if way in before else ()
             if self.together_never(guard, *own, _not(self.of(way))):
-                return _report_shadow(transition, f"`{way.name}` fires", bool(wait), problems)
+                what, hint = f"`{way.name}` fires", BY_PRIORITY
+                if way not in self.mode.transitions:
+                    what, hint = (
+                        f"`{way.name}` of `{way.source}`, which is around it, fires",
+                        BY_ORDER,
+                    )
+                return _report_shadow(transition, what, bool(wait), problems, hint)
         others = [_not(self.of(way)) for way in at_once]
         if len(others) > 1 and self.together_never(guard, *lasted, *others):
             names = ", ".join(f"`{way.name}`" for way in at_once)
-            return _report_shadow(transition, f"one of {names} fires", bool(wait), problems)
+            what = f"one of {names} fires"
+            return _report_shadow(transition, what, bool(wait), problems, BY_PRIORITY)
         return False
 
-    def _comes_first(self, way: Transition, before: list[Transition], wait: Fraction) -> bool:
-        """Tell whether a transition fires first wherever both guards hold from one time on."""
+    def _first(self, transition: Transition) -> list[Transition]:
+        """Return the transitions that fire first wherever both guards hold from one time on."""
+        wait = _held(self.automaton, transition)
+        before = winners(self.automaton, self.mode, transition)
+        ways = [way for way in self.mode.transitions if comes_along(way, transition)]
+        ways += [way for way in before if way not in ways]
+        return [way for way in ways if self.of(way) is not None and self._wins(way, before, wait)]
+
+    def _wins(self, way: Transition, before: list[Transition], wait: Fraction) -> bool:
         own = _held(self.automaton, way)
-        leaves = not way.internal
+        leaves = bool(way.targets) and not way.internal
         return (leaves and own < wait) or (own == wait and way in before)
 
     def _lasted(self, wait: Fraction) -> tuple[Expr, ...]:
@@ -159,14 +211,15 @@ class _Guards:
         return (Compare(">=", Ref(ELAPSED, is_sampled), limit),)
 
 
-def _report_shadow(transition: Transition, what: str, waits: bool, problems: Problems) -> bool:
+def _report_shadow(
+    transition: Transition, what: str, waits: bool, problems: Problems, hint: str
+) -> bool:
     if waits:
         label = f"this wait never elapses: {what} before, whenever the guard holds"
         assert transition.wait
         problems.warning("timer", transition.wait.span, label, "wait for less, or remove it")
     else:
         label = f"this never fires: {what} first, whenever this holds"
-        hint = "give it a smaller priority, or remove it"
         problems.warning("shadowed", transition.when.span, label, hint)
     return True
 

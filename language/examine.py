@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from language.check_cycle import check_cycles
 from language.check_past import check_past
+from language.check_reached import check_behind
 from language.check_transition import check_stuck, check_transitions, check_waits
 from language.check_zeno import check_zeno
 from language.inquiry import Inquiry
@@ -18,6 +19,7 @@ def examine(automaton: Automaton, problems: Problems) -> None:
     """Warn of what never fires or is never left, and of modes that change for ever."""
     inquiry = Inquiry(automaton)
     silent = check_transitions(automaton, inquiry, problems)
+    check_behind(automaton, silent, problems)
     check_stuck(automaton, silent, problems)
     check_waits(automaton, inquiry, problems)
     check_cycles(automaton, problems)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 
 from language.graph import chain, circle, reachable, topological, turned
 from language.model import Mode
@@ -43,10 +43,14 @@ def report_circle(
         problems.error("loop", spans[loop[0]], label, hint)
 
 
-def unreached(modes: Mapping[str, Mode], initial: str) -> list[str]:
-    """Return the modes that no chain of transitions from the initial mode enters."""
+def unreached(modes: Mapping[str, Mode], initial: str, silent: Set[str] = frozenset()) -> list[str]:
+    """Return the modes that no chain of transitions from the initial mode enters.
+
+    The silent ones, by key path, never fire.
+    """
     edges = {
-        mode.name: [transition.target for transition in mode.transitions] for mode in modes.values()
+        mode.name: [way.target for way in mode.transitions if way.key not in silent]
+        for mode in modes.values()
     }
     found = reachable(edges, initial)
     return [name for name in modes if name not in found]

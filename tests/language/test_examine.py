@@ -22,8 +22,8 @@ inputs:
 initial: a
 modes:
   a: {{transitions: {{b: {{{first}, priority: 1}}, c: {{{second}, priority: 2}}}}}}
-  b: {{transitions: {{a: {{when: x < 0 m}}}}}}
-  c: {{transitions: {{a: {{when: x < 0 m}}}}}}
+  b: {{transitions: {{a: {{when: x < 0 m}}, c: {{when: x > 8 m}}}}}}
+  c: {{transitions: {{a: {{when: x < 0 m}}, b: {{when: x > 8 m}}}}}}
 outputs: [mode]
 """
 
@@ -134,7 +134,7 @@ regions:
           slow:
             transitions:
               fast: {{when: {up}, priority: 1}}
-              rest: {{when: x < -5 m, priority: 2}}
+              rest: {{when: x < -1 m, priority: 2}}
           fast: {{transitions: {{slow: {{when: x < 1 m}}}}}}
       rest: {{transitions: {{drive: {{when: x > 0 m}}}}}}
   lamp:
@@ -151,14 +151,51 @@ outputs: [mode]
     [
         ("x < -2 m", "x > 2 m", []),
         ("x < -20 m", "x > 2 m", ["dead"]),
-        ("x < -2 m", "x < -4 m", ["shadowed"]),
+        ("x < -2 m", "x < -4 m", ["shadowed", "unreached"]),  # by the transition of the mode around
         ("x < -2 m and in(lamp.lit)", "x > 2 m and in(drive)", []),
-        ("x < -2 m", "x > 2 m and not in(drive)", ["dead"]),
-        ("x < -2 m and not in(chart.drive)", "x > 20 m", ["dead", "dead"]),
+        ("x < -2 m", "x > 2 m and not in(drive)", ["dead", "unreached"]),
+        ("x < -2 m and not in(chart.drive)", "x > 20 m", ["dead", "dead", "unreached"]),
     ],
 )
 def test_superstates_and_regions(out: str, up: str, expected: list[str], tmp_path: Path) -> None:
     assert kinds(tmp_path, CHART.format(out=out, up=up)) == expected
+
+
+@pytest.mark.parametrize(
+    ("order", "up", "expected"),
+    [
+        ("inner_first", "x > 0 m", ["shadowed", "unreached"]),  # one inside fires in every mode
+        ("inner_first", "x > 2 m", []),
+        ("inner_first", "x > 0 m, wait: 20 ms", []),
+        ("inner_first", "x > 0 m and rising(x > 1 m)", []),
+        ("outer_first", "x > 2 m", ["shadowed", "unreached"]),
+        ("outer_first", "x > 2 m, event: go", ["shadowed", "unreached"]),
+        ("outer_first", "x > 2 m, wait: 20 ms", ["timer", "unreached"]),
+        ("outer_first", "x > 0 m", []),
+    ],
+)
+def test_a_superstate_shadows_what_is_inside_and_the_other_way_round(
+    order: str, up: str, expected: list[str], tmp_path: Path
+) -> None:
+    text = f"""language: 1
+automaton: nested
+period: 10 ms
+numbers: float64
+order: {order}
+events: {{go: {{from: input}}}}
+inputs: {{x: {{unit: m, range: [-9, 9]}}}}
+initial: drive
+modes:
+  drive:
+    initial: slow
+    transitions: {{rest: {{when: x > 1 m}}}}
+    modes:
+      slow: {{transitions: {{fast: {{when: {up}}}}}}}
+      fast: {{transitions: {{slow: {{when: x > 0.5 m}}, fast: {{event: go, when: x < 0 m}}}}}}
+  rest: {{transitions: {{drive: {{when: x < 0 m}}}}}}
+outputs: [mode]
+"""
+    assert kinds(tmp_path, text) == expected
 
 
 ZENO = """language: 1
