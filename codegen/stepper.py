@@ -52,19 +52,24 @@ class CompiledStepper:
         self._run = library.stepper_run
         self._room = ctypes.create_string_buffer(int(library.stepper_size()))
         self._address = ctypes.addressof(self._room)
+        sizes = {v.name: v.size for v in program.variables if v.size}
         self._values = {
             name: KINDS[kind].from_buffer(self._room, offset)
             for name, (kind, offset) in places.items()
+            if name not in sizes
         }
-        self._fixed = {c.name: c.items or c.value for c in program.constants}
+        self._whole: dict[str, Any] = {c.name: c.items or c.value for c in program.constants}
+        for name, size in sizes.items():
+            kind, offset = places[name]
+            self._whole[name] = (KINDS[kind] * size).from_buffer(self._room, offset)
         self._left = {signal: LEFT.format(k) for k, signal in enumerate(ranged_signals(program))}
         for entry in ("default_page", "derive", "init"):
             self.run(entry)
 
     def get(self, name: str) -> Any:
-        """Return the value of a variable or constant, `group.name`."""
+        """Return the value of a variable or constant, `group.name`; of an array all of them."""
         value = self._values.get(name)
-        return self._fixed[name] if value is None else value.value
+        return self._whole[name] if value is None else value.value
 
     def set(self, name: str, value: float | int | bool) -> None:
         """Set a variable; a real is rounded to the number type, once."""
@@ -72,7 +77,7 @@ class CompiledStepper:
 
     def has(self, name: str) -> bool:
         """Tell whether the Program has a variable or constant."""
-        return name in self._values or name in self._fixed
+        return name in self._values or name in self._whole
 
     def run(self, block: str) -> None:
         """Run a block."""
@@ -127,11 +132,7 @@ def _files(program: Program) -> tuple[dict[str, str], dict[str, int], dict[str, 
     local = locals_of(program)
     used, place = usages(program, local), CNames(program)
     hidden = {name for names in local.values() for name in names}
-    names = {
-        v.name: c_type(v, program.number)
-        for v in program.variables
-        if not v.size and v.name not in hidden
-    }
+    names = {v.name: c_type(v, program.number) for v in program.variables if v.name not in hidden}
     names |= {
         c.name: c_type(Variable(c.name, c.type, values=c.values), program.number)
         for c in program.constants

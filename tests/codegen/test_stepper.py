@@ -34,6 +34,14 @@ def test_the_engine_gets_the_same_bits(name: str, scenario: str, horizon: Fracti
     assert mine.csv() == theirs.csv()
 
 
+def test_the_transitions_of_all_micro_steps_of_a_tick_are_told() -> None:
+    root = ROOT / "tests/rules/a_chart_may_be_regions_and_no_modes"
+    loaded = load("rig", "run", root=root)
+    runs = [simulate(loaded.system, loaded.scenario, build) for build in (stepper, Interpreter)]
+    assert len(runs[0].events) == 6
+    assert runs[0].events == runs[1].events
+
+
 def test_what_leaves_its_range_is_told_once_asked() -> None:
     made = heater()
     for run in (stepper(made), Interpreter(made)):
