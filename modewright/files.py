@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import os
+import stat
 import tempfile
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+
+NEW_MODE = 0o644
+SPECS = (".yaml", ".yml")
 
 
 class OutputError(Exception):
@@ -25,40 +29,79 @@ def make_folder(folder: Path) -> None:
 
 
 def require_writable(*paths: Path | None) -> None:
-    """Raise OutputError, before any work is done, for a path that cannot be written."""
+    """Raise OutputError, before any work is done, for a path that is no place for an output."""
     for path in paths:
         if path is None:
             continue
-        if path.is_dir():
-            raise OutputError(f"{path}: this is a folder; name a file in it")
-        folder = path.parent
-        if not folder.is_dir():
-            raise OutputError(f"{path}: there is no folder {folder}")
-        if not os.access(folder, os.W_OK):
-            raise OutputError(f"{path}: the folder {folder} is not writable")
+        if path.exists() and path.resolve().suffix in SPECS:
+            raise OutputError(f"{path}: this is a spec; an output would replace it")
+        require_place(path)
+
+
+def require_calibration(path: Path) -> None:
+    """Raise OutputError for what a new calibration cannot be written to, such as another spec."""
+    require_place(path)
+    if path.is_file() and not any(line.startswith(b"calibration:") for line in path.open("rb")):
+        raise OutputError(f"{path}: this is no calibration; a new one would replace it")
+
+
+def require_place(path: Path) -> None:
+    """Raise OutputError for a path that cannot be written."""
+    if path.is_dir():
+        raise OutputError(f"{path}: this is a folder; name a file in it")
+    folder = _target(path).parent
+    if not folder.is_dir():
+        raise OutputError(f"{path}: there is no folder {folder}")
+    if not os.access(path if _is_stream(path) else folder, os.W_OK):
+        what = f"{path}: this" if _is_stream(path) else f"{path}: the folder {folder}"
+        raise OutputError(f"{what} is not writable")
 
 
 def write_files(files: Mapping[Path, bytes]) -> None:
-    """Write all files or, if one cannot be written, none. Raises OutputError."""
+    """Write all files or, if one cannot be written, none. Raises OutputError.
+
+    A file that is there keeps its mode, a link leads where it led; pipes are written to at last.
+    """
     made: list[tuple[str, Path]] = []
     current = Path()
+    streams = {path: data for path, data in files.items() if _is_stream(path)}
     try:
         for path, data in files.items():
             current = path
-            handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-            made.append((name, path))
+            if path in streams:
+                continue
+            target = _target(path)
+            handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
+            made.append((name, target))
             with os.fdopen(handle, "wb") as file:
                 file.write(data)
-            os.chmod(name, 0o644)
+            os.chmod(name, stat.S_IMODE(target.stat().st_mode) if target.exists() else NEW_MODE)
         while made:
             name, current = made[0]
             os.replace(name, current)
             made.pop(0)
+        for current, data in streams.items():
+            with current.open("wb") as stream:
+                stream.write(data)
     except OSError as error:
         raise OutputError(f"{current}: {error.strerror}") from None
     finally:
         for name, _ in made:
             Path(name).unlink(missing_ok=True)
+
+
+def _target(path: Path) -> Path:
+    """Return the file that a path leads to: a link stays, what it names is written."""
+    return path.resolve() if path.is_symlink() and not _is_stream(path) else path
+
+
+def _is_stream(path: Path) -> bool:
+    """Tell whether a path is a pipe or a terminal, which take what comes and keep nothing."""
+    try:
+        mode = path.stat().st_mode
+    except OSError:
+        return False
+    return stat.S_ISFIFO(mode) or stat.S_ISCHR(mode)
 
 
 def remove_files(paths: Iterable[Path]) -> None:

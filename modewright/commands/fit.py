@@ -12,7 +12,7 @@ from modewright.commands.diagnose import Map, Train, tell
 from modewright.commands.options import Json, usage_errors
 from modewright.console import announce, console
 from modewright.exits import PROBLEMS
-from modewright.files import OutputError, require_writable, write_files
+from modewright.files import OutputError, require_calibration, write_files
 
 Anyway = Annotated[bool, typer.Option("--anyway", help="fit to recordings with errors too")]
 
@@ -45,9 +45,10 @@ def fit(
     from modewright import show, show_diagnosis
     from modewright.diagnoses import UnusableRecordings, fit as fitted
 
-    require_writable(out)
-    if out and out.suffix != ".yaml":
-        raise OutputError(f"{out}: a calibration ends with .yaml")
+    if out:
+        if out.suffix != ".yaml":
+            raise OutputError(f"{out}: a calibration ends with .yaml")
+        require_calibration(out)
     title = name or (out.stem if out else "fitted")
     if not NAME.fullmatch(title):
         raise typer.BadParameter(f"`{title}` is not a name", param_hint="--name")

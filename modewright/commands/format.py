@@ -9,7 +9,7 @@ import typer
 
 from modewright.console import console, counted
 from modewright.exits import PROBLEMS
-from modewright.files import require_writable, write_files
+from modewright.files import require_place, write_files
 
 
 def format(
@@ -39,7 +39,8 @@ def format(
             f"{'would change' if check else 'changed'} {path}", soft_wrap=True, markup=False
         )
     if not check:
-        require_writable(*made)
+        for path in made:
+            require_place(path)
         write_files(made)
     console().print(f"{counted(len(paths), 'spec')} read, {counted(len(made), 'change')}")
     if check and made:

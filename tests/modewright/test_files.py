@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import pytest
 
-from modewright.files import OutputError, write_files
+from modewright.files import OutputError, require_calibration, require_writable, write_files
 
 KILLED = """
 import os, signal, sys
@@ -49,3 +51,41 @@ def test_one_that_cannot_be_written_leaves_none(tmp_path: Path) -> None:
     with pytest.raises(OutputError):
         write_files({tmp_path / "a": b"a", tmp_path / "no" / "b": b"b"})
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_keeps_its_mode_and_a_link_leads_where_it_led(tmp_path: Path) -> None:
+    kept, link, new = tmp_path / "kept", tmp_path / "links" / "link", tmp_path / "new"
+    link.parent.mkdir()
+    kept.write_bytes(b"old")
+    kept.chmod(0o600)
+    link.symlink_to("../kept")
+    require_writable(link, new)
+    write_files({link: b"told", new: b"new"})
+    assert link.is_symlink() and kept.read_bytes() == b"told"
+    assert (kept.stat().st_mode & 0o777, new.stat().st_mode & 0o777) == (0o600, 0o644)
+    assert [each.name for each in link.parent.iterdir()] == ["link"]
+
+
+def test_a_pipe_is_written_to_and_stays(tmp_path: Path) -> None:
+    pipe, heard = tmp_path / "pipe", []
+    os.mkfifo(pipe)
+    reader = threading.Thread(target=lambda: heard.append(pipe.read_bytes()), daemon=True)
+    reader.start()
+    require_writable(pipe)
+    write_files({pipe: b"told"})
+    reader.join(10)
+    assert (heard, pipe.is_fifo()) == ([b"told"], True)
+
+
+def test_an_output_replaces_no_spec(tmp_path: Path) -> None:
+    spec, link, fitted = tmp_path / "a.yaml", tmp_path / "out.sarif", tmp_path / "b.yaml"
+    spec.write_text("language: 1\nautomaton: a\n")
+    fitted.write_text("language: 1\ncalibration: b\n")
+    link.symlink_to(spec)
+    for path in (spec, link):
+        with pytest.raises(OutputError, match="this is a spec"):
+            require_writable(path)
+    with pytest.raises(OutputError, match="this is no calibration"):
+        require_calibration(spec)
+    require_calibration(fitted)
+    require_calibration(tmp_path / "new.yaml")
