@@ -12,7 +12,8 @@ from language.parse import parse_expression
 from language.problem import Problems, SpecError
 from language.syntax import Negative, Number, Tree, alike
 from language.units import Dimension, fits
-from modewright.editing.thing import SUBSECTIONS, TEXTS, Path, Thing, thing_of
+from modewright.editing.order import what_moves
+from modewright.editing.thing import SUBSECTIONS, TEXTS, Path, Thing, is_section, thing_of
 from modewright.editing.unfolding import unfolded
 
 MOST_PERCENT = 5
@@ -65,6 +66,7 @@ class _Trees:
         """Yield what differs below a path; a mode that is new is told with what is in it."""
         thing = thing_of(path, self.after if new is not None else self.before)
         if isinstance(old, Table) and isinstance(new, Table):
+            yield from _moved(path, old, new)
             for key in _keys(old, new):
                 yield from self.changes((*path, key), old.get(key), new.get(key))
             return
@@ -83,6 +85,17 @@ class _Trees:
                 yield from self.changes((*path, key), None, below)
             else:
                 yield from self.changes((*path, key), below, None)
+
+
+def _moved(path: Path, old: Table, new: Table) -> Iterator[Change]:
+    """Yield that the keys of a section have another order, where that means something."""
+    section = path[-1]
+    moves = what_moves(section, old, new) if is_section(path) else ""
+    if moves:
+        owner = ".".join(key for key in path[:-1] if key not in ("modes", "regions"))
+        title = f"order in {owner}" if owner else "order"
+        texts = (", ".join(old.entries), ", ".join(new.entries))
+        yield Change("changed", section, title, "", *texts, moves, _place(old), _place(new))
 
 
 def _keys(old: Table, new: Table) -> list[str]:

@@ -54,6 +54,11 @@ def thing_of(path: Path, root: Table) -> Thing | None:
     return thing
 
 
+def is_section(path: Path) -> bool:
+    """Tell whether what a path leads to holds named things: at the root, or in a mode or region."""
+    return len(_mode(path)[1]) == 1 and (len(path) == 1 or path[-1] in ("modes", "regions"))
+
+
 def _thing(path: Path, root: Table) -> Thing | None:
     mode, rest = _mode(path)
     if not mode:

@@ -194,3 +194,52 @@ def test_a_priority_has_no_size_but_a_factor_has() -> None:
     text = BASE.replace("alpha: {value: 0.2 rad}", "alpha: {value: 0.2}")
     (found,) = changes(text.replace("value: 0.2}", "value: 0.25}"), text)
     assert found.note == "+25 %"
+
+
+ORDER = """\
+language: 1
+automaton: order
+events: {e: {from: input}, f: {from: input}}
+faults: {left: {}, right: {}}
+modes: {a: {}, b: {modes: {c: {}, d: {}}}}
+regions: {r: {modes: {on: {number: 1}, off: {number: 0}}}, s: {modes: {up: {}}}}
+parameters: {k: {value: 1}, m: {value: 2}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        (
+            "e: {from: input}, f: {from: input}",
+            "f: {from: input}, e: {from: input}",
+            ["events | order | e, f | f, e | what comes at once is heard in another order"],
+        ),
+        (
+            "{left: {}, right: {}}",
+            "{right: {}, left: {}}",
+            ["faults | order | left, right | right, left | bits of faults move"],
+        ),
+        (
+            "{c: {}, d: {}}",
+            "{d: {}, c: {}}",
+            ["modes | order in b | c, d | d, c | numbers of modes move"],
+        ),
+        (
+            "left: {}, r",
+            "new: {}, left: {}, r",
+            [
+                "faults | order | left, right | new, left, right | bits of faults move",
+                "faults | new |  |  | ",
+            ],
+        ),
+        ("right: {}", "right: {}, new: {}", ["faults | new |  |  | "]),
+        ("e: {from: input}, f", "g: {}, e: {from: input}, f", ["events | g |  |  | "]),
+        ("{on: {number: 1}, off: {number: 0}}", "{off: {number: 0}, on: {number: 1}}", []),
+        ("{k: {value: 1}, m: {value: 2}}", "{m: {value: 2}, k: {value: 1}}", []),
+    ],
+)
+def test_an_order_is_told_where_it_means_something(old: str, new: str, told: list[str]) -> None:
+    assert ORDER.count(old) == 1
+    found = changes(ORDER.replace(old, new), ORDER)
+    assert [" | ".join((c.group, c.thing, c.before, c.after, c.note)) for c in found] == told
