@@ -17,6 +17,7 @@ from language.document import Document, Entry, Items, Node, Scalar, Table
 from language.overlay import lay, without
 from language.problem import Problems
 from language.text import shortened, visible
+from language.transition_table import with_transition_tables
 
 LONGEST = 1000
 """Characters of a label; expressions are shorter, other texts are cut."""
@@ -25,6 +26,8 @@ LABEL_WIDTH = 36
 MOST_LINES = 6
 """Most lines of equations shown in a mode."""
 Key = tuple[str, ...]
+Sort = Literal["", "final", "history"]
+"""What a mode is: most are plain; one that nothing leaves; a place that enters another mode."""
 Shade = Literal["", "covered", "part", "missed"]
 """What tests have reached of a mode or a transition; empty where nothing is said of it."""
 
@@ -48,6 +51,7 @@ class ModeBox:
     lines: tuple[str, ...]
     regions: tuple[RegionBox, ...] = ()
     shade: Shade = ""
+    sort: Sort = ""
 
     @property
     def name(self) -> str:
@@ -96,6 +100,7 @@ def diagram_of(document: Document) -> Diagram:
     """
     templates = document.root.get("templates")
     root = _filled(document.root, templates) if isinstance(templates, Table) else document.root
+    root = with_transition_tables(root, Problems())
     regions = [_with_fault(r, _text(root.get("fault_mode"))) for r in _regions(root, ())]
     known = set(_paths(regions))
     arrows = [arrow for path, table in _modes(root, ()) for arrow in _arrows(path, table, known)]
@@ -168,6 +173,7 @@ def _region(name: str, owner: Table, modes: Table, path: Key) -> RegionBox:
             (*path, entry.key),
             tuple(_inside(entry.node)),
             tuple(_regions(entry.node, (*path, entry.key))),
+            sort=_sort(entry.node),
         )
         for entry in modes
         if isinstance(entry.node, Table)
@@ -175,6 +181,12 @@ def _region(name: str, owner: Table, modes: Table, path: Key) -> RegionBox:
     return RegionBox(
         name, _text(owner.get("initial")) or next((b.name for b in boxes), ""), tuple(boxes)
     )
+
+
+def _sort(mode: Table) -> Sort:
+    if mode.get("history") is not None:
+        return "history"
+    return "final" if _text(mode.get("final")) == "true" else ""
 
 
 def _modes(owner: Table, path: Key) -> Iterator[tuple[Key, Table]]:
@@ -202,10 +214,14 @@ def _arrows(path: Key, mode: Table, known: set[Key]) -> Iterator[Arrow]:
     transitions = mode.get("transitions")
     for entry in transitions if isinstance(transitions, Table) else ():
         if isinstance(entry.node, Table):
-            for name in _names(entry.node.get("to"), entry.key):
+            label = tuple(_label(entry.node))
+            names = _names(entry.node.get("to"), entry.key)
+            if not names:
+                yield Arrow(path, path, (*label, "/ stays"), entry.key)
+            for name in names:
                 target = _target(tuple(name.split(".")), path, known)
                 if target:
-                    yield Arrow(path, target, tuple(_label(entry.node)), entry.key)
+                    yield Arrow(path, target, label, entry.key)
 
 
 def _names(to: Node | None, key: str) -> list[str]:
@@ -228,14 +244,16 @@ def _label(transition: Table) -> Iterator[str]:
     when, event = _text(transition.get("when")), _text(transition.get("event"))
     priority = _text(transition.get("priority"))
     start = f"({priority}) " if priority else ""
-    condition = " and ".join(part for part in (f"on {event}" if event else "", when) if part)
+    condition = " and ".join(
+        part for part in (f"on {event.replace(', ', ' or ')}" if event else "", when) if part
+    )
     yield from _wrapped(start + condition)
     if wait := _text(transition.get("wait")):
         yield f"for {wait}"
     reset = transition.get("reset")
     for entry in reset if isinstance(reset, Table) else ():
         yield from _wrapped(f"/ {entry.key} = {_text(entry.node)}")
-    for key in ("raise", "history", "memory", "rewind"):
+    for key in ("raise", "history", "memory", "internal", "rewind"):
         if transition.get(key) is not None:
             yield from _wrapped(f"/ {key}: {_text(transition.get(key))}")
 
@@ -244,10 +262,10 @@ def _inside(node: Node) -> list[str]:
     """Return what holds in a mode: its equations, flow, updates and observer, shortened."""
     if not isinstance(node, Table):
         return []
-    lines = []
+    lines = _standing(node)
     for key in ("equations", "update", "entry", "exit"):
         part = node.get(key)
-        word = {"entry": "entry / ", "exit": "exit / "}.get(key, "")
+        word = "" if key == "equations" else f"{key} / "
         for entry in part if isinstance(part, Table) else ():
             lines += _wrapped(f"{word}{entry.key} = {_text(entry.node)}")
     flow = node.get("flow")
@@ -259,6 +277,14 @@ def _inside(node: Node) -> list[str]:
             of = _text(part.get("of"))
             lines.append(f"{key} of {of}" if of else key)
     return lines if len(lines) <= MOST_LINES else [*lines[: MOST_LINES - 1], "..."]
+
+
+def _standing(mode: Table) -> list[str]:
+    """Return what a mode is where it is no plain one, as a line."""
+    kept, first = _text(mode.get("history")), _text(mode.get("initial"))
+    if kept:
+        return _wrapped(f"{kept} history" + (f", else {first}" if first else ""))
+    return ["final"] if _sort(mode) == "final" else []
 
 
 def _wrapped(text: str) -> list[str]:
@@ -281,6 +307,8 @@ def _text(node: Node | None) -> str:
         return visible(" ".join(node.text.split()))
     if isinstance(node, Table):
         return ", ".join(f"{entry.key} {_text(entry.node)}" for entry in node)
+    if isinstance(node, Items):
+        return ", ".join(map(_text, node.nodes))
     return ""
 
 

@@ -144,8 +144,12 @@ def _mode(mode: ModeBox, loops: Sequence[Arrow], arrows: Sequence[Arrow], number
         top += size[1] + 24.0
     colour = PALETTE[_number(mode.shade, number)]
     dash = DASH if mode.shade == "missed" else ""
-    box = f'<rect width="{width:.1f}" height="{height:.1f}" rx="7" fill="{colour}"'
+    rounding = height / 2 if mode.sort == "history" else 7
+    box = f'<rect width="{width:.1f}" height="{height:.1f}" rx="{rounding:g}" fill="{colour}"'
     box += f' fill-opacity="0.08" stroke="{colour}" stroke-width="1.6"{dash}/>'
+    if mode.sort == "final":
+        box += f'<rect x="3" y="3" width="{width - 6:.1f}" height="{height - 6:.1f}" rx="5"'
+        box += f' fill="none" stroke="{colour}"/>'
     box += f'<text class="n" x="{PAD}" y="16">{_xml(mode.name)}</text>'
     box += _lines(mode.lines, PAD, TITLE + 10, "a")
     parts.append(((0.0, top), box))

@@ -10,6 +10,9 @@ from modewright.diagram import Arrow, Diagram, Key, ModeBox, RegionBox, lifted
 
 RESERVED = frozenset({"state", "note", "end", "direction", "class", "click", "hide", "scale", "as"})
 
+SIGNS = {"history": "(H) "}
+"""What stands before the name of a mode that is no plain one."""
+
 
 def mermaid(diagram: Diagram) -> str:
     """Return the diagram as Mermaid text; a transition stands where both its modes are inside."""
@@ -45,6 +48,8 @@ def _region_lines(region: RegionBox, arrows: tuple[Arrow, ...], depth: int) -> I
             yield f"{indent}[*] --> {identifier(mode.path)}"
     for mode in region.modes:
         yield from _mode_lines(mode, arrows, depth)
+        if mode.sort == "final":
+            yield f"{indent}{identifier(mode.path)} --> [*]"
     place = region.modes[0].path[:-1] if region.modes else ()
     for arrow in map(lifted, arrows):
         if arrow.source[:-1] == place:
@@ -54,7 +59,7 @@ def _region_lines(region: RegionBox, arrows: tuple[Arrow, ...], depth: int) -> I
 
 def _mode_lines(mode: ModeBox, arrows: tuple[Arrow, ...], depth: int) -> Iterator[str]:
     indent = "    " * depth
-    text = "<br/>".join(map(_escaped, (mode.name, *mode.lines)))
+    text = "<br/>".join(map(_escaped, (SIGNS.get(mode.sort, "") + mode.name, *mode.lines)))
     head = f'{indent}state "{text}" as {identifier(mode.path)}'
     if not mode.regions:
         yield head

@@ -83,7 +83,7 @@ def test_a_transition_that_leaves_an_outer_mode_starts_there_and_names_its_sourc
     assert "from slow" in shown(nested().svg())
 
 
-def test_a_transition_with_several_targets_has_an_arrow_to_each_and_none_without_one() -> None:
+def test_a_transition_with_several_targets_has_an_arrow_to_each_one_without_stays() -> None:
     text = NESTED.replace(
         "run: {event: clear, when: ok}", "on_both: {to: [run, run.fast], event: e}"
     )
@@ -93,6 +93,8 @@ def test_a_transition_with_several_targets_has_an_arrow_to_each_and_none_without
     ends = {tuple(tuple(p for p in path if p != "chart") for path in pair) for pair in arrows}
     assert both <= ends
     assert (("run", "fast"), ("run", "slow")) not in ends
+    stays = "chart__run__fast --> chart__run__fast : v < 2 m/s<br/>/ stays"
+    assert stays in diagram_of(document_of(Source("a"), text)).mermaid()
 
 
 def test_what_a_mode_takes_from_a_template_is_shown() -> None:
@@ -188,3 +190,40 @@ def test_the_mode_that_faults_lead_to_says_so() -> None:
     text = mw.graph("guarded", ROOT / "tests" / "rules" / rule).mermaid()
     (line,) = (line for line in text.splitlines() if "entered on a fault" in line)
     assert line.strip().startswith('state "safe<br/>entered on a fault')
+
+
+CHART = """\
+language: 1
+automaton: chart
+initial: run
+modes:
+  run:
+    initial: slow
+    modes:
+      slow: {update: {n: n + 1}, transitions: {fast: {event: [go, hop], when: u > 1}}}
+      fast: {transitions: {over: {when: u > 9}}}
+      over: {final: true}
+      back: {history: deep, initial: slow}
+  idle: {}
+transition_table:
+  columns: {start: {event: go}, hot: {when: u > 5, wait: 30 ms}}
+  rows: {run: {start: stay, hot: idle}, idle: {start: run.back, hot: stay}}
+"""
+
+
+def test_transitions_of_tables_are_drawn_and_modes_that_are_none() -> None:
+    drawn = diagram_of(document_of(Source("chart.yaml"), CHART))
+    lines = [line.strip() for line in drawn.mermaid().splitlines()]
+    for line in (
+        "run --> idle : u > 5<br/>for 30 ms",
+        "idle --> run : to back<br/>on go",
+        'state "over<br/>final" as run__over',
+        "run__over --> [*]",
+        'state "(H) back<br/>deep history, else slow" as run__back',
+        'state "slow<br/>update / n = n + 1" as run__slow',
+        "run__slow --> run__fast : on go or hop and u > 1",
+    ):
+        assert line in lines, lines
+    text = shown(drawn.svg())
+    for part in ("for 30 ms", "to back", "final", "deep history, else slow", "update / n = n + 1"):
+        assert part in text
