@@ -49,7 +49,7 @@ def check_cycles(automaton: Automaton, problems: Problems) -> None:
 def _forever(automaton: Automaton, lengths: range) -> Iterator[tuple[Way, Witness]]:
     """Yield ways round of some lengths that are taken for ever, the first turn that shows it."""
     if automaton.is_sampled:
-        return  # one transition a tick
+        return  # language/check_endless.py
     inquiry = Inquiry(automaton)
     for way in ways_round(automaton):
         for turn in range(len(way) if len(way) in lengths else 0):

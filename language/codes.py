@@ -32,7 +32,7 @@ CODES: Mapping[str, tuple[str, str]] = {
     "unwritten": ("MW207", "A variable is written nowhere."),
     "faults": ("MW208", "There are more fault bits than a word holds."),
     "rewind": ("MW209", "A transition cannot go back in time like this."),
-    "cycle": ("MW210", "Transitions of several modes go round for ever at the same instant."),
+    "cycle": ("MW210", "Transitions go round for ever at the same instant, or in one tick."),
     "dead": ("MW211", "A guard never holds, so its transition never fires."),
     "shadowed": ("MW212", "Other transitions fire first whenever a guard holds."),
     "timer": ("MW213", "A wait never elapses."),

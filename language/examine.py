@@ -6,6 +6,7 @@ It runs where a spec is checked, not where it is only used: what has errors neve
 from __future__ import annotations
 
 from language.check_cycle import check_cycles
+from language.check_endless import check_endless
 from language.check_past import check_past
 from language.check_reached import check_behind
 from language.check_transition import check_stuck, check_transitions, check_waits
@@ -23,5 +24,6 @@ def examine(automaton: Automaton, problems: Problems) -> None:
     check_stuck(automaton, silent, problems)
     check_waits(automaton, inquiry, problems)
     check_cycles(automaton, problems)
+    check_endless(automaton, inquiry, problems)
     check_zeno(automaton, inquiry, problems)
     check_past(automaton, inquiry, problems)
