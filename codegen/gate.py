@@ -10,7 +10,7 @@ import dataclasses
 from collections.abc import Iterator
 from functools import reduce
 
-from language.operation import Assign, Binary, Block, Branch, Call, Compare, Expr, Run, Value
+from language.operation import Assign, Binary, Block, Branch, Call, Compare, Expr, Ref, Run, Value
 from language.program import Program
 from language.substitution import with_expressions
 
@@ -21,7 +21,12 @@ APART = "latch_apart"
 
 def gated(program: Program) -> Program:
     """Return a Program that takes its inputs at once where all are within their ranges."""
-    blocks = {name: with_expressions(block, centred) for name, block in program.blocks.items()}
+    words = frozenset(variable.name for variable in program.variables if variable.values)
+
+    def fewer(expr: Expr) -> Expr:
+        return centred(_unsigned(expr, words))
+
+    blocks = {name: with_expressions(block, fewer) for name, block in program.blocks.items()}
     taken = blocks.get(LATCH, ())
     held = [op for op in taken if isinstance(op, Branch) and _takes(op.then)]
     if len(held) == len(taken) > 1:
@@ -38,6 +43,14 @@ def centred(expr: Expr) -> Expr:
             "and", Compare(">=", value, Value(float(low))), Compare("<=", same, Value(float(high)))
         ) if value == same and low == -high <= 0:
             return Compare("<=", Call("abs", (value,)), Value(high))
+    return expr
+
+
+def _unsigned(expr: Expr, words: frozenset[str]) -> Expr:
+    """Return the range of a word of an enumeration without `>= 0`: in C it is unsigned."""
+    match expr:
+        case Binary("and", Compare(">=", Ref(name), Value(0)), rest) if name in words:
+            return rest
     return expr
 
 

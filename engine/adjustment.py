@@ -123,6 +123,8 @@ def require_known(batch: Batch) -> None:
         instance = batch.system.instances.get(owner)
         if instance is None or short not in instance.automaton.parameters:
             raise ValueError(f"`{name}` is no parameter of {batch.system.name}")
+        if instance.automaton.parameters[short].table is not None:
+            raise ValueError(f"`{name}` is a table: a batch varies numbers")
     for name in batch.initial:
         owner, _, short = name.partition(".")
         instance = batch.system.instances.get(owner)

@@ -13,11 +13,21 @@ def fired(program: Program, stepper: Stepper) -> list[TransitionInfo]:
 
     Of a chart with several micro-steps in a tick those of all of them, in their order.
     """
-    if program.has_log:
-        log = stepper.get(LOG)
-        return [program.transitions[log[k] - 1] for k in range(stepper.get(LOGGED))]
-    numbers = [stepper.get(name) for name in program.fired_variables()]
-    return [program.transitions[number - 1] for number in numbers if number]
+    return [info for _, info in fired_in_steps(program, stepper)]
+
+
+def fired_in_steps(program: Program, stepper: Stepper) -> list[tuple[int, TransitionInfo]]:
+    """Return the transitions of a tick, each with the number of its micro-step in the tick."""
+    if not program.has_log:
+        numbers = [stepper.get(name) for name in program.fired_variables()]
+        return [(0, program.transitions[number - 1]) for number in numbers if number]
+    log, found, micro_step = stepper.get(LOG), [], 0
+    for number in (log[k] for k in range(stepper.get(LOGGED))):
+        if number:
+            found.append((micro_step, program.transitions[number - 1]))
+        else:
+            micro_step += 1
+    return found
 
 
 def event(

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from engine.firing import event, fired, mode_names
+from engine.firing import event, fired_in_steps, mode_names
 from engine.interpreter import Interpreter, Stepper
 from engine.recording import Channel, Recording
 from engine.trajectory import Event, Trajectory, Values, column_array, fault_names
@@ -187,8 +187,9 @@ class _Kept:
                 if stepper.get(f"is_new.{name.partition('.')[2]}"):
                     self.squares[name] += stepper.get(name) ** 2
                     self.counts[name] += 1
-        taken = fired(self.program, stepper)
-        self.events += [event(self.program.name, self.program, i, float(time)) for i in taken]
+        name, program = self.program.name, self.program
+        taken = fired_in_steps(program, stepper)
+        self.events += [event(name, program, info, float(time), step) for step, info in taken]
         self.mode = stepper.get("memory.mode")
 
     def innovation_rms(self) -> dict[str, float]:

@@ -10,7 +10,7 @@ from typing import Any
 
 from engine.continuous import ContinuousRun, Stopped
 from engine.feeding import Feeding, where
-from engine.firing import event, fired, mode_names
+from engine.firing import event, fired_in_steps, mode_names
 from engine.interpreter import Interpreter, Stepper
 from engine.invariant_watch import InvariantWatch
 from engine.page import calibrate
@@ -234,8 +234,8 @@ class _Simulation:
         stepper.run("step")
         self._move_lags(sources, time)
         self._put_into_lines(sources, time)
-        taken = fired(program, stepper)
-        self.events += [event(name, program, info, float(time)) for info in taken]
+        taken = fired_in_steps(program, stepper)
+        self.events += [event(name, program, info, float(time), step) for step, info in taken]
         self._note_ranges(name, time)
         self.invariants[name].look(time)
         if self.ticked:

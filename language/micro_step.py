@@ -73,9 +73,10 @@ def chart_variables(charting: Charting) -> list[Variable]:
         found += [Variable(flag(node).name, "truth") for flag in (leaves_flag, enters_flag)]
     found += [Variable(name, "whole") for name in (STEPS.name, TURN)]
     found += [Variable(BUSY.name, "truth")]
-    size = charting.chart.micro_steps * len(charting.chart.regions)
-    found.append(Variable(LOG, "whole", size=size, about="transitions of this tick"))
-    found.append(Variable(LOGGED, "whole", about="how many transitions"))
+    size = charting.chart.micro_steps * (len(charting.chart.regions) + 1)
+    about = "transitions of this tick, 0 after those of a micro-step"
+    found.append(Variable(LOG, "whole", size=size, about=about))
+    found.append(Variable(LOGGED, "whole", about="how many entries of log"))
     return found
 
 
@@ -133,7 +134,7 @@ def _step(charting: Charting) -> Block:
     """One turn: a micro-step, or the next event, or the end."""
     fired = _any(charting, _chosen(charting))
     over: Block = (FaultBit(MICRO_STEP_LIMIT), Assign(BUSY.name, Value(False)))
-    done: list[Op] = [Run("commit"), Assign(STEPS.name, add(STEPS, whole(1)))]
+    done: list[Op] = [Run("commit"), *_noted(whole(0)), Assign(STEPS.name, add(STEPS, whole(1)))]
     if charting.size:
         done.append(Assign(EVENT.name, whole(0)))
     reached = Compare("==", STEPS, whole(charting.chart.micro_steps))
@@ -198,12 +199,15 @@ def _left(charting: Charting) -> Block:
             continue
         log: Block = (Assign(fired_variable(region.region), chosen),)
         if charting.several:
-            more = (Store(LOG, Ref(LOGGED), chosen), Assign(LOGGED, add(Ref(LOGGED), whole(1))))
-            log = (*log, *more)
+            log = (*log, *_noted(chosen))
         ops.append(Branch(Compare("!=", chosen, whole(0)), log))
         if cases:
             ops.append(Choose(chosen.name, tuple(cases)))
     return tuple(ops)
+
+
+def _noted(entry: Expr) -> Block:
+    return (Store(LOG, Ref(LOGGED), entry), Assign(LOGGED, add(Ref(LOGGED), whole(1))))
 
 
 def _stage(charting: Charting, flagged: list[tuple[Ref, Mapping[str, Formula]]]) -> Block:

@@ -27,7 +27,7 @@ MODE = "memory.mode"
 """The variable of the chart's mode; a run keeps its own."""
 LOG = "memory.log"
 LOGGED = "memory.count_of_log"
-"""The transitions of a tick with several micro-steps, and how many they are."""
+"""The transitions of a tick with several micro-steps, a 0 after each step, and how many entries."""
 ValueType = Literal["real", "truth", "whole"]
 
 

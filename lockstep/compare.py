@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from codegen.build import FLAGS, executable, fed, observed, run_executable, tunable
+from engine.firing import fired
 from engine.interpreter import Stepper
 from language.number import NumberType, decimal
 from language.program import Program, short
@@ -95,15 +96,15 @@ class Tape:
             self._page = page
         self.inputs.append(record)
         self.values.append(self._value.pack(*[stepper.get(n) for n in self._names]))
-        self.transitions += self._has_moved(stepper)
+        self.transitions += self._taken(stepper)
 
-    def _has_moved(self, stepper: Stepper) -> bool:
-        """Tell whether a transition fired in the tick, or a mode is another than a step ago."""
+    def _taken(self, stepper: Stepper) -> int:
+        """Return how many transitions fired in a tick; of a step whether a mode is another."""
         if self.program.period is not None:
-            return any(stepper.get(name) for name in self.program.fired_variables())
+            return len(fired(self.program, stepper))
         before = self._modes
         self._modes = tuple(stepper.get(name) for name in self.program.mode_variables().values())
-        return before not in ((), self._modes)
+        return int(before not in ((), self._modes))
 
     def unpack(self, record: bytes) -> tuple[float | int, ...]:
         """Return the values of a record."""

@@ -122,6 +122,13 @@ def test_a_batch_reads_the_page_beside_what_it_varies(tmp_path: Path) -> None:
     assert theirs.measures["ticking_float64.y_line"].tolist() == [pytest.approx(15.72)] * 2
 
 
+def test_a_batch_does_not_vary_a_table(tmp_path: Path) -> None:
+    loaded = four(tmp_path)
+    values = {"ticking_float64.line": np.array([1.0])}
+    with pytest.raises(ValueError, match="line` is a table"):
+        run_variants(Batch(loaded.system, loaded.scenario, 1, parameters=values))
+
+
 @pytest.mark.parametrize("name", ["flowing_float32", "flowing_float64"])
 def test_a_predictor_reads_the_tables_that_its_page_does_not_hold(
     tmp_path: Path, name: str

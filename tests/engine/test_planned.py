@@ -125,6 +125,7 @@ def test_a_ramp_that_arrives_late_has_the_bits_of_the_interpreter() -> None:
         "edges_of_a_continuous_automaton_are_events_of_their_argument",
         "parallel_regions_of_a_continuous_automaton_swap_at_one_instant",
         "a_rewind_makes_its_micro_step_with_the_inputs_of_then",
+        "a_chart_may_be_regions_and_no_modes",
     ],
 )
 def test_rules_hold_in_c_as_well(rule: str) -> None:
