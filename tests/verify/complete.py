@@ -116,12 +116,19 @@ def check_of_3_mb() -> Figure:
         path = Path(folder) / "large.yaml"
         path.write_text(modes_of_equations(190, 190))
         command = [sys.executable, "-m", "modewright", "check", str(path), "--json"]
-        with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL) as child:
-            _, status, used = os.wait4(child.pid, 0)
-            child.returncode = os.waitstatus_to_exitcode(status)
+        memory = 0
+
+        def check() -> None:
+            nonlocal memory
+            with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL) as child:
+                _, status, used = os.wait4(child.pid, 0)
+                child.returncode = os.waitstatus_to_exitcode(status)
+            assert status == 0, "a valid spec is refused"
+            memory = used.ru_maxrss * 1024
+
+        seconds = seconds_of(check, LARGE_SECONDS)
         size = path.stat().st_size
-    seconds, memory = used.ru_utime + used.ru_stime, used.ru_maxrss * 1024
-    met = status == 0 and seconds < LARGE_SECONDS and memory < LARGE_BYTES
+    met = seconds < LARGE_SECONDS and memory < LARGE_BYTES
     return {"met": met, "bytes": size, "check_s": round(seconds, 1), "memory_bytes": memory}
 
 
