@@ -30,7 +30,8 @@ def memory_kind(check: DimensionCheck, tree: Application) -> Kind | None:
         return None
     if len(arguments) != wanted:
         label = f"`{name}` takes {wanted} argument(s), not {len(arguments)}"
-        check.problems.error("arguments", tree.span, label)
+        hint = f"a time has its unit: `{name}(5 s)`" if name in TIMES else ""
+        check.problems.error("arguments", tree.span, label, hint)
         return None
     if name in ("delay", *TIMES):
         check.quantity(arguments[-1], SECOND, f"the time of {name}")

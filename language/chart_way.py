@@ -25,7 +25,7 @@ def _way(chart: Chart, source: Node, transition: Transition, problems: Problems)
         hit = looked_up(chart, source, name)
         if hit is None:
             label = f"there is no mode `{name}`"
-            hint = nearest(name, known_targets(chart))
+            hint = _target_hint(chart, name)
             problems.error("name", transition.span, label, hint)
         else:
             targets.append(hit)
@@ -40,6 +40,16 @@ def _way(chart: Chart, source: Node, transition: Transition, problems: Problems)
         hint = "regions of the root are never left"
         problems.error("target", transition.span, label, hint)
     return Way(source.index, tuple(target.index for target in targets), domain)
+
+
+def _target_hint(chart: Chart, name: str) -> str:
+    """Return where a mode stands that is no target by its own name, else the nearest name."""
+    if name in ("none", "null", "self", "stay"):
+        return "`to: []` for no target"
+    paths = [node.path for node in chart.nodes[ROOT + 1 :] if node.name == name]
+    if paths:
+        return f"it stands in another mode: write {' or '.join(f'`to: {path}`' for path in paths)}"
+    return nearest(name, known_targets(chart))
 
 
 def _check_together(

@@ -183,6 +183,7 @@ class _Check:
         formulas = sources(mode)
         kept, owners = self._kept(), self.owners
         scope = Scope(known, modes, place, self._angles(), kept, self._tables(), mode.name, owners)
+        scope = dataclasses.replace(scope, events=_events(automaton))
         check = DimensionCheck(scope, self.problems)
         for name in equation_order(mode):
             for formula in formulas[name]:
@@ -209,6 +210,7 @@ class _Check:
         scope = Scope(
             known, _mode_paths(automaton), place, self._angles(), self._kept(), self._tables()
         )
+        scope = dataclasses.replace(scope, events=_events(automaton))
         return DimensionCheck(scope, self.problems)
 
     def _beside(self, mode: Mode) -> None:
@@ -271,6 +273,10 @@ class _Check:
 
 def _of_model(automaton: Automaton) -> Mapping[str, object]:
     return automaton.model.parameters if automaton.model else {}
+
+
+def _events(automaton: Automaton) -> frozenset[str]:
+    return frozenset(automaton.tree.signals if automaton.tree else ())
 
 
 def _mode_paths(automaton: Automaton) -> frozenset[str]:

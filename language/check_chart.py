@@ -8,6 +8,7 @@ from language.activity import may_complete
 from language.chart import ROOT, Chart, Node
 from language.model import Automaton, Mode, Transition
 from language.problem import Problems, Span
+from language.syntax import Name, walk
 from language.wiring import INACTIVE
 
 
@@ -26,6 +27,7 @@ def check_chart(automaton: Automaton, problems: Problems) -> None:
         if mode:
             _check_inner(chart, node, mode, problems)
             for transition in mode.transitions:
+                _check_guard(chart, transition, problems)
                 _check_way(chart, node, transition, problems)
                 _check_memory(automaton, chart, transition, problems)
 
@@ -124,6 +126,17 @@ def _leave(chart: Chart, left: Node, right: Node) -> bool:
         return False
     outer = left.parent
     return any(domain is not None and domain < outer for domain in (*from_left, *from_right))
+
+
+def _check_guard(chart: Chart, transition: Transition, problems: Problems) -> None:
+    """Warn of a guard that reads the input of an event: it holds in all micro-steps of a tick."""
+    for part in walk(transition.when.tree):
+        signal = chart.signals.get(part.path) if isinstance(part, Name) else None
+        if signal and signal.is_input:
+            label = f"`{signal.name}` is an event"
+            hint = f"write `event: {signal.name}` beside `when`; as a guard it holds in every "
+            hint += "micro-step of a tick"
+            problems.warning("form", part.span, label, hint)
 
 
 def _check_memory(

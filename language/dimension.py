@@ -55,7 +55,8 @@ class Scope:
 
     `angles` are the units of the parameters that are declared in a unit of angle, `memory` the
     functions with memory that may be used, `tables` what `lookup` reads,
-    `mode` the mode that reads, `owners` a mode for each equation that any mode has.
+    `mode` the mode that reads, `owners` a mode for each equation that any mode has, `events` those
+    of a chart, which are no values.
     """
 
     names: Mapping[str, Kind | None]
@@ -66,6 +67,7 @@ class Scope:
     tables: Mapping[str, LookupTable] = field(default_factory=dict)
     mode: str = ""
     owners: Mapping[str, str] = field(default_factory=dict)
+    events: frozenset[str] = frozenset()
 
 
 MOST_HINTS = 200
@@ -118,14 +120,14 @@ class DimensionCheck:
         kind = self.kind(tree)
         if kind is not None and kind != want:
             label = f"`{what}` is {said(want)}, this is {said(kind)}"
-            hint = "compare it: `x > 0`" if want == "truth" else ""
+            hint = _truth_hint(tree) if want == "truth" else ""
             self.report("type", tree.span, label, hint)
 
     def truth(self, tree: Tree, what: str) -> None:
         """Check that an expression is true or false."""
         kind = self.kind(tree)
         if kind is not None and kind != "truth":
-            hint = "compare it: `x > 0`"
+            hint = _truth_hint(tree)
             label = f"`{what}` is a condition, this is {said(kind)}"
             self.report("type", tree.span, label, hint)
 
@@ -193,6 +195,8 @@ class DimensionCheck:
         owner = self.scope.owners.get(tree.path, self.scope.mode)
         if owner != self.scope.mode:
             hint = f"mode `{owner}` has an equation of it, mode `{self.scope.mode}` has none"
+        if tree.path in self.scope.events:
+            hint = f"it is an event: write `event: {tree.path}` on a transition"
         self.report("name", tree.span, f"`{tree.path}` is not known {self.scope.place}", hint)
         return None
 
@@ -289,3 +293,10 @@ class DimensionCheck:
             self.report("type", tree.span, label)
             return None
         return left
+
+
+def _truth_hint(tree: Tree) -> str:
+    """Return what is written for 0 and 1, else how a number becomes a condition."""
+    words = {0: "write `false`", 1: "write `true`"}
+    number = whole_literal(tree)
+    return "compare it: `x > 0`" if number is None else words.get(number, "compare it: `x > 0`")

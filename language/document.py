@@ -88,8 +88,10 @@ class Document:
 def require_kind(document: Document, kind: str, problems: Problems) -> None:
     """Report a document of another kind, and stop. Raises SpecError."""
     if document.kind != kind:
-        article = "an" if kind[0] in "aeiou" else "a"
-        label = f"`{document.name}` is a {document.kind}, not {article} {kind}"
+        given, wanted = (
+            f"{'an' if each[0] in 'aeiou' else 'a'} {each}" for each in (document.kind, kind)
+        )
+        label = f"`{document.name}` is {given}, not {wanted}"
         problems.error("form", document.name_span, label)
         problems.stop_if_any()
 

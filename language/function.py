@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from language.aliases import FUNCTIONS
 from language.call import WHERE, lookup_kind, memory_kind
 from language.problem import nearest
 from language.syntax import MEMORY, Application, Name, Tree, is_zero
@@ -35,7 +36,7 @@ def function_kind(check: DimensionCheck, tree: Application) -> Kind | None:
     if wanted is None:
         label = f"`{name}` is not a function that can be used here"
         usable = (*ARGUMENTS, *sorted(check.scope.memory), "lookup")
-        hint = nearest(name, KNOWN) or f"there are `{' '.join(usable)}`"
+        hint = FUNCTIONS.get(name) or nearest(name, KNOWN) or f"there are `{' '.join(usable)}`"
         check.report("name", tree.span, label, hint)
         return None
     if len(arguments) != wanted:

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import cast
 
+from language.aliases import known_as
 from language.declaration import Formula, Range
 from language.document import Entry, Items, Node, Scalar, Table
 from language.kind import LARGEST_WHOLE, TYPES, Type
@@ -57,7 +58,7 @@ class Reader:
             self.problems.error("form", entry.span, label, "like `req: [BL-3]`")
 
     def _unknown_key(self, entry: Entry, what: str, known: set[str]) -> None:
-        hint = nearest(entry.key, known)
+        hint = known_as(entry.key, known) or nearest(entry.key, known)
         cut_off = isinstance(entry.node, Scalar) and not entry.node.text
         if re.search(r"[() ]", entry.key) or (cut_off and not hint):
             hint = COMMA_HINT

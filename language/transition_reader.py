@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from typing import Literal, cast
 
+from language.aliases import known_as
 from language.chart import Keeping
 from language.declaration import Formula
 from language.document import Entry, Items, Node, Scalar, Table
@@ -38,7 +40,7 @@ class TransitionReader(Reader):
         key = f"{site.key}.transitions.{entry.key}"
         table = self.table(entry.node, key, (*TRANSITION_KEYS, *CHART_WAY_KEYS))
         to, wait, priority = (table.get(part) for part in ("to", "wait", "priority"))
-        targets = self._words(to, "to") if to else (entry.key,)
+        targets = self._targets(to, entry)
         events = self._events(table, "event")
         when = self._guard(table, key, entry, bool(events) or site.holds_modes)
         waited = self.expression(wait, f"{key}.wait", entry.span) if wait else None
@@ -69,6 +71,16 @@ class TransitionReader(Reader):
             completes="when" not in table.entries and not events,
         )
 
+    def _targets(self, node: Node | None, entry: Entry) -> tuple[str, ...]:
+        """Return the names of the modes that a transition leads to: by default its own name."""
+        if node is None:
+            return (entry.key,)
+        if isinstance(node, Scalar) and not node.text:
+            label = "`to` has no target"
+            hint = f"`to: []` for none, or leave it out to go to `{entry.key}`"
+            self.problems.error("missing", node.span, label, hint)
+        return self._words(node, "to")
+
     def _words(self, node: Node | None, what: str) -> tuple[str, ...]:
         """Return the names of a list, or the only one."""
         if isinstance(node, Items):
@@ -84,6 +96,9 @@ class TransitionReader(Reader):
             if isinstance(item, Scalar) and item.text not in self.events:
                 label = f"there is no event `{item.text}`"
                 hint = nearest(item.text, self.events) or "events are declared under `events`"
+                words = [word for word in re.findall(r"\w+", item.text) if word in self.events]
+                if len(words) > 1:
+                    hint = f"several are a list: `{what}: [{', '.join(words)}]`"
                 self.problems.error("name", item.span, label, hint)
         return found
 
@@ -92,6 +107,18 @@ class TransitionReader(Reader):
         node = table.get("when")
         if node is None and optional:
             return Formula(Truth(True, entry.span), f"{key}.when")
+        keys = entry.node.entries if isinstance(entry.node, Table) else ()
+        if node is None and any(known_as(key, ("when", "event")) for key in keys):
+            return None  # told as an unknown key
+        if node is None:
+            hint = "`when: true` with the largest `priority` for what the others leave"
+            self.problems.error("missing", entry.span, "`when` is missing", hint)
+            return None
+        if isinstance(node, Scalar) and node.text in ("else", "otherwise"):
+            label = f"`{node.text}` is no condition"
+            hint = "`when: true` with the largest `priority` for what the others leave"
+            self.problems.error("expression", node.span, label, hint)
+            return None
         return self.expression(node, f"{key}.when", entry.span)
 
     def _rewind(self, node: Node | None, key: str) -> Rewind | None:

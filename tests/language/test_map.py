@@ -152,4 +152,4 @@ def test_the_shipped_maps_are_read(name: str) -> None:
 def test_another_kind_is_no_map() -> None:
     document_ = read_document(SHIPPED.path_of("driveline"))
     (problem,) = refusal(lambda: read_map(document_, SHIPPED))
-    assert problem.label == "`driveline` is a automaton, not a map"
+    assert problem.label == "`driveline` is an automaton, not a map"
