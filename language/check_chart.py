@@ -95,12 +95,30 @@ def _check_way(chart: Chart, node: Node, transition: Transition, problems: Probl
         label = f"`{node.path}` never comes to its end: there is no final mode in it"
         hint = "`when: true` for a transition that is always enabled, else a guard"
         problems.error("missing", transition.span, label, hint)
+    _check_history(chart, node, transition, problems)
     if transition.history:
         for index in chart.ways[transition.key].targets:
             target = chart.nodes[index]
             if target.kind not in ("compound", "parallel"):
                 label = f"`{target.path}` has no modes inside: there is no history of it"
                 problems.error("form", transition.span, label)
+
+
+def _check_history(chart: Chart, node: Node, transition: Transition, problems: Problems) -> None:
+    """Warn of a history that is entered from inside: it tells of the time before."""
+    way = chart.ways[transition.key]
+    for index in way.targets:
+        target = chart.nodes[index]
+        outer = chart.nodes[target.parent]
+        stays = way.domain is not None and outer.holds(way.domain) and outer.holds(node.index)
+        if target.kind == "history" and stays and target.initial:
+            label = f"`{target.name}` is what `{outer.path}` was left in, which this does not leave"
+            back = chart.nodes[target.initial[0]]
+            hint = "a history is entered from outside of its mode"
+            if back.kind in ("compound", "parallel"):
+                hint = f"to go back to where `{back.name}` was left: `{{to: {back.name}, "
+                hint += f"history: {target.history}}}`"
+            problems.warning("form", transition.span, label, hint)
 
 
 def _check_ranks(automaton: Automaton, chart: Chart, problems: Problems) -> None:
