@@ -36,6 +36,7 @@ from language.program import (
     Variable,
 )
 from language.traversal import reads, walk
+from language.units import shown_unit
 from language.wiring import finished
 
 GROUPS = ("state", "discrete", "latched", "equation", "before", "innovation", "timer", "check")
@@ -168,15 +169,15 @@ def _step(program: Program) -> str:
 
 
 def _field(variable: Variable, number: NumberType) -> Field:
-    comment = variable.unit if variable.type == "real" else variable.about
+    comment = shown_unit(variable.unit) if variable.type == "real" else variable.about
     if variable.type == "real" and variable.about:
-        comment = f"{variable.unit}; {variable.about}"
+        comment = f"{shown_unit(variable.unit)}; {variable.about}"
     member = c_member(variable.name)
     return Field(c_type(variable, number), member, safe(comment), size=variable.size)
 
 
 def _constant(constant: Constant, number: NumberType) -> Field:
-    comment = "; ".join(text for text in (constant.unit, constant.key) if text)
+    comment = "; ".join(text for text in (shown_unit(constant.unit), constant.key) if text)
     if constant.range:
         low, high = constant.range
         comment += f"; {decimal(low, number)} to {decimal(high, number)}"
@@ -205,7 +206,7 @@ def _outputs(program: Program) -> list[dict[str, str]]:
         {
             "type": types[wire.source],
             "name": wire.name,
-            "unit": wire.unit,
+            "unit": shown_unit(wire.unit),
             "source": place(wire.source),
         }
         for wire in program.outputs

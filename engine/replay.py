@@ -20,6 +20,7 @@ from language.model import CHART, Automaton
 from language.pairing import paired
 from language.problem import Problems, SpecError
 from language.program import Program
+from language.units import shown_unit
 
 MAX_TICKS = 20_000_000
 """Most ticks of one replay."""
@@ -168,7 +169,9 @@ class _Kept:
             self.names.setdefault("mode" if region == CHART else region, variable)
         variables = {variable.name: variable for variable in program.variables}
         self.kinds = {name: variables[source].type for name, source in self.names.items()}
-        self.units = {name: variables[source].unit for name, source in self.names.items()}
+        self.units = {
+            name: shown_unit(variables[source].unit) for name, source in self.names.items()
+        }
         self.innovations = [n for n in variables if n.startswith("innovation.")]
         observing = {info.mode for info in program.observers}
         self.observing = {m.number for m in program.modes if m.name in observing}

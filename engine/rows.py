@@ -15,6 +15,7 @@ from engine.trajectory import Values as Column, column_array
 from language.declaration import Formula
 from language.experiment import Scenario, System
 from language.program import Program, ValueType
+from language.units import shown_unit
 from language.wires import output_block
 
 Values = tuple[Any, ...]
@@ -43,7 +44,7 @@ def recorded(
     for owner, program in programs.items():
         for wire in program.outputs:
             name = f"{owner}.{wire.name}"
-            known[name] = Recorded(name, wire.type, wire.unit, None, name)
+            known[name] = Recorded(name, wire.type, shown_unit(wire.unit), None, name)
             everything.append(name)
     for name, sensor in system.sensors.items():
         known[name] = Recorded(name, "real", str(sensor.dimension), None, name)
@@ -57,7 +58,7 @@ def recorded(
             everything.append(name)
         else:
             part = known[output]
-            known[name] = Recorded(name, part.type, part.unit, None, part.source)
+            known[name] = Recorded(name, part.type, shown_unit(part.unit), None, part.source)
     return tuple(known[name] for name in scenario.signals or everything)
 
 

@@ -22,6 +22,23 @@ MECHANICAL: dict[tuple[int, ...], str] = {
     (2, 1, 0): "kg*m^2",
 }
 """How dimensions of mechanics are shown: powers of m, kg, s."""
+COMMON: dict[tuple[int, ...], str] = {
+    (2, 1, -3, -1, 0): "V",
+    (2, 1, -3, -2, 0): "V/A",
+    (-2, -1, 3, 2, 0): "A/V",
+    (2, 1, -2, -2, 0): "V*s/A",
+    (-2, -1, 4, 2, 0): "A*s/V",
+    (0, 0, 1, 1, 0): "A*s",
+    (2, 1, -2, -1, 0): "N*m/A",
+    (1, 1, -3, -1, 0): "V/m",
+    (2, 1, -4, -1, 0): "V/s",
+    (0, 1, -2, 0, 0): "N/m",
+    (2, 1, -2, 0, -1): "N*m/K",
+    (2, 1, -3, 0, -1): "W/K",
+    (-2, -1, 3, 0, 1): "K/W",
+    (-1, 1, -3, 0, 0): "Pa/s",
+}
+"""Further common names, for readers alone: powers of m, kg, s, A, K. Programs do without them."""
 
 UNIT = re.compile(r"(1/)?[A-Za-z]+(\^-?\d)?([*/][A-Za-z]+(\^-?\d)?)*")
 PIECE = re.compile(r"([*/]?)([A-Za-z]+)(?:\^(-?\d))?")
@@ -81,6 +98,14 @@ UNKNOWN_UNIT = Unit("?", Fraction(1), UNKNOWN)
 
 def _power(name: str, power: int) -> str:
     return name if power == 1 else f"{name}^{power}"
+
+
+SHOWN = {str(Dimension(powers)): text for powers, text in COMMON.items()}
+
+
+def shown_unit(text: str) -> str:
+    """Return how a unit of a Program is shown: by its common name where it has one."""
+    return SHOWN.get(text, text)
 
 
 @cache

@@ -79,8 +79,8 @@ typedef struct {
 
 typedef struct {
     uint8_t key; /* inputs.key */
-    float U_dc; /* m^2*kg/s^3/A; inputs.U_dc */
-    float U_pack; /* m^2*kg/s^3/A; inputs.U_pack */
+    float U_dc; /* V; inputs.U_dc */
+    float U_pack; /* V; inputs.U_pack */
     float T_req; /* N*m; inputs.T_req */
     float v; /* m/s; inputs.v */
     float temp; /* K; inputs.temp */
@@ -113,8 +113,8 @@ typedef struct {
     } discrete;
     struct {
         uint8_t key; /* inputs.key within its range */
-        float U_dc; /* m^2*kg/s^3/A; inputs.U_dc within its range */
-        float U_pack; /* m^2*kg/s^3/A; inputs.U_pack within its range */
+        float U_dc; /* V; inputs.U_dc within its range */
+        float U_pack; /* V; inputs.U_pack within its range */
         float T_req; /* N*m; inputs.T_req within its range */
         float v; /* m/s; inputs.v within its range */
         float temp; /* K; inputs.temp within its range */

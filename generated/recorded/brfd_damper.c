@@ -20,7 +20,7 @@ static const struct {
     double c_v;
     double c_b;
 } constant = {
-    .k_s = 2500000.0, /* kg/s^2; brfd_damper parameters.k_s; 500000.0 to 20000000.0; elastic stick */
+    .k_s = 2500000.0, /* N/m; brfd_damper parameters.k_s; 500000.0 to 20000000.0; elastic stick */
     .F_up = 11000.0, /* N; brfd_damper parameters.F_up; 3000.0 to 40000.0; slip under a positive velocity */
     .F_lo = 17000.0, /* N; brfd_damper parameters.F_lo; 3000.0 to 40000.0; slip under a negative velocity */
     .c_v = 60000.0, /* kg/s; brfd_damper parameters.c_v; 0.0 to 300000.0 */

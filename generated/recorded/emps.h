@@ -46,7 +46,7 @@ typedef struct {
         double F_dr; /* N */
     } state;
     struct {
-        double u_dr; /* m^2*kg/s^3/A */
+        double u_dr; /* V */
         double F_m; /* N */
     } equation;
     struct {

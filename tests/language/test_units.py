@@ -21,6 +21,7 @@ from language.units import (
     power,
     product,
     root,
+    shown_unit,
     unit_hint,
 )
 from tests.language.making import automaton, si
@@ -294,3 +295,8 @@ modes: {only: {}}
     assert made.inputs["p"].default == 2 * 10**5
     assert made.inputs["p"].range == bounds(0, 5 * 10**5)
     assert made.states["x"].range == (Fraction(-5, 1000), Fraction(5, 1000))
+
+
+@pytest.mark.parametrize("text", ["V", "V/A", "N/m", "A*s/V", "V*s/A", "K/W", "N*m", "W", "Pa"])
+def test_a_dimension_is_shown_by_its_common_name(text: str) -> None:
+    assert shown_unit(str(parse_unit(text).dimension)) == shown_unit(text) == text
