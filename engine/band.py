@@ -9,9 +9,12 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
 from engine.trajectory import Trajectory, Values
+from language.wiring import INACTIVE
 
 PALETTE = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#777777")
 """Colours that colour-blind readers tell apart (Tol 2021, bright)."""
+INACTIVE_COLOUR = "#dddddd"
+"""Of a region that is in none of its modes, which is no mode of its own."""
 CHARACTER = 0.075
 """Width of a character at 8 points, with room [inch]."""
 
@@ -28,7 +31,9 @@ class Band:
 def draw_band(axis: Axes, trajectory: Trajectory, band: Band, window: tuple[float, float]) -> None:
     """Draw a strip; modes whose stretches are too short for a name are named beside it."""
     names = trajectory.modes[band.signal]
-    colours = {number: PALETTE[k % len(PALETTE)] for k, number in enumerate(sorted(names))}
+    active = sorted(number for number in names if names[number] != INACTIVE)
+    colours = {number: PALETTE[k % len(PALETTE)] for k, number in enumerate(active)}
+    colours |= dict.fromkeys(set(names) - set(active), INACTIVE_COLOUR)
     room = 0.72 * axis.figure.get_figure(root=True).get_figwidth() / (window[1] - window[0])
     short = {}
     named = set()
@@ -40,8 +45,9 @@ def draw_band(axis: Axes, trajectory: Trajectory, band: Band, window: tuple[floa
         axis.axvspan(start, end, color=colour, alpha=0.75, lw=0)
         short[name] = colour
         if (right - left) * room > CHARACTER * len(name):
+            ink = "black" if colour == INACTIVE_COLOUR else "white"
             axis.text(
-                0.5 * (left + right), 0.5, name, ha="center", va="center", fontsize=8, color="white"
+                0.5 * (left + right), 0.5, name, ha="center", va="center", fontsize=8, color=ink
             )
             named.add(name)
     _legend(axis, {name: colour for name, colour in short.items() if name not in named})

@@ -224,7 +224,9 @@ def _panel(
 
 
 def _mark_events(axis: Axes, run: Trajectory, window: tuple[float, float]) -> None:
-    instants = sorted({e.time for e in run.events if window[0] <= e.time <= window[1]})
+    """Mark when a mode became another one, not what fired and left the modes as they were."""
+    times = {e.time for e in run.events if e.source != e.target}
+    instants = sorted(time for time in times if window[0] <= time <= window[1])
     for k, time in enumerate(instants[:MOST_MARKERS]):
         label = "mode changes" if k == 0 else None
         axis.axvline(time, color="black", lw=0.7, ls=":", alpha=0.55, label=label, zorder=0)

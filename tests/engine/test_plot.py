@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
 import xml.etree.ElementTree as ElementTree
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_hex
 
+from engine.band import INACTIVE_COLOUR, PALETTE
 from engine.plot import overview
 from engine.trajectory import Event, Trajectory
 
@@ -47,6 +50,23 @@ def test_mode_changes_are_marked_in_every_panel_and_named_in_its_legend() -> Non
         assert legend and "mode changes" in [text.get_text() for text in legend.get_texts()]
         dotted = [line for line in axis.lines if line.get_linestyle() == ":"]
         assert [list(np.ravel(line.get_xdata())) for line in dotted] == [[0.45, 0.45]]
+
+
+def test_what_fires_and_changes_no_mode_is_not_marked() -> None:
+    stays = Event(0.7, 0, "p", "count", "drive", "drive")
+    ranged = Event(0.8, 0, "p", "range T", "drive", "drive", kind="range", message="too large")
+    shown = overview([dataclasses.replace(run(), events=(*run().events, stays, ranged))])
+    dotted = [line for line in shown.figure.axes[1].lines if line.get_linestyle() == ":"]
+    assert [list(np.ravel(line.get_xdata())) for line in dotted] == [[0.45, 0.45]]
+
+
+def test_a_region_without_a_mode_has_no_colour_of_a_mode() -> None:
+    plain = run()
+    rows = {**plain.signals, "p.mode": np.repeat([-1, 0, 1], [4, 3, 4])}
+    modes = {"p.mode": {-1: "inactive", 0: "gap", 1: "drive"}}
+    band = overview([dataclasses.replace(plain, signals=rows, modes=modes)]).figure.axes[0]
+    colours = [to_hex(patch.get_facecolor()) for patch in band.patches]
+    assert colours == [INACTIVE_COLOUR, *PALETTE[:2]]
 
 
 def test_the_second_run_is_dashed_in_the_colours_of_the_first() -> None:
