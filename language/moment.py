@@ -195,15 +195,18 @@ class Moment:
             if self.tag:
                 return Value(_time_of(automaton, part) <= 0)
             if automaton.is_sampled:
-                self.story.extents[ELAPSED] = Extent("whole", low=Fraction(0))
-                ticks = whole(ticks_of(automaton, part.arguments[0]))
-                return Compare(">=", Ref(ELAPSED, True), ticks)
+                return self._aged(part)
             self.story.extents[ELAPSED] = Extent(low=Fraction(0))
             time = expression(part.arguments[0], constant_names(automaton))
             return Compare(">=", Ref(ELAPSED), time)
         name = f"memory.{part.function}_{len(self.story.extents)}{self.tag}"
         if part.function in ("changed", "every"):
             self.story.extents[name] = Extent("truth")
+            if part.function == "every" and automaton.is_sampled:
+                aged = self._aged(part)
+                if ticks_of(automaton, part.arguments[0]) == 1:
+                    return aged  # each tick after the first
+                self.story.facts.append(Binary("or", Unary("not", Ref(name)), aged))
             return Ref(name)
         if part.function in EDGES:
             self.story.extents[name] = Extent("truth")
@@ -214,6 +217,12 @@ class Moment:
         kind = type_of(automaton, part.arguments[0])
         self.story.extents[name] = replace(self._extent_of(part.arguments[0]), type=kind)
         return Ref(name, kind == "whole")
+
+    def _aged(self, part: Application) -> Expr:
+        """Return that a mode has been active for the whole ticks of a time."""
+        self.story.extents[ELAPSED] = Extent("whole", low=Fraction(0))
+        ticks = whole(ticks_of(self.automaton, part.arguments[0]))
+        return Compare(">=", Ref(ELAPSED, True), ticks)
 
     def _extent_of(self, tree: Tree) -> Extent:
         """Return the bounds of a name that is delayed."""
