@@ -14,6 +14,7 @@ from expectation.places import (
     path_of,
     require_mode_output,
     stays,
+    unknown_output,
 )
 from language.declaration import Formula
 from language.dimension import DimensionCheck, Scope
@@ -195,7 +196,8 @@ class _Found:
         else:
             label = f"`{tree.path}` is not a signal of `{self.reader.system.name}`"
             known = [*self.reader.kinds, *self.reader.regions]
-            self._error("name", tree, label, nearest(name, known))
+            hint = unknown_output(self.reader.system, name) or nearest(name, known)
+            self._error("name", tree, label, hint)
         return Broken(tree.span)
 
     def _error(self, kind: str, at: Tree, label: str, help: str = "") -> None:

@@ -68,3 +68,15 @@ def require_mode_output(system: System, instance: str, at: Span, problems: Probl
     if is_chart(system, instance) and "mode" not in outputs:
         label = f"`{instance}` is a chart: its modes are known by its output `mode`"
         problems.error("missing", at, label, "add `mode` to its `outputs`")
+
+
+def unknown_output(system: System, name: str) -> str:
+    """Return what makes a signal of what an instance keeps to itself; empty where it has none."""
+    head, _, own = name.rpartition(".")
+    instance = system.instances.get(head or system.alone or "")
+    automaton = instance.automaton if instance else None
+    if automaton is None:
+        return ""
+    computed = {part for mode in automaton.modes.values() for part in mode.equations}
+    is_its_own = own in computed or own in automaton.carried
+    return f"add `{own}` to the `outputs` of `{automaton.name}`" if is_its_own else ""
