@@ -1,0 +1,21 @@
+"""Words of other statechart tools: each means a key that there is, where that has a place."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from language.aliases import KEYS, known_as
+
+SCHEMA = Path(__file__).parent.parent.parent / "spec" / "modewright.schema.json"
+
+
+@pytest.mark.parametrize("word", KEYS)
+def test_every_word_means_a_key_that_there_is(word: str) -> None:
+    keys = json.dumps(json.loads(SCHEMA.read_text()))
+    for meant in KEYS[word]:
+        assert f'"{meant}":' in keys
+        assert known_as(word, {meant, "about"}) == f"did you mean `{meant}`?"
+    assert known_as(word, {"about"}) == ""
