@@ -173,7 +173,7 @@ class _Guards:
         at_once = [way for way in first if way in before and not _held(self.automaton, way)]
         lasted = self._lasted(wait)
         for way in first:
-            own = lasted if way in before else ()
+            own = self._lasted(wait - _held(self.automaton, way)) if way in before else ()
             if self.together_never(guard, *own, _not(self.of(way))):
                 what, hint = f"`{way.name}` fires", BY_PRIORITY
                 if way not in self.mode.transitions:

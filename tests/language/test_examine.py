@@ -59,6 +59,8 @@ def test_no_shipped_spec_raises_an_alarm(path: Path, monkeypatch: pytest.MonkeyP
         ("when: x > 0 m, wait: 40 ms", "when: v > 0 m/s, wait: 50 ms", []),
         ("when: after(30 ms)", "when: x > 0 m, wait: 30 ms", ["timer"]),
         ("when: x > 0 m, wait: 30 ms", "when: after(30 ms)", []),
+        ("when: after(20 ms), wait: 10 ms", "when: x > 0 m, wait: 20 ms", []),
+        ("when: after(10 ms), wait: 10 ms", "when: x > 0 m, wait: 20 ms", ["timer"]),
         ("when: every(10 ms)", "when: x > 0 m, wait: 10 ms", ["timer"]),
         ("when: every(20 ms)", "when: x > 0 m, wait: 10 ms", []),
         ("when: after(15 ms)", "when: every(20 ms)", ["shadowed"]),  # 2 ticks both
