@@ -59,6 +59,7 @@ verify: setup ## measure every acceptance figure; with recordings: ARGS="--recor
 	$(BIN)/python tests/verify/command_line.py
 	$(BIN)/python tests/verify/editor.py
 	$(BIN)/python tests/verify/static_checks.py
+	$(BIN)/python tests/verify/charts.py
 	$(BIN)/python tests/verify/studies.py
 	$(BIN)/python tests/verify/fast.py
 	$(BIN)/python tests/verify/open_cases.py
