@@ -6,28 +6,18 @@ It is read from the laid-out text, so that guards stand in it as their author wr
 from __future__ import annotations
 
 import dataclasses
-import re
-import textwrap
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from language.document import Document, Entry, Items, Node, Scalar, Table
+from language.document import Document, Entry, Items, Node, Table
 from language.overlay import lay, without
 from language.problem import Problems
-from language.text import shortened, visible
 from language.transition_table import with_transition_tables
+from modewright.label import Sort, inside, label_of, sort_of, text_of
 
-LONGEST = 1000
-"""Characters of a label; expressions are shorter, other texts are cut."""
-LABEL_WIDTH = 36
-"""Longest line of a label [characters]."""
-MOST_LINES = 6
-"""Most lines of equations shown in a mode."""
 Key = tuple[str, ...]
-Sort = Literal["", "final", "history"]
-"""What a mode is: most are plain; one that nothing leaves; a place that enters another mode."""
 Shade = Literal["", "covered", "part", "missed"]
 """What tests have reached of a mode or a transition; empty where nothing is said of it."""
 
@@ -101,11 +91,11 @@ def diagram_of(document: Document) -> Diagram:
     templates = document.root.get("templates")
     root = _filled(document.root, templates) if isinstance(templates, Table) else document.root
     root = with_transition_tables(root, Problems())
-    regions = [_with_fault(r, _text(root.get("fault_mode"))) for r in _regions(root, ())]
+    regions = [_with_fault(r, text_of(root.get("fault_mode"))) for r in _regions(root, ())]
     known = set(_paths(regions))
     arrows = [arrow for path, table in _modes(root, ()) for arrow in _arrows(path, table, known)]
     about = document.root.get("about")
-    return Diagram(document.name, _text(about), tuple(regions), tuple(arrows))
+    return Diagram(document.name, text_of(about), tuple(regions), tuple(arrows))
 
 
 def _with_fault(region: RegionBox, fault_mode: str) -> RegionBox:
@@ -121,7 +111,7 @@ def _with_fault(region: RegionBox, fault_mode: str) -> RegionBox:
 
 def _filled(owner: Table, templates: Table) -> Table:
     """Return a table whose modes, inner ones too, are laid over the templates that they name."""
-    template = templates.get(_text(owner.get("like")))
+    template = templates.get(text_of(owner.get("like")))
     if isinstance(template, Table):
         owner = lay(template, without(owner, "like"), Problems(), template=True)
     entries = dict(owner.entries)
@@ -171,22 +161,16 @@ def _region(name: str, owner: Table, modes: Table, path: Key) -> RegionBox:
     boxes = [
         ModeBox(
             (*path, entry.key),
-            tuple(_inside(entry.node)),
+            tuple(inside(entry.node)),
             tuple(_regions(entry.node, (*path, entry.key))),
-            sort=_sort(entry.node),
+            sort=sort_of(entry.node),
         )
         for entry in modes
         if isinstance(entry.node, Table)
     ]
     return RegionBox(
-        name, _text(owner.get("initial")) or next((b.name for b in boxes), ""), tuple(boxes)
+        name, text_of(owner.get("initial")) or next((b.name for b in boxes), ""), tuple(boxes)
     )
-
-
-def _sort(mode: Table) -> Sort:
-    if mode.get("history") is not None:
-        return "history"
-    return "final" if _text(mode.get("final")) == "true" else ""
 
 
 def _modes(owner: Table, path: Key) -> Iterator[tuple[Key, Table]]:
@@ -214,7 +198,7 @@ def _arrows(path: Key, mode: Table, known: set[Key]) -> Iterator[Arrow]:
     transitions = mode.get("transitions")
     for entry in transitions if isinstance(transitions, Table) else ():
         if isinstance(entry.node, Table):
-            label = tuple(_label(entry.node))
+            label = tuple(label_of(entry.node))
             names = _names(entry.node.get("to"), entry.key)
             if not names:
                 yield Arrow(path, path, (*label, "/ stays"), entry.key)
@@ -227,8 +211,8 @@ def _arrows(path: Key, mode: Table, known: set[Key]) -> Iterator[Arrow]:
 def _names(to: Node | None, key: str) -> list[str]:
     """Return the targets of a transition: those of a list, the only one, or its key."""
     if isinstance(to, Items):
-        return [_text(item) for item in to.nodes]
-    return [_text(to) or key]
+        return [text_of(item) for item in to.nodes]
+    return [text_of(to) or key]
 
 
 def _target(name: Key, path: Key, known: set[Key]) -> Key | None:
@@ -237,79 +221,6 @@ def _target(name: Key, path: Key, known: set[Key]) -> Key | None:
         if (*path[:depth], *name) in known:
             return (*path[:depth], *name)
     return None
-
-
-def _label(transition: Table) -> Iterator[str]:
-    """Yield the lines of a label: priority, event, guard, wait, resets and what else is said."""
-    when, event = _text(transition.get("when")), _text(transition.get("event"))
-    priority = _text(transition.get("priority"))
-    start = f"({priority}) " if priority else ""
-    condition = " and ".join(
-        part for part in (f"on {event.replace(', ', ' or ')}" if event else "", when) if part
-    )
-    yield from _wrapped(start + condition)
-    if wait := _text(transition.get("wait")):
-        yield f"for {wait}"
-    reset = transition.get("reset")
-    for entry in reset if isinstance(reset, Table) else ():
-        yield from _wrapped(f"/ {entry.key} = {_text(entry.node)}")
-    for key in ("raise", "history", "memory", "internal", "rewind"):
-        if transition.get(key) is not None:
-            yield from _wrapped(f"/ {key}: {_text(transition.get(key))}")
-
-
-def _inside(node: Node) -> list[str]:
-    """Return what holds in a mode: its equations, flow, updates and observer, shortened."""
-    if not isinstance(node, Table):
-        return []
-    lines = _standing(node)
-    for key in ("equations", "update", "entry", "exit"):
-        part = node.get(key)
-        word = "" if key == "equations" else f"{key} / "
-        for entry in part if isinstance(part, Table) else ():
-            lines += _wrapped(f"{word}{entry.key} = {_text(entry.node)}")
-    flow = node.get("flow")
-    for entry in flow if isinstance(flow, Table) else ():
-        lines += _wrapped(_text(entry.node))
-    for key in ("observer", "runs"):
-        part = node.get(key)
-        if isinstance(part, Table):
-            of = _text(part.get("of"))
-            lines.append(f"{key} of {of}" if of else key)
-    return lines if len(lines) <= MOST_LINES else [*lines[: MOST_LINES - 1], "..."]
-
-
-def _standing(mode: Table) -> list[str]:
-    """Return what a mode is where it is no plain one, as a line."""
-    kept, first = _text(mode.get("history")), _text(mode.get("initial"))
-    if kept:
-        return _wrapped(f"{kept} history" + (f", else {first}" if first else ""))
-    return ["final"] if _sort(mode) == "final" else []
-
-
-def _wrapped(text: str) -> list[str]:
-    """Return a text in lines, parted before `and` and `or` where that is enough."""
-    lines: list[str] = []
-    plain = visible(shortened(" ".join(text.split()), LONGEST))
-    for piece in re.split(r" (?=(?:and|or) )", plain):
-        if lines and len(lines[-1]) + 1 + len(piece) <= LABEL_WIDTH:
-            lines[-1] += " " + piece
-        else:
-            indent = "    " if lines else ""
-            lines += textwrap.wrap(
-                piece, LABEL_WIDTH, initial_indent=indent, subsequent_indent="    "
-            )
-    return lines
-
-
-def _text(node: Node | None) -> str:
-    if isinstance(node, Scalar):
-        return visible(" ".join(node.text.split()))
-    if isinstance(node, Table):
-        return ", ".join(f"{entry.key} {_text(entry.node)}" for entry in node)
-    if isinstance(node, Items):
-        return ", ".join(map(_text, node.nodes))
-    return ""
 
 
 def graph(reference: str, root: Path | None = None) -> Diagram:
