@@ -27,14 +27,21 @@ def along(bench: Bench, free: Estimate, drifts: Sequence[Reals]) -> tuple[tuple[
     target = [values - np.mean(values) for values in drifts]
     found = []
     for name, parts in _columns(bench, free).items():
-        values = np.concatenate(parts)
+        values = np.concatenate(_ends(parts, drifts))
         together = np.concatenate(drifts)
         if np.std(values) > 0.0 and np.std(together) > 0.0:
             found.append((name, float(np.corrcoef(values, together)[0, 1])))
     found.append(("the recording (not the same in each)", _between(drifts)))
-    found += [(name, _order(target, angles)) for name, angles in _angles(bench, free).items()]
+    angles = _angles(bench, free).items()
+    found += [(name, _order(target, _ends(each, drifts))) for name, each in angles]
     found = [(name, value) for name, value in found if np.isfinite(value)]
     return tuple(sorted(found, key=lambda pair: -abs(pair[1]))[:MOST])
+
+
+def _ends(parts: Sequence[Reals], drifts: Sequence[Reals]) -> list[Reals]:
+    """Return the part of each recording in which its drift is known: all but the start."""
+    pairs = zip(parts, drifts, strict=True)
+    return [part[len(part) - len(values) :] for part, values in pairs]
 
 
 def _columns(bench: Bench, free: Estimate) -> dict[str, list[Reals]]:

@@ -13,6 +13,7 @@ from diagnosis import wording
 from diagnosis.digits import per_cent, significant
 from diagnosis.dossier import Dossier
 from diagnosis.location import acting
+from diagnosis.locus import drifts_of
 from diagnosis.locus_picture import locus_picture
 from diagnosis.missing_picture import missing_picture
 from diagnosis.place_sentence import PLACES
@@ -130,7 +131,8 @@ def _missing(dossier: Dossier, inputs: Mapping[str, str]) -> list[Drawing]:
         f"What is {what} over time, before effects are laid: the unknown that would explain what "
         f"is recorded in {names[place]}, as an observer finds it."
     )
-    picture = missing_picture(best, bench.series[place], place, what, unit, inputs)
+    drift = drifts_of(bench.series, best.free, best.drift)[place]
+    picture = missing_picture(best, bench.series[place], drift, what, unit, inputs)
     return [Drawing("missing", caption, caption, picture)]
 
 

@@ -10,6 +10,7 @@ import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from diagnosis.bench import Bench
 from diagnosis.estimation import Estimate, estimated, with_normal
@@ -21,6 +22,7 @@ from diagnosis.locus import Locus, drifts_of
 from diagnosis.search import Tell, Tried
 from diagnosis.selection import Selection, counted
 
+Reals = NDArray[np.float64]
 MOST = 0.8
 """Part of the squares of a drift that its loudest samples have."""
 SHORT = 0.22
@@ -52,7 +54,7 @@ def with_hidden(
         return selection
     locus, layer = loud[0], known[loud[0].path]
     assert locus.free is not None, "a locus with a gain was let free"
-    if not acts_in_windows(locus.free, locus.drift):
+    if not acts_in_windows(drifts_of(bench.series, locus.free, locus.drift)):
         return selection
     quiet, model = freed(bench, selection.base), with_normal(locus.free, bench.series)
     if selection.accepted:
@@ -77,9 +79,9 @@ def _quieted(bench: Bench, model: Estimate) -> Estimate:
     return estimated(model.candidate, bench.series, noises, model.point, ROUNDS)
 
 
-def acts_in_windows(model: Estimate, name: str) -> bool:
+def acts_in_windows(drifts: Sequence[Reals]) -> bool:
     """Tell whether a drift is silent most of the time."""
-    squares = np.concatenate(drifts_of(model, name)) ** 2
+    squares = np.concatenate(drifts) ** 2
     whole = np.cumsum(np.sort(squares)[::-1])
     loudest = int(np.searchsorted(whole, MOST * whole[-1])) + 1
     return loudest < SHORT * len(squares)

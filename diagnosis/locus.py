@@ -13,6 +13,7 @@ from diagnosis.bench import Bench
 from diagnosis.companion import along
 from diagnosis.estimation import Estimate
 from diagnosis.layers import DRIFT, Layer
+from diagnosis.prediction import burnt
 from diagnosis.scale import scale_of
 from diagnosis.series import Series
 
@@ -52,9 +53,9 @@ class Locus:
 
 def locus_of(bench: Bench, section: str, layer: Layer, free: Estimate) -> Locus:
     """Return what the drift of a layer does at a place where it is free; the gains are not set."""
-    drifts = drifts_of(free, layer.named(DRIFT))
-    predictions = free.outcome.predictions
-    modes = [one.modes[: one.done] for one in predictions]
+    drifts = drifts_of(bench.series, free, layer.named(DRIFT))
+    predictions = zip(bench.series, free.outcome.predictions, strict=True)
+    modes = [run.modes[burnt(one) : run.done] for one, run in predictions]
     size = float(np.sqrt(np.mean(np.concatenate(drifts) ** 2)))
     windows = [
         window
@@ -77,15 +78,17 @@ def locus_of(bench: Bench, section: str, layer: Layer, free: Estimate) -> Locus:
     )
 
 
-def drifts_of(free: Estimate, name: str) -> list[Reals]:
-    """Return the drift of a name [SI] in each recording (samples,)."""
+def drifts_of(series: Sequence[Series], free: Estimate, name: str) -> list[Reals]:
+    """Return the drift of a name [SI] in each recording (samples,) once its states are found."""
     place = free.candidate.predictor.states.index(name)
-    return [one.states[: one.done, place] for one in free.outcome.predictions]
+    runs = zip(series, free.outcome.predictions, strict=True)
+    return [run.states[burnt(one) : run.done, place] for one, run in runs]
 
 
 def _windows(values: Reals, size: float, series: Series) -> list[tuple[float, float, str]]:
     """Return the times [s] of a recording at which a drift is loud."""
-    start, period = float(series.start), float(series.period)
+    period = float(series.period)
+    start = float(series.start) + burnt(series) * period
     loud = np.flatnonzero(np.abs(values) > LOUD * size) if size > 0.0 else np.array([], dtype=int)
     if not len(loud):
         return []

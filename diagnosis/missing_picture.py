@@ -6,28 +6,29 @@ from collections.abc import Mapping
 
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
-from diagnosis.locus import Locus, drifts_of
+from diagnosis.locus import Locus
 from diagnosis.series import Series
 from engine.band import PALETTE
 from engine.plot import Picture
 from language.text import visible
 
-BLUE, RED, GREEN, _, _, PURPLE, GREY = PALETTE
+Reals = NDArray[np.float64]
+_, RED, GREEN, _, _, PURPLE, GREY = PALETTE
 MOST_INPUTS = 3
 
 
 def missing_picture(
-    locus: Locus, one: Series, place: int, what: str, unit: str, inputs: Mapping[str, str]
+    locus: Locus, one: Series, drift: Reals, what: str, unit: str, inputs: Mapping[str, str]
 ) -> Picture:
-    """Return the picture of what a recording `one`, the one at `place`, asks for at a locus.
+    """Return the picture of the `drift` (samples,) that the end of a recording asks for.
 
     `what` it is and its `unit` are told; beneath stand those of the `inputs` (names with units)
     that move, in the unit of the first.
     """
-    assert locus.free is not None
-    drift = drifts_of(locus.free, locus.drift)[place]
-    times = float(one.start) + np.arange(len(drift)) * float(one.period)
+    first = one.count - len(drift)
+    times = float(one.start) + np.arange(first, one.count) * float(one.period)
     moving = [k for k in range(len(inputs)) if float(np.ptp(one.inputs[:, k])) > 0.0]
     names, units = list(inputs), list(inputs.values())
     moving = [k for k in moving if units[k] == units[moving[0]]][:MOST_INPUTS]
@@ -43,9 +44,7 @@ def missing_picture(
     above.set_ylabel(visible(f"{what} [{unit}]"), fontsize=9, parse_math=False)
     above.set_title(visible(one.name), loc="left", fontsize=10, parse_math=False)
     for k, colour in zip(moving, (GREEN, PURPLE, GREY), strict=False):
-        beneath.plot(
-            times, one.inputs[: len(times), k], color=colour, lw=1.1, label=visible(names[k])
-        )
+        beneath.plot(times, one.inputs[first:, k], color=colour, lw=1.1, label=visible(names[k]))
     if moving:
         beneath.set_ylabel(visible(f"inputs [{units[moving[0]]}]"), fontsize=8, parse_math=False)
         beneath.legend(loc="best", fontsize=8)

@@ -133,6 +133,11 @@ def noises_of(series: Sequence[Series], drifts: Mapping[str, float]) -> Noises:
     return Noises(known, np.median(inputs, axis=0), drifts, np.full(len(known), np.inf))
 
 
+def burnt(series: Series) -> int:
+    """Return how many samples at the start of a recording do not count."""
+    return max(1, round(BURN_IN / float(series.period)))
+
+
 def predicted(
     candidate: Candidate,
     series: Sequence[Series],
@@ -155,8 +160,7 @@ def predicted(
                 one.is_linear,
             )
         )
-    burnt = [max(1, round(BURN_IN / float(one.period))) for one in series]
-    innovations = tuple(p.innovations[skip:] for p, skip in zip(found, burnt, strict=True))
+    innovations = tuple(p.innovations[burnt(one) :] for p, one in zip(found, series, strict=True))
     whole = all(p.done == one.count for p, one in zip(found, series, strict=True))
     return Outcome(innovations, tuple(found), limits, whole)
 
@@ -177,7 +181,7 @@ def gains_of(
     prompt = dict.fromkeys(candidate.recipe.delays, 0.0)
     page = candidate.page({**values, **prompt}, series[0])
     period = float(series[0].period)
-    count = max(1, round(BURN_IN / period))
+    count = burnt(series[0])
     modes = candidate.predictor.modes
     points = points_of(candidate, series, outcome)
     found: dict[int, Reals] = {}

@@ -18,7 +18,7 @@ from diagnosis.bench import Bench
 from diagnosis.candidate import Candidate, candidate
 from diagnosis.estimation import Estimate
 from diagnosis.layers import DRIFT, Layer, drift
-from diagnosis.prediction import BURN_IN
+from diagnosis.prediction import burnt
 from diagnosis.scale import KINDS
 from diagnosis.series import Series
 from language.document import Document, Entry, Scalar, Table
@@ -68,7 +68,7 @@ class Probe:
     def innovations(self, predictions: Sequence[Prediction]) -> list[Reals]:
         """Return the innovations of the compared signals behind the burn-in."""
         seen = len(self.model.candidate.predictor.seen)
-        skip = max(1, round(BURN_IN / float(self.series[0].period)))
+        skip = burnt(self.series[0])
         return [one.innovations[skip:, :seen] for one in predictions]
 
 

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from diagnosis.bench import Bench
 from diagnosis.estimation import Estimate
 from diagnosis.layers import drift
+from diagnosis.prediction import burnt
 from language.place import Misfit, place_of
 
 Reals = NDArray[np.float64]
@@ -29,7 +30,8 @@ def scale_of(bench: Bench, section: str, place: str, model: Estimate) -> float:
     states = model.candidate.predictor.states
     if factor is None or name not in states:
         return 0.0
-    rows = [one.states[: one.done] for one in model.outcome.predictions]
+    runs = zip(bench.series, model.outcome.predictions, strict=True)
+    rows = [run.states[burnt(one) : run.done] for one, run in runs]
     if section == "flow":
         period = float(bench.period)
         moved = [np.diff(one[:, states.index(name)]) / period for one in rows]

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.estimation import Estimate
-from diagnosis.prediction import BURN_IN, predicted
+from diagnosis.prediction import burnt, predicted
 from diagnosis.series import Series
 from diagnosis.verdict import Misfit
 
@@ -70,7 +70,7 @@ def free(model: Estimate, series: Sequence[Series]) -> list[Reals]:
 
 def is_later(series: Series) -> NDArray[np.bool_]:
     """Return the samples (samples,) behind those in which the states are found."""
-    return np.asarray(np.arange(series.count) >= round(BURN_IN / float(series.period)))
+    return np.asarray(np.arange(series.count) >= burnt(series))
 
 
 def is_free(series: Series) -> NDArray[np.bool_]:

@@ -12,7 +12,7 @@ from diagnosis.level import first_fit, recalibrated, units_of
 from diagnosis.location import acting, led_by
 from diagnosis.locus import Locus, locus_of
 from diagnosis.place_sentence import NOTHING, place_sentence
-from diagnosis.prediction import noises_of
+from diagnosis.prediction import BURN_IN, noises_of
 from diagnosis.series import Series
 from tests.diagnosis.test_estimation import FRICTION, TRUTH, bench, recorded
 
@@ -50,6 +50,7 @@ def test_a_friction_is_no_sensor_and_told_with_its_size_and_what_it_goes_with(
     assert free.cost < freed(hidden, base, drift("output", "w_s")).cost - 100.0
     locus = locus_of(hidden, "flow", layer, free)
     assert locus.rms == pytest.approx(FRICTION["T_c_w_em"], rel=0.4)
+    assert all(start >= BURN_IN for start, _, _ in locus.windows)
     told = place_sentence(led_by([locus], ["flow.w_em"], hidden), hidden)
     assert told.startswith("missing in the balance of w_em: ")
     assert "N*m rms" in told
