@@ -13,8 +13,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from engine.band import PALETTE, Band, draw_band
+from engine.band import PALETTE, Band, draw_band, name_stretches
 from engine.trajectory import Trajectory
+from language.mode import ALWAYS
 from language.problem import nearest
 from language.text import visible
 
@@ -91,8 +92,10 @@ def picture(
     rows = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)
     axes = [row[0] for row in rows]
     window = _window(runs, span)
-    for axis, band in zip(axes, bands, strict=False):
+    strips = [
         draw_band(axis, runs[band.run], band, window)
+        for axis, band in zip(axes, bands, strict=False)
+    ]
     for axis, panel in zip(axes[len(bands) :], panels, strict=True):
         _panel(axis, runs, panel, window)
         for start, end in shaded:
@@ -102,6 +105,10 @@ def picture(
     axes[-1].set_xlabel("time [s]")
     axes[-1].tick_params(labelbottom=True)
     axes[-1].set_xlim(*window)
+    if any(strips):
+        figure.draw_without_rendering()  # what fits is known when the axes have their places
+    for axis, stretches in zip(axes, strips, strict=False):
+        name_stretches(axis, stretches)
     return Picture(figure)
 
 
@@ -122,7 +129,7 @@ def overview(
         Band(name.removesuffix(".mode") + (f", {labels[run]}" if two else ""), name, run)
         for name in dict.fromkeys(name for each in runs for name in each.modes)
         for run, each in enumerate(runs)
-        if name in each.modes and name in each.signals and _matches(name, patterns)
+        if name in each.signals and _matches(name, patterns) and _has_modes(each, name)
     ]
     title = title or " and ".join(dict.fromkeys(run.name for run in runs))
     return picture(runs, panels_by_unit(runs, patterns, labels), bands, title, span)
@@ -149,6 +156,11 @@ def panels_by_unit(
             ]
             panels.append(Panel(axis_title(unit), lines))
     return panels
+
+
+def _has_modes(run: Trajectory, name: str) -> bool:
+    """Tell whether a signal is of modes, not of an automaton that has none of its own."""
+    return set(run.modes.get(name, {}).values()) not in (set(), {ALWAYS})
 
 
 def _groups(names: Sequence[str], runs: Sequence[Trajectory]) -> list[list[str]]:

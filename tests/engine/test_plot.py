@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import xml.etree.ElementTree as ElementTree
 
 import numpy as np
@@ -91,3 +92,39 @@ def test_the_same_run_gives_the_same_svg_and_it_is_xml() -> None:
 def test_a_run_without_samples_has_a_picture() -> None:
     empty = Trajectory("none", np.zeros(0), {"a": np.zeros(0)}, {"a": "1"}, {}, ())
     assert overview([empty]).data().startswith(b"\x89PNG")
+
+
+def strip(modes: list[int], names: dict[int, str]) -> Trajectory:
+    rows = {**run().signals, "p.mode": np.array(modes)}
+    return dataclasses.replace(run(), signals=rows, modes={"p.mode": names})
+
+
+def test_modes_that_follow_each_other_have_two_colours_and_a_border_however_many_there_are() -> (
+    None
+):
+    names = {number: f"m{number}" for number in range(50)}
+    band = overview([strip([0, 7, 14, 21, 42, 0, 28, 49, 7, 35, 0], names)]).figure.axes[0]
+    colours = [to_hex(patch.get_facecolor()) for patch in band.patches]
+    assert all(one != other for one, other in itertools.pairwise(colours))
+    assert colours[0] == colours[5] == colours[10]
+    assert all(to_hex(patch.get_edgecolor()) == "#ffffff" for patch in band.patches)
+    assert all(patch.get_linewidth() > 0.0 for patch in band.patches[:-1])  # the last is no time
+
+
+def test_a_mode_is_named_where_its_name_fits_whole_else_in_the_legend() -> None:
+    names = {0: "idle", 1: "session.charging.derated", 2: "session.charging.done_and_parked"}
+    long = strip([0] * 4 + [2] * 1 + [1] * 6, names)
+    picture = overview([long])
+    picture.data()
+    axis = picture.figure.axes[0]
+    legend = axis.get_legend()
+    assert legend and [each.get_text() for each in legend.get_texts()] == [names[2]]
+    assert [each.get_text() for each in axis.texts] == [names[0], names[1]]
+    for text, patch in zip(axis.texts, (axis.patches[0], axis.patches[2]), strict=True):
+        box, of = text.get_window_extent(), patch.get_window_extent()
+        assert of.x0 < box.x0 < box.x1 < of.x1
+
+
+def test_an_automaton_that_has_no_modes_has_no_band() -> None:
+    assert len(overview([strip([0] * 11, {0: "always"})]).figure.axes) == 4
+    assert len(overview([strip([0] * 11, {0: "gap"})]).figure.axes) == 5
