@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from engine.firing import fired
@@ -13,8 +13,7 @@ from engine.starting import automata_of
 from engine.stimulus import resolved
 from expectation.decision import SHOWN, Decision, Shown, decision_of
 from expectation.expected import Test
-from expectation.places import path_of
-from expectation.probe import LOOK, probed
+from expectation.probe import LOOK, probed, reached_array
 from language.hoist import hoisted
 from language.load import lowered
 from language.model import Automaton
@@ -107,7 +106,7 @@ def coverage(test: Test) -> list[Coverage]:
             Coverage(
                 automaton,
                 decisions[name],
-                _entered(automaton, stepper.active, stepper.reached),
+                _entered(automaton, stepper.all_active()),
                 frozenset(stepper.taken),
                 {key: combinations for key, combinations in seen.items() if combinations},
                 frozenset(d.key for d in decisions[name] if d.key not in arrays[name]),
@@ -116,19 +115,13 @@ def coverage(test: Test) -> list[Coverage]:
     return made
 
 
-def _entered(
-    automaton: Automaton, active: Collection[tuple[str, int]], reached: Collection[str]
-) -> frozenset[str]:
+def _entered(automaton: Automaton, active: Collection[tuple[str, int]]) -> frozenset[str]:
     """Return the key paths of the modes that were active, and of all that hold them.
 
-    `active` are regions with numbers of modes, `reached` paths that a transition named.
+    `active` are regions with numbers of modes.
     """
     modes = [mode for region in automaton.all_regions for mode in region.modes.values()]
-    inner = {
-        mode.key
-        for mode in modes
-        if (mode.region, mode.number) in active or path_of(mode.region, mode.name) in reached
-    }
+    inner = {mode.key for mode in modes if (mode.region, mode.number) in active}
     outer = (mode.key for mode in automaton.superstates if is_mode(mode.key))
     return frozenset(inner.union(o for o in outer if any(i.startswith(f"{o}.") for i in inner)))
 
@@ -182,21 +175,28 @@ class _Looking(Interpreter):
     def __init__(self, program: Program) -> None:
         super().__init__(program)
         self.taken: set[str] = set()
-        self.active: set[tuple[str, int]] = set()
-        self.reached: set[str] = set()
         self._modes = program.mode_variables()
+        self._active = set(self._now())
         self._looks = LOOK in program.blocks
+
+    def all_active(self) -> set[tuple[str, int]]:
+        """Return the regions with the numbers of the modes that were active, however shortly."""
+        arrays = [(region, reached_array(region)) for region in self._modes]
+        kept = [(region, self.get(array)) for region, array in arrays if self.has(array)]
+        inside = ((region, k) for region, array in kept for k, was in enumerate(array) if was)
+        return self._active.union(inside)
 
     def run(self, block: str) -> None:
         if block == "equations" and self._looks:
             super().run(LOOK)
         super().run(block)
         if block in ("step", "jump"):
-            for info in fired(self.program, self):
-                self.taken.add(info.key.partition(" ")[2])
-                self.reached.update(info.between[1:] if info.between else ())
+            self.taken |= {info.key.partition(" ")[2] for info in fired(self.program, self)}
         if block in ("step", "jump", "equations"):
-            self.active.update((region, self.get(name)) for region, name in self._modes.items())
+            self._active.update(self._now())
+
+    def _now(self) -> Iterator[tuple[str, int]]:
+        return ((region, self.get(name)) for region, name in self._modes.items())
 
 
 def _possible(decision: Decision) -> int:

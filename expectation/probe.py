@@ -2,7 +2,8 @@
 
 `probe.<k>` is an array with a place for each combination of the conditions of guard k. A sampled
 Program reads its guards in its jumps. A continuous one reads them all along its steps; what counts
-are jumps, and the instants at which outputs are evaluated (`look`): not what bisection tries.
+are jumps, and the instants at which outputs are evaluated (`look`): not what bisection tries. A
+chart remembers which modes were active after each micro-step.
 """
 
 from __future__ import annotations
@@ -20,16 +21,19 @@ from language.operation import (
     Count,
     Expr,
     Op,
+    Ref,
     Run,
     Select,
     Store,
     Value,
     whole,
 )
-from language.program import Program, Variable
+from language.program import Program, Variable, mode_variable
 
 LOOK = "look"
 """The block that reads the guards of the active modes and does nothing else."""
+COMMIT = "commit"
+"""The block of a chart that ends a micro-step: its modes are those between two of them."""
 GUARDS = "guards_"
 PROBED = "probed_"
 CHOOSING = ("jump", "count_", "choose_")
@@ -63,9 +67,18 @@ def probed(program: Program, decisions: Iterable[Decision]) -> Probed:
                 blocks[name] = _everywhere(block, found.before_fired)
     arrays = {key: found.arrays[key] for key in found.stored}
     sizes = {arrays[d.key]: 1 << len(d.conditions) for d in found.decisions if d.key in arrays}
+    for region, mode in program.mode_variables().items() if COMMIT in blocks else ():
+        array = reached_array(region)
+        blocks[COMMIT] = (*blocks[COMMIT], Store(array, Ref(mode, whole=True), Value(True)))
+        sizes[array] = 1 + max(each.number for each in program.modes_of(region))
     more = (Variable(name, "truth", size=size) for name, size in sizes.items())
     variables = (*program.variables, *more)
     return Probed(dataclasses.replace(program, blocks=blocks, variables=variables), arrays)
+
+
+def reached_array(region: str) -> str:
+    """Return the array of the modes of a chart's region that were active after a micro-step."""
+    return mode_variable("reached.mode", region)
 
 
 class _Probes:

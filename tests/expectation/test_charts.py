@@ -10,6 +10,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from expectation.coverage import coverage, probed_programs
+from expectation.expected import Test
 from language.operation import Store
 from language.traversal import walk
 from modewright import tests
@@ -135,3 +136,53 @@ def test_each_guard_of_a_chart_has_a_probe(tmp_path: Path) -> None:
     ops = [op for block in programs["one"].blocks.values() for op in walk(block)]
     stored = {op.array for op in ops if isinstance(op, Store) and op.array.startswith("probe.")}
     assert stored == set(arrays["one"].values()) and len(stored) == len(decisions["one"]) == 10
+
+
+BRIEF = """\
+language: 1
+automaton: brief
+period: 10 ms
+numbers: float64
+micro_steps: 5
+events: {beat: {from: input}, passed: {}}
+discrete: {beats: {type: int, range: [0, 9], initial: 0}}
+initial: idle
+modes:
+  idle: {transitions: {start: {to: op.left.first, when: "true"}}}
+  op:
+    regions:
+      left:
+        initial: none
+        modes:
+          none: {}
+          first: {transitions: {last: {when: "true", raise: passed}}}
+          last: {transitions: {count: {to: [], event: beat, reset: {beats: beats + 1}}}}
+      right:
+        initial: waits
+        modes: {waits: {transitions: {goes: {event: passed}}}, goes: {}}
+outputs: [mode, beats]
+"""
+BRIEF_TEST = """\
+language: 1
+test: briefly
+scenario:
+  of: brief
+  horizon: 100 ms
+  inputs: {beat: {start: false, steps: {50 ms: true, 80 ms: false}}}
+expect:
+  beats:   {that: beats == 3, at: end}
+"""
+
+
+def briefly(folder: Path, more: str = "") -> Test:
+    (folder / "spec").mkdir()
+    (folder / "spec" / "brief.yaml").write_text(BRIEF)
+    path = folder / "spec" / "test_briefly.yaml"
+    path.write_text(BRIEF_TEST + more)
+    return tests.load_test(str(path), folder)
+
+
+def test_a_mode_left_in_the_tick_of_its_entry_was_entered(tmp_path: Path) -> None:
+    """`waits` is the default of a neighbouring region; `idle` is left at tick 0."""
+    (found,) = coverage(briefly(tmp_path))
+    assert found.missed() == ["mode `op.left.none` was not entered"]
