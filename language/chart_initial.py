@@ -83,7 +83,10 @@ def _found(
 
 def _words(node: Node | None, raw: RawNode, reader: Reader) -> list[Scalar]:
     """Return the names that stand in a list, or the only one."""
-    if isinstance(node, Items):
+    if isinstance(node, Items) and node.nodes:
         return reader.items(node, "initial")
+    if isinstance(node, Items):
+        reader.problems.error("missing", node.span, f"`initial` of `{raw.name}` names no mode")
+        return []
     word = reader.scalar(node, "initial", raw.span)
     return [word] if word else []

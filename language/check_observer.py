@@ -11,7 +11,7 @@ from language.kind import Kind
 from language.model import Automaton, Observer
 from language.problem import Problems, nearest
 from language.syntax import names as names_of
-from language.units import Dimension, fits, product
+from language.units import SECOND, Dimension, fits, product
 
 
 def check_observer(
@@ -122,6 +122,4 @@ def _fits(check: DimensionCheck, formula: Formula, want: Dimension) -> None:
 
 
 def _rate(dimension: Dimension) -> Dimension:
-    powers = list(dimension.powers)
-    powers[2] -= 1
-    return Dimension(tuple(powers), dimension.angle)
+    return Dimension(product(dimension, SECOND, -1).powers, dimension.angle)

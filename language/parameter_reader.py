@@ -56,9 +56,10 @@ class ParameterReader(Reader):
             unit = unit or own
         unit = unit or parse_unit("1")
         limits = self.range(table.get("range"), unit)
-        if limits and value is not None and not limits[0] <= value <= limits[1]:
-            span = cast(Scalar, table.get("value")).span
-            self.problems.error("range", span, f"the value of `{entry.key}` is outside its range")
+        given = table.get("value")
+        if limits and value is not None and given and not limits[0] <= value <= limits[1]:
+            label = f"the value of `{entry.key}` is outside its range"
+            self.problems.error("range", given.span, label)
         if type_ == "int":
             limits = self.whole_range(limits, table.get("range"))
         fitting = self._fitting(table, unit, limits)

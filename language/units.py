@@ -62,7 +62,9 @@ class Dimension:
         return not any(self.powers)
 
     def __str__(self) -> str:
-        """Return the dimension in SI symbols: `N*m`, `kg*m^2`, `rad/s`, `1`."""
+        """Return the dimension in SI symbols: `N*m`, `kg*m^2`, `rad/s`, `1`; `?` if unknown."""
+        if not self.powers:
+            return "?"
         known = MECHANICAL.get(self.powers[:3])
         if known and not any(self.powers[3:]):
             angle = self.angle or 0
