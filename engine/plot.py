@@ -237,7 +237,7 @@ def _panel(
 
 def _mark_events(axis: Axes, run: Trajectory, window: tuple[float, float]) -> None:
     """Mark when a mode became another one, not what fired and left the modes as they were."""
-    times = {e.time for e in run.events if e.source != e.target}
+    times = {e.time for e in run.events if e.target not in ("", e.source)}
     instants = sorted(time for time in times if window[0] <= time <= window[1])
     for k, time in enumerate(instants[:MOST_MARKERS]):
         label = "mode changes" if k == 0 else None

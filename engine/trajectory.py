@@ -27,6 +27,7 @@ TIME = "t [s]"
 class Event:
     """A transition: time [s], micro-step at that instant, and what changed.
 
+    In a chart a transition `to: []` has no target: nothing is entered.
     Of another `kind` is a signal that left its range, or an invariant that ceased to hold:
     `transition` names it, `message` says how, `source` and `target` are both the mode.
     """

@@ -129,6 +129,7 @@ def _event_lines(program: Program) -> Iterator[str]:
         wait = f" wait {t.wait} s = {t.ticks} ticks" if t.wait else ""
         back = f" rewind {t.rewind} ticks" if t.rewind else ""
         source, target = t.between or (t.source, t.target)
+        target = "[]" if target == "" else target
         yield f"transition {t.number} {t.name}: {source} -> {target}{wait}{back}"
     for alarm in program.alarms:
         yield f"alarm {alarm.variable}: {alarm.time} s in {alarm.region} mode {alarm.mode}"

@@ -89,7 +89,7 @@ class TransitionInfo:
     """A transition: number (from 1), modes, wait in seconds (exact) and in ticks.
 
     `slot` is the ending of the variables of its guard, see language/region.py; `rewind` are the
-    ticks that it looks back; `between` are the paths of source and target in a chart.
+    ticks that it looks back; `between` are the paths of source and target in a chart, "" for none.
     """
 
     number: int
@@ -243,7 +243,7 @@ class Program:
         return any(variable.name == LOG for variable in self.variables)
 
     def ends(self, info: TransitionInfo) -> tuple[str, str]:
-        """Return the names of source and target of a transition: paths in a chart."""
+        """Return the names of source and target of a transition: paths in a chart, "" for none."""
         return info.between or (
             self.mode_name(info.source, info.region),
             self.mode_name(info.target, info.region),

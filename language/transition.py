@@ -76,12 +76,12 @@ def transition_infos(automaton: Automaton, problems: Problems) -> tuple[Transiti
 
 
 def _between(automaton: Automaton, transition: Transition) -> tuple[str, str] | None:
-    """Return the paths of source and target in a chart; where nothing is entered, of the source."""
+    """Return the paths of source and target in a chart; where nothing is entered, no target."""
     if automaton.tree is None:
         return None
     way, nodes = automaton.tree.ways[transition.key], automaton.tree.nodes
     source = nodes[way.source].path
-    return source, ", ".join(nodes[target].path for target in way.targets) or source
+    return source, ", ".join(nodes[target].path for target in way.targets)
 
 
 def infos_of(

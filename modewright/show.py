@@ -33,7 +33,7 @@ def events_table(events: Sequence[Event]) -> Table:
         box=None, pad_edge=False, header_style="bold",
     )  # fmt: skip
     for event in events[:MOST_EVENTS]:
-        change = (event.source, event.target)
+        change = (event.source, event.target or escape("[]"))
         if event.kind != "transition":
             change = (event.source, escape(event.message))
         table.add_row(f"{event.time:.9f}", event.instance, event.transition, *change)

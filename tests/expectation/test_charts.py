@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from engine.simulate import simulate
 from expectation.coverage import coverage, probed_programs
 from expectation.expected import Test
 from language.operation import Store
@@ -186,3 +187,16 @@ def test_a_mode_left_in_the_tick_of_its_entry_was_entered(tmp_path: Path) -> Non
     """`waits` is the default of a neighbouring region; `idle` is left at tick 0."""
     (found,) = coverage(briefly(tmp_path))
     assert found.missed() == ["mode `op.left.none` was not entered"]
+
+
+def test_a_transition_to_nothing_enters_nothing(tmp_path: Path) -> None:
+    """`count` fires at 50, 60 and 70 ms in `last`, which was entered at 0."""
+    more = """\
+  entered: {event: op.left.last, count: 1}
+  anew:    {event: op.left.last -> op.left.last, count: 0}
+"""
+    run = tests.run_test(briefly(tmp_path, more))
+    assert [(each.name, each.message) for each in run.outcomes if not each.passed] == []
+    assert (run.difference, len(run.outcomes)) == ("", 3)
+    events = simulate(run.test.system, run.test.scenario).events[-3:]
+    assert [(each.source, each.target) for each in events] == [("op.left.last", "")] * 3
