@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -96,7 +96,7 @@ def name_stretches(axis: Axes, stretches: Sequence[Stretch]) -> None:
     _legend(axis, {each.name: each.colour for each in stretches if each.name not in named})
 
 
-def _colours(names: dict[int, str], shown: Sequence[int]) -> dict[int, str]:
+def _colours(names: Mapping[int, str], shown: Sequence[int]) -> dict[int, str]:
     """Return a colour for each mode; those that follow each other have never the same one."""
     wheel = [
         *PALETTE,
@@ -119,7 +119,8 @@ def _colours(names: dict[int, str], shown: Sequence[int]) -> dict[int, str]:
 
 def _mixed(colour: str, other: float, share: float) -> str:
     """Return a colour mixed with white, 1, or black, 0."""
-    return to_hex(tuple((1.0 - share) * part + share * other for part in to_rgb(colour)))
+    red, green, blue = ((1.0 - share) * part + share * other for part in to_rgb(colour))
+    return to_hex((red, green, blue))
 
 
 def _ink(colour: str) -> str:

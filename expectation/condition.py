@@ -7,12 +7,16 @@ from collections.abc import Callable
 from fractions import Fraction
 from typing import Any
 
-from expectation.expected import Condition, Place, Running, Stay
+from expectation.expected import Condition, Flag, Place, Running, Stay
 from expectation.places import (
+    fault_bits,
+    fault_words,
     mode_signals,
-    modes_inside,
+    nearest_mode,
+    nearest_path,
     path_of,
     require_mode_output,
+    said,
     stays,
     unknown_output,
 )
@@ -39,7 +43,8 @@ class ConditionReader:
         """Report into `problems`."""
         self.problems = problems
         self.system = system
-        self.kinds = signal_kinds(system)
+        self.words = fault_words(system)
+        self.kinds = signal_kinds(system) | dict.fromkeys(self.words, Whole(0))
         self.modes = stays(system)
         self.regions = {
             s: p for name in system.instances for s, p in mode_signals(system, name).items()
@@ -70,8 +75,8 @@ class ConditionReader:
             return None
         literals = {name: place for name, (_, place) in self.literals.items()}
         return Condition(
-            Formula(made, key), text, found.signals, found.stays, found.running, literals,
-            kind or NUMBER,
+            Formula(made, key), text, found.signals, found.stays, found.flags, found.running,
+            literals, kind or NUMBER,
         )  # fmt: skip
 
     def full(self, name: str) -> str:
@@ -95,6 +100,7 @@ class _Found:
         self.problems = reader.problems
         self.signals: dict[str, Kind] = {}
         self.stays: dict[str, Stay] = {}
+        self.flags: dict[str, Flag] = {}
         self.running: dict[str, Running] = {}
         self.kinds: dict[str, Kind] = {}
 
@@ -109,6 +115,8 @@ class _Found:
                         return stay if tree.operator == "==" else Not(stay, span)
             case Application("in", arguments, _):
                 return self._in(tree, arguments)
+            case Application("fault", arguments, _):
+                return self._fault(tree, arguments)
             case Application(function, _, _) if function in RUNNING:
                 return self._running(tree)
             case Name():
@@ -126,13 +134,9 @@ class _Found:
             stay = self.reader.modes.get(f"{instance}.{path_of(region, tree.path)}")
             if stay and stay.place == place:
                 return self._stay(stay, tree.path, tree)
-        said = tree.path if isinstance(tree, Name) else "this"
-        automaton = self.reader.system.instances[instance].automaton
-        known = [path for owner, path in modes_inside(automaton) if owner == region]
-        hint = nearest(path_of(region, said), known) or nearest(
-            said, automaton.region(region).modes
-        )
-        self._error("name", tree, f"`{said}` is not a mode of `{instance}`", hint)
+        name = tree.path if isinstance(tree, Name) else "this"
+        hint = nearest_mode(name, place, self.reader.system)
+        self._error("name", tree, f"`{name}` is not a mode of `{said(place)}`", hint)
         return Broken(tree.span)
 
     def _in(self, tree: Application, arguments: tuple[Tree, ...]) -> Tree:
@@ -140,10 +144,36 @@ class _Found:
         stay = self.reader.modes.get(path)
         if stay is None:
             label = f"`{path}` is not a mode of an instance of `{self.reader.system.name}`"
-            self._error("name", arguments[0] if arguments else tree, label,
-                        nearest(path, self.reader.modes))  # fmt: skip
+            hint = nearest_path(path, self.reader.modes)
+            self._error("name", arguments[0] if arguments else tree, label, hint)
             return Broken(tree.span)
         return self._stay(stay, path, tree)
+
+    def _fault(self, tree: Application, arguments: tuple[Tree, ...]) -> Tree:
+        """Return one bit of a fault word: `fault(est.range_T)`, in a test of one alone without."""
+        path = arguments[0].path if len(arguments) == 1 and isinstance(arguments[0], Name) else ""
+        system = self.reader.system
+        head, _, name = path.rpartition(".")
+        instance = head or system.alone or ""
+        bits = fault_bits(system, instance)
+        at = arguments[0] if arguments else tree
+        if name not in bits:
+            label = f"`{path}` is not a fault of an instance of `{system.name}`"
+            known = [
+                f"{each}.{bit}" for each in system.instances for bit in fault_bits(system, each)
+            ]
+            self._error("name", at, label, nearest_path(path, [*bits, *known]))
+            return Broken(tree.span)
+        signal = next((word for word, of in self.reader.words.items() if of == instance), None)
+        if signal is None:
+            automaton = system.instances[instance].automaton.name
+            label = f"the faults of `{instance}` are not told"
+            self._error("missing", at, label, f"add `faults` to the `outputs` of `{automaton}`")
+            return Broken(tree.span)
+        made = f"fault {instance} {name}"
+        self.flags[made] = Flag(signal, bits[name])
+        self.kinds[made] = "truth"
+        return Name(made, tree.span)
 
     def _stay(self, stay: Stay, mode: str, at: Tree) -> Tree:
         self._require_modes(stay.place, at)

@@ -39,13 +39,22 @@ class Running:
 
 
 @dataclass(frozen=True)
+class Flag:
+    """One bit of a fault word, a signal."""
+
+    signal: str
+    bit: int
+
+
+@dataclass(frozen=True)
 class Condition:
-    """An expression over a run; its names are signals, or keys of `stays` and of `running`."""
+    """An expression over a run; its names are signals, or keys of `stays`, `flags`, `running`."""
 
     formula: Formula
     text: str
     signals: Mapping[str, Kind] = field(default_factory=dict)
     stays: Mapping[str, Stay] = field(default_factory=dict)
+    flags: Mapping[str, Flag] = field(default_factory=dict)
     running: Mapping[str, Running] = field(default_factory=dict)
     literals: Mapping[str, int] = field(default_factory=dict)
     kind: Kind = "truth"
@@ -53,7 +62,7 @@ class Condition:
     @property
     def all_signals(self) -> tuple[str, ...]:
         """The signals that are read, by what runs too; none: it is known between rows."""
-        found = dict.fromkeys(self.signals)
+        found = dict.fromkeys([*self.signals, *(flag.signal for flag in self.flags.values())])
         for running in self.running.values():
             if isinstance(running.of, Condition):
                 found.update(dict.fromkeys(running.of.all_signals))

@@ -14,7 +14,7 @@ from typing import Any
 
 from engine.trajectory import Event, Trajectory
 from expectation.expected import Condition, Place, Running, Stay
-from expectation.places import inside, is_chart, mode_signals, path_of
+from expectation.places import inside, is_chart, mode_signals, path_of, said
 from language.evaluate import evaluate
 from language.event_name import EventName
 from language.experiment import System
@@ -51,7 +51,7 @@ class Observed:
 
     def modes_at(self, point: int) -> dict[str, str]:
         """Return the active modes at a point by `instance` or `instance.region`."""
-        return {_shown(place): found[point] for place, found in self.modes.items()}
+        return {said(place): found[point] for place, found in self.modes.items()}
 
     def times_of(self, event: EventName) -> list[float]:
         """Return when an event happened [s].
@@ -166,11 +166,15 @@ def series(condition: Condition, seen: Observed) -> Series:
         modes = seen.modes[stay.place]
         columns.append([modes[k] in stay.modes for k in points])
         known[name] = Ref(name)
+    for name, flag in condition.flags.items():
+        words = seen.signals[flag.signal]
+        columns.append([bool(words[seen.points[k].row] >> flag.bit & 1) for k in points])
+        known[name] = Ref(name)
     for name, running in condition.running.items():
         made = _running(running, seen)
         columns.append([made[k] for k in points])
         known[name] = Ref(name, whole=running.function == "count")
-    names = [*condition.signals, *condition.stays, *condition.running]
+    names = [*condition.signals, *condition.stays, *condition.flags, *condition.running]
     tree = condition.formula.tree
     expr = expression(tree, known)
     expr = assigned(tree, known, False) if is_whole(expr) else expr
@@ -225,7 +229,3 @@ def _converted(kind: Kind) -> Any:
     if kind == "truth":
         return bool
     return int if isinstance(kind, Whole | Enumeration) else float
-
-
-def _shown(place: Place) -> str:
-    return place[0] if place[1] == "chart" else f"{place[0]}.{place[1]}"

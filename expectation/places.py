@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from expectation.expected import Place, Stay
 from language.event_name import EventName
 from language.experiment import System
+from language.load import lowered
 from language.model import CHART, Automaton
-from language.problem import Problems, Span
+from language.once import once
+from language.problem import Problems, Span, nearest
 
 
 def stays(system: System) -> dict[str, Stay]:
@@ -42,6 +46,32 @@ def path_of(region: str, mode: str) -> str:
     return mode if region == CHART else f"{region}.{mode}"
 
 
+def said(place: Place) -> str:
+    """Return how a region is named: `est`, `est.gap`."""
+    instance, region = place
+    return instance if region == CHART else f"{instance}.{region}"
+
+
+def nearest_mode(name: str, place: Place, system: System) -> str:
+    """Return which mode of a region may be meant, by the name it has beside that region."""
+    instance, region = place
+    own = "" if region == CHART else f"{region}."
+    paths = modes_inside(system.instances[instance].automaton)
+    known = [path.removeprefix(own) for of, path in paths if of == region]
+    name = name.removeprefix(f"{instance}.").removeprefix(own)
+    ends = [path for path in known if path.rpartition(".")[2] == name]
+    if name in known or ends:
+        return f"did you mean `{name if name in known else ends[0]}`?"
+    return nearest(name, known)
+
+
+def nearest_path(said: str, known: Iterable[str]) -> str:
+    """Return which of some paths may be meant: one that ends so, else the nearest one."""
+    known = list(known)
+    ends = [path for path in known if path.endswith(f".{said}")]
+    return f"did you mean `{min(ends, key=len)}`?" if ends else nearest(said, known)
+
+
 def inside(system: System, event: EventName) -> frozenset[str]:
     """Return the innermost modes inside the one that an event enters."""
     automaton = system.instances[event.instance].automaton
@@ -62,6 +92,29 @@ def mode_signals(system: System, instance: str) -> dict[str, Place]:
     return found
 
 
+def fault_words(system: System) -> dict[str, str]:
+    """Return the signals that hold fault words, with their instances; those of instances first."""
+    found = {
+        f"{name}.{output}": name
+        for name, instance in system.instances.items()
+        for output in instance.automaton.outputs
+        if instance.automaton.source_of(output) == "faults"
+    }
+    outer = {name: found[of] for name, of in system.outputs.items() if of in found}
+    return found | outer
+
+
+def fault_bits(system: System, instance: str) -> dict[str, int]:
+    """Return the bits of an instance's fault word by name; none for one that has no such word."""
+    found = system.instances.get(instance)
+    return _bits(found.automaton) if found and found.automaton.is_sampled else {}
+
+
+@once
+def _bits(automaton: Automaton) -> dict[str, int]:
+    return {name: bit for bit, name in enumerate(lowered(automaton).faults)}
+
+
 def require_mode_output(system: System, instance: str, at: Span, problems: Problems) -> None:
     """Report a chart whose modes a run does not tell."""
     outputs = system.instances[instance].automaton.outputs
@@ -79,4 +132,5 @@ def unknown_output(system: System, name: str) -> str:
         return ""
     computed = {part for mode in automaton.modes.values() for part in mode.equations}
     is_its_own = own in computed or own in automaton.carried
+    is_its_own = is_its_own or (own == "faults" and automaton.is_sampled)
     return f"add `{own}` to the `outputs` of `{automaton.name}`" if is_its_own else ""

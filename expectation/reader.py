@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
 from expectation.condition import ConditionReader
 from expectation.expected import Condition, Expectation, Place, Subject, Test, Trigger, When
-from expectation.places import require_mode_output
+from expectation.places import nearest_mode, require_mode_output, said
 from expectation.recording import recording
 from language.declaration import Formula
 from language.document import Document, Entry, Node, Scalar, Table, require_kind
@@ -175,12 +175,14 @@ class _TestReader(Reader):
 
     def _place(self, own: Table, at: Span) -> Place | None:
         """The region whose modes are expected: `est`, `est.gap`."""
-        known = {
-            name if region.name == CHART else f"{name}.{region.name}": (name, region.name)
+        places = [
+            (name, region.name)
             for name, instance in self.system.instances.items()
             for region in instance.automaton.all_regions
-        }
+        ]
         alone = self.system.alone
+        known = {region: (name, region) for name, region in places if name == alone}
+        known |= {said(place): place for place in places}
         if own.get("of") is None and alone:
             require_mode_output(self.system, alone, at, self.problems)
             return alone, CHART
@@ -204,9 +206,18 @@ class _TestReader(Reader):
         modes = [*region.modes, *([INACTIVE] if region.inactive is not None else [])]
         for item in items:
             if item.text not in modes:
-                label = f"`{item.text}` is not a mode of `{place[0]}`"
-                self.problems.error("name", item.span, label, nearest(item.text, modes))
+                self._unknown_mode(item, place, modes)
         return tuple(item.text for item in items)
+
+    def _unknown_mode(self, item: Scalar, place: Place, modes: Sequence[str]) -> None:
+        """Report a mode that a region has not, or that has others inside it."""
+        label = f"`{item.text}` is not a mode of `{said(place)}`"
+        hint = nearest_mode(item.text, place, self.system)
+        inner = [mode for mode in modes if mode.startswith(f"{item.text}.")]
+        if inner:
+            label = f"`{item.text}` has modes inside it, and what is listed are the innermost"
+            hint = f"like `{inner[0]}`"
+        self.problems.error("name", item.span, label, hint)
 
     # When it is expected.
 

@@ -9,6 +9,7 @@ from xml.etree import ElementTree
 from expectation.expected import Expectation
 from expectation.judging import Outcome
 from language.text import visible
+from language.units import Dimension
 from modewright.console import counted
 from modewright.tests import TestRun
 
@@ -102,7 +103,7 @@ def _units(run: TestRun) -> Mapping[str, str]:
         for expectation in run.test.expectations
         for condition in expectation.conditions
         for name, kind in condition.signals.items()
-        if not isinstance(kind, str)
+        if isinstance(kind, Dimension)
     }
 
 
