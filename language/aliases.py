@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Mapping
+
+from language.document import Items, Node, Scalar
 
 KEYS: Mapping[str, tuple[str, ...]] = {
     "en": ("entry",),
@@ -12,6 +15,8 @@ KEYS: Mapping[str, tuple[str, ...]] = {
     "ex": ("exit",),
     "action": ("reset", "update"),
     "actions": ("reset", "update"),
+    "condition_action": ("reset",),
+    "transition_action": ("reset",),
     "entry": ("reset",),
     "guard": ("when",),
     "condition": ("when",),
@@ -23,8 +28,24 @@ KEYS: Mapping[str, tuple[str, ...]] = {
     "sample_time": ("period",),
     "parallel": ("regions",),
     "invariants": ("invariant",),
+    "states": ("modes",),
+    "default": ("initial",),
 }
 """Keys, each with what it may mean: the first that has a place counts."""
+AT_THE_ROOT = ("discrete", "inputs", "outputs", "parameters", "events", "tables", "period")
+KEPT = "what is kept is declared once, at the root: `discrete: {k: {type: int, initial: 0}}`"
+KINDS = "a mode has no type: `modes` inside take turns, `regions` run side by side; "
+KINDS += "in place of a junction each transition has the whole guard"
+HABITS: Mapping[str, str] = {
+    **dict.fromkeys(AT_THE_ROOT, "it stands at the root of the automaton, for all modes"),
+    **dict.fromkeys(("data", "local", "locals", "variables", "vars"), KEPT),
+    **dict.fromkeys(("type", "decomposition", "junction", "junctions"), KINDS),
+    "on": "a transition hears an event: `transitions: {x: {event: x, to: []}}`",
+}
+"""Keys that people write in a mode, and what is written here."""
+ASSIGNMENT = re.compile(r"([A-Za-z]\w*)\s*=\s*([^=;,]+)")
+STEPPED = re.compile(r"([A-Za-z]\w*)?\s*(\+\+|--|[-+*/]=)")
+WITH_GUARD = re.compile(r"(\w+)\s*\[(.*)\]")
 FUNCTIONS: Mapping[str, str] = {
     "duration": "write `wait: 5 s` on the transition: how long its guard has to hold",
     "elapsed": "`after(5 s)` is a condition: 5 s since the mode was entered",
@@ -42,3 +63,46 @@ def known_as(word: str, known: Collection[str]) -> str:
     """Return "did you mean `x`?" for a key of another tool, or an empty text."""
     found = next((key for key in KEYS.get(word, ()) if key in known), "")
     return f"did you mean `{found}`?" if found else ""
+
+
+def habit(key: str, what: str) -> str:
+    """Return what is written in place of a key of a mode, an empty text where nothing is known."""
+    heard = re.fullmatch(r"on[ _](\w+)", key)
+    if heard:
+        name = heard.group(1)
+        return f"a transition hears an event: `transitions: {{{name}: {{event: {name}, to: []}}}}`"
+    if key == "priority" and re.fullmatch(r"regions\.\w+", what):
+        return "regions at the root are never left: those inside a mode have a priority"
+    return HABITS.get(key, "") if re.match(r"(.*\.)?(modes|regions)\.", what) else ""
+
+
+def as_mapping(node: Node, what: str) -> str:
+    """Return how what is written as a text or list is written as a mapping, if that is known."""
+    if what.endswith("transitions"):
+        return "each has a name: `transitions: {fault: {to: fault, when: ...}}`"
+    if re.search(r"transitions\.\w+$", what):
+        return "like `{event: go, when: a, reset: {k: 1}}`"
+    items = node.nodes if isinstance(node, Items) else (node,)
+    text = ";".join(item.text for item in items if isinstance(item, Scalar))
+    found = ASSIGNMENT.findall(text)
+    parts = ", ".join(f"{name}: {value.strip()}" for name, value in found)
+    return f"it is written `{{{parts}}}`" if parts else ""
+
+
+def stepped(text: str) -> str:
+    """Return what is written in place of `k++` and `k += 2`, an empty text for other texts."""
+    match = STEPPED.search(text)
+    if not match:
+        return ""
+    name, sign = match.group(1), match.group(2)
+    rest = text[match.end() :].strip() or "1"
+    written = f": `{name}: {name} {sign[0]} {rest}`" if name else ", like `k: k + 1`"
+    return f"the new value is written whole{written}"
+
+
+def heard_with_guard(text: str, events: Collection[str]) -> str:
+    """Return what is written in place of the event `go [a]`, an empty text for other texts."""
+    match = WITH_GUARD.fullmatch(text)
+    if not match or match.group(1) not in events:
+        return ""
+    return f"a guard stands beside it: `event: {match.group(1)}, when: {match.group(2)}`"

@@ -62,6 +62,10 @@ def _initial(nodes: Sequence[RawNode], index: int, reader: Reader) -> tuple[int,
         return ()
     if node is None and len(own) == 1:
         return (own[0],)
+    if node is None:
+        told = f"like `initial: {nodes[own[0]].name}`"
+        reader.problems.error("missing", raw.span, "`initial` is missing", told)
+        return ()
     return _found(nodes, index, _words(node, raw, reader), reader)
 
 

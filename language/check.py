@@ -36,7 +36,7 @@ from language.order import equation_order, report_circle
 from language.problem import Problems
 from language.region import sources, with_regions
 from language.syntax import KEPT, Tree, whole_literal
-from language.units import Dimension, Unit, common, fits
+from language.units import Dimension, Unit, common, fits, shown_unit
 
 WHOLES = (Whole, Enumeration)
 
@@ -266,7 +266,8 @@ class _Check:
         if isinstance(before, Whole) and number is not None:
             self.names[name] = before.joined(Whole(number, number))
             return self.names[name]
-        label = f"`{name}` is in `{kind}` here and in `{before}` in another mode"
+        here, there = (shown_unit(str(each)) for each in (kind, before))
+        label = f"`{name}` is in `{here}` here and in `{there}` in another mode"
         self.problems.error("dimension", formula.span, label)
         return before
 

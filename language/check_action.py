@@ -10,6 +10,7 @@ from language.check_writer import check_continued
 from language.declaration import Formula
 from language.dimension import DimensionCheck
 from language.model import Automaton, Mode, Transition
+from language.names import NAME
 from language.parameter import parameter_kinds
 from language.problem import Problems, nearest
 from language.syntax import EDGES, MEMORY, TIMES, names
@@ -25,12 +26,25 @@ def check_assignments(
     """Report assignments to what is not carried, and values of another kind."""
     for name, formula in formulas.items():
         kind = check.scope.names.get(name)
+        if not NAME.fullmatch(name):
+            continue  # told where it was read
         if name not in automaton.carried:
-            hint = nearest(name, automaton.carried)
+            hint = _instead(automaton, name) or nearest(name, automaton.carried)
             label = f"`{name}` is not a state or discrete variable"
             problems.error("name", formula.span, label, hint)
         elif kind is not None:
             check.assigned(formula.tree, kind, name)
+
+
+def _instead(automaton: Automaton, name: str) -> str:
+    """Return what is done with a known name that is not assigned."""
+    if automaton.tree and name in automaton.tree.signals:
+        return f"it is an event: a transition raises it, `raise: {name}`"
+    if name in automaton.inputs:
+        return "it is an input, which is only read: `discrete` declares what is written"
+    if name in automaton.parameters:
+        return "it is a parameter, which stays: `discrete` declares what is written"
+    return ""
 
 
 def check_ways(

@@ -16,7 +16,9 @@ from language.kind import (
     Whole,
     as_real,
     combined,
+    compared_hint,
     said,
+    truth_hint,
     wholes_of,
 )
 from language.problem import Problems, Span, nearest
@@ -38,6 +40,7 @@ from language.syntax import (
     whole_literal,
 )
 from language.units import (
+    NO_UNIT,
     Dimension,
     Unit,
     angle_hint,
@@ -94,7 +97,7 @@ class DimensionCheck:
             label = f"`{what}` is a quantity, this is {said(kind)}"
             self.report("type", tree.span, label)
         elif isinstance(kind, Dimension) and not is_zero(tree) and not fits(kind, want):
-            label = f"this is in `{kind}`, `{what}` is in `{want}`"
+            label = f"this is in `{kind.shown}`, `{what}` is in `{want.shown}`"
             hint = angle_hint(kind, want)
             if isinstance(tree, Number | Negative):
                 hint = hint or units_hint(want)
@@ -120,14 +123,14 @@ class DimensionCheck:
         kind = self.kind(tree)
         if kind is not None and kind != want:
             label = f"`{what}` is {said(want)}, this is {said(kind)}"
-            hint = _truth_hint(tree) if want == "truth" else ""
+            hint = truth_hint(tree) if want == "truth" else ""
             self.report("type", tree.span, label, hint)
 
     def truth(self, tree: Tree, what: str) -> None:
         """Check that an expression is true or false."""
         kind = self.kind(tree)
         if kind is not None and kind != "truth":
-            hint = _truth_hint(tree)
+            hint = truth_hint(tree)
             label = f"`{what}` is a condition, this is {said(kind)}"
             self.report("type", tree.span, label, hint)
 
@@ -247,8 +250,12 @@ class DimensionCheck:
             return left
         if fits(left, right):
             return common(left, right)
-        label = f"`{operator}` joins `{left}` and `{right}`"
-        self.report("dimension", span, label, angle_hint(left, right))
+        label = f"`{operator}` joins `{left.shown}` and `{right.shown}`"
+        hint = angle_hint(left, right)
+        for tree, other in ((a, right), (b, left)):
+            if isinstance(tree, Number) and tree.unit is NO_UNIT:
+                hint = hint or units_hint(other)
+        self.report("dimension", span, label, hint)
         return None
 
     def _relation(self, tree: Relation) -> Truthful:
@@ -264,6 +271,11 @@ class DimensionCheck:
         if equality and len(named) == 2:
             label = f"`{tree.operator}` compares {said(named[0])} and {said(named[1])}"
             self.report("type", tree.span, label)
+            return "truth"
+        if equality and "truth" in (first, second):
+            condition = tree.left if first == "truth" else tree.right
+            label = "this is true or false, a quantity is needed"
+            self.report("type", condition.span, label, compared_hint(tree, condition))
             return "truth"
         left, right = self._number(first, tree.left), self._number(second, tree.right)
         if left is None or right is None:
@@ -293,10 +305,3 @@ class DimensionCheck:
             self.report("type", tree.span, label)
             return None
         return left
-
-
-def _truth_hint(tree: Tree) -> str:
-    """Return what is written for 0 and 1, else how a number becomes a condition."""
-    words = {0: "write `false`", 1: "write `true`"}
-    number = whole_literal(tree)
-    return "compare it: `x > 0`" if number is None else words.get(number, "compare it: `x > 0`")

@@ -65,14 +65,14 @@ def _elementary(
     if name == "sqrt":
         result = root(first)
         if result is None:
-            check.report("dimension", tree.span, f"`{first}` has no square root")
+            check.report("dimension", tree.span, f"`{first.shown}` has no square root")
         return result
     if name == "sign":
         return NUMBER
     fine = first.is_bare and (first.angle is None or first.angle == (name in ANGLES))
     if not fine and not is_zero(tree.arguments[0]):
         want = "an angle" if name in ANGLES else "a number"
-        check.report("dimension", tree.span, f"`{name}` takes {want}, this is in `{first}`")
+        check.report("dimension", tree.span, f"`{name}` takes {want}, this is in `{first.shown}`")
     return NUMBER
 
 

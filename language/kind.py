@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from language.syntax import Tree, whole_literal
+from language.syntax import Name, Relation, Tree, whole_literal
 from language.units import NUMBER, Dimension
 
 Type = Literal["real", "int", "bool", "enum"]
@@ -86,3 +86,19 @@ def wholes_of(
     if isinstance(second, Whole) and (value := whole_literal(a)) is not None:
         return Whole(value, value), second
     return None
+
+
+def truth_hint(tree: Tree) -> str:
+    """Return what is written for 0 and 1, else how a number becomes a condition."""
+    words = {0: "write `false`", 1: "write `true`"}
+    number = whole_literal(tree)
+    return "compare it: `x > 0`" if number is None else words.get(number, "compare it: `x > 0`")
+
+
+def compared_hint(tree: Relation, condition: Tree) -> str:
+    """Return how a condition is written that `tree` compares with 0 or 1, else nothing."""
+    number = whole_literal(tree.right if condition is tree.left else tree.left)
+    if not isinstance(condition, Name) or number not in (0, 1):
+        return ""
+    wanted = (number == 1) == (tree.operator == "==")
+    return f"it is written `{'' if wanted else 'not '}{condition.path}`"

@@ -86,7 +86,10 @@ class ModeReader(Reader):
         node = table.get("initial")
         if node is None and len(modes) == 1:
             return next(iter(modes))
-        name = self.text(node, "initial", at)
+        if node is None:
+            told = f"like `initial: {next(iter(modes))}`" if modes else ""
+            self.problems.error("missing", at, "`initial` is missing", told)
+        name = self.text(node, "initial", at) if node else ""
         if name and name not in modes and node is not None:
             label = f"there is no mode `{name}`"
             self.problems.error("name", node.span, label, nearest(name, modes))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
+from language.aliases import stepped
 from language.problem import Problems, Span
 from language.reserved import C_MACRO, DEVICE_WORDS, FILE_WORDS, reserved_words
 
@@ -17,7 +18,8 @@ def check_name(name: str, span: Span, problems: Problems) -> None:
     words = reserved_words()
     another = f"another name, like `{name}_1`"
     if not NAME.fullmatch(name):
-        hint = COMMA_HINT if ")" in name else "a letter, then at most 30 letters, digits or `_`"
+        hint = COMMA_HINT if ")" in name else stepped(name)
+        hint = hint or "a letter, then at most 30 letters, digits or `_`"
         problems.error("name", span, f"`{name}` is not a name", hint)
     elif name in words["GRAMMAR"]:
         problems.error("name", span, f"`{name}` is a word of the language", another)

@@ -80,14 +80,14 @@ def _check_output(automaton: Automaton, column: Column, problems: Problems) -> N
 
 def _check_dimension(column: Column, want: Dimension, what: str, problems: Problems) -> None:
     if not fits(column_dimension(column), want):
-        label = f"column `{column.name}` is in `{column_dimension(column)}`"
-        problems.error("dimension", column.span, label, f"{what} is in `{want}`")
+        label = f"column `{column.name}` is in `{column_dimension(column).shown}`"
+        problems.error("dimension", column.span, label, f"{what} is in `{want.shown}`")
 
 
 def _check_constants(automaton: Automaton, mapping: RecordingMap, problems: Problems) -> None:
     for name, (_, dimension) in mapping.constants.items():
         thing = automaton.inputs.get(name)
         if thing and not fits(dimension, thing.unit.dimension):
-            label = f"constant `{name}` is in `{dimension}`"
-            hint = f"input `{name}` is in `{thing.unit.dimension}`"
+            label = f"constant `{name}` is in `{dimension.shown}`"
+            hint = f"input `{name}` is in `{thing.unit.dimension.shown}`"
             problems.error("dimension", mapping.span, label, hint)

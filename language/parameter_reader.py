@@ -10,7 +10,7 @@ from language.document import Entry, Scalar, Table
 from language.problem import Problems
 from language.reader import Reader, about_of
 from language.table import TableReader, section
-from language.units import NO_UNIT, Unit, parse_unit
+from language.units import NO_UNIT, UNKNOWN_UNIT, Unit, parse_unit
 
 FITTING_KEYS = ("neutral", "starts", "per", "form")
 FORMS = ("constant", "constant_or_random_walk")
@@ -56,6 +56,8 @@ class ParameterReader(Reader):
             unit = unit or own
         unit = unit or parse_unit("1")
         limits = self.range(table.get("range"), unit)
+        if unit is UNKNOWN_UNIT:
+            limits = None  # told as no unit
         given = table.get("value")
         if limits and value is not None and given and not limits[0] <= value <= limits[1]:
             label = f"the value of `{entry.key}` is outside its range"

@@ -6,6 +6,7 @@ import re
 
 import lark
 
+from language.aliases import stepped
 from language.build import built
 from language.document import Scalar
 from language.grammar import parsed
@@ -91,6 +92,11 @@ def _explain(
     if ended or not text.strip():
         return place, "the expression ends too early", ""
     rest = text[column - 1 :]
+    if rest.startswith("[") and text.endswith("]"):
+        label = "a condition stands without brackets"
+        return span.inside(0, len(text)), label, f"it is written `{text[1:-1].strip()}`"
+    if re.match(r"(\+\+|--|[-+*/]=)", text[max(column - 2, 0) :]) or rest.startswith("+="):
+        return place, f"`{rest.split(' ')[0][:20]}` was not expected here", stepped(text)
     if found in ("<", "<=", ">", ">=", "==", "!="):
         return place, "one relation only", "write `a < b and b < c`"
     for foreign, ours in FOREIGN.items():

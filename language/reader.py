@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import cast
 
-from language.aliases import known_as
+from language.aliases import as_mapping, habit, known_as
 from language.declaration import Formula, Range
 from language.document import Entry, Items, Node, Scalar, Table
 from language.kind import LARGEST_WHOLE, TYPES, Type
@@ -37,7 +37,8 @@ class Reader:
             return Table({}, NOWHERE)
         if not isinstance(node, Table):
             if not (isinstance(node, Scalar) and node.text == ""):
-                self.problems.error("form", node.span, f"`{what}` is a mapping")
+                hint = as_mapping(node, what)
+                self.problems.error("form", node.span, f"`{what}` is a mapping", hint)
             return Table({}, node.span)
         known = None if allowed is None else {*allowed, *TEXT_KEYS}
         kept: dict[str, Entry] = {}
@@ -58,9 +59,8 @@ class Reader:
             self.problems.error("form", entry.span, label, "like `req: [BL-3]`")
 
     def _unknown_key(self, entry: Entry, what: str, known: set[str]) -> None:
-        hint = known_as(entry.key, known) or nearest(entry.key, known)
-        cut_off = isinstance(entry.node, Scalar) and not entry.node.text
-        if re.search(r"[() ]", entry.key) or (cut_off and not hint):
+        hint = known_as(entry.key, known) or habit(entry.key, what) or nearest(entry.key, known)
+        if not hint and isinstance(entry.node, Scalar) and not entry.node.text:
             hint = COMMA_HINT
         if not hint:
             hint = f"known here: {', '.join(sorted(known - TEXT_KEYS))}"

@@ -162,14 +162,14 @@ class _ScenarioReader(StimulusReader):
             label = f"`{name}` is not a column of the scenario's recording"
             self.problems.error("name", span, label, nearest(name, columns))
         elif not fits(column_dimension(columns[name]), want):
-            label = f"column `{name}` is in `{column_dimension(columns[name])}`"
-            self.problems.error("dimension", span, f"{label}, {what} is in `{want}`")
+            label = f"column `{name}` is in `{column_dimension(columns[name]).shown}`"
+            self.problems.error("dimension", span, f"{label}, {what} is in `{want.shown}`")
         return name
 
     def _constant(self, tree: Tree, unit: Unit) -> Fraction:
         value, dimension = constant(tree)
         if not fits(dimension, unit.dimension) and not getattr(tree, "is_bare_zero", False):
-            label = f"this is in `{dimension}`, the state is in `{unit.dimension}`"
+            label = f"this is in `{dimension.shown}`, the state is in `{unit.dimension.shown}`"
             self.problems.error("dimension", tree.span, label)
         return value
 
@@ -203,7 +203,7 @@ class _ScenarioReader(StimulusReader):
         for name, (value, dimension) in self.mapping.constants.items():
             if name in known:
                 if not fits(dimension, known[name].unit.dimension):
-                    label = f"constant `{name}` is in `{dimension}`"
+                    label = f"constant `{name}` is in `{dimension.shown}`"
                     self.problems.error("dimension", self.mapping.span, label)
                 found[name] = Stimulus((Piece(Fraction(0), value),), truth=known[name].truth)
         for column in self.mapping.columns.values():

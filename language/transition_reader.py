@@ -6,11 +6,12 @@ import re
 from collections.abc import Iterator
 from typing import Literal, cast
 
-from language.aliases import known_as
+from language.aliases import heard_with_guard, known_as
 from language.chart import Keeping
 from language.declaration import Formula
 from language.document import Entry, Items, Node, Scalar, Table
 from language.model import Rewind, Transition
+from language.names import check_name
 from language.problem import Problems, nearest
 from language.reader import Reader
 from language.site import Site
@@ -31,10 +32,22 @@ class TransitionReader(Reader):
 
     def transitions(self, node: Node | None, source: str, site: Site) -> Iterator[Transition]:
         """Iterate over the transitions of the mode `source`; one without a guard is reported."""
-        for entry in self.named(node, "transitions"):
+        for entry in self.table(node, "transitions"):
+            self._check_name(entry)
             transition = self._transition(entry, source, site)
             if transition:
                 yield transition
+
+    def _check_name(self, entry: Entry) -> None:
+        """A transition is named like anything; one named like a path to its target has `to`."""
+        if re.fullmatch(r"\w+(\.\w+)+", entry.key):
+            name = entry.key.rpartition(".")[2]
+            label = f"`{entry.key}` is not a name"
+            self.problems.error(
+                "name", entry.span, label, f"a name of its own: `{name}: {{to: {entry.key}}}`"
+            )
+        else:
+            check_name(entry.key, entry.span, self.problems)
 
     def _transition(self, entry: Entry, source: str, site: Site) -> Transition | None:
         key = f"{site.key}.transitions.{entry.key}"
@@ -95,7 +108,9 @@ class TransitionReader(Reader):
         for item in node.nodes if isinstance(node, Items) else (node,):
             if isinstance(item, Scalar) and item.text not in self.events:
                 label = f"there is no event `{item.text}`"
-                hint = nearest(item.text, self.events) or "events are declared under `events`"
+                hint = heard_with_guard(item.text, self.events)
+                hint = hint or nearest(item.text, self.events)
+                hint = hint or "events are declared under `events`"
                 words = [word for word in re.findall(r"\w+", item.text) if word in self.events]
                 if len(words) > 1:
                     hint = f"several are a list: `{what}: [{', '.join(words)}]`"
@@ -110,6 +125,8 @@ class TransitionReader(Reader):
         keys = entry.node.entries if isinstance(entry.node, Table) else ()
         if node is None and any(known_as(key, ("when", "event")) for key in keys):
             return None  # told as an unknown key
+        if isinstance(entry.node, Items) or (isinstance(entry.node, Scalar) and entry.node.text):
+            return None  # told as no mapping
         if node is None:
             hint = "`when: true` with the largest `priority` for what the others leave"
             self.problems.error("missing", entry.span, "`when` is missing", hint)

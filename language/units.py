@@ -61,6 +61,11 @@ class Dimension:
         """Tell whether there is no dimension, whatever the angle."""
         return not any(self.powers)
 
+    @property
+    def shown(self) -> str:
+        """The dimension for readers: by its common name where it has one."""
+        return SHOWN.get(str(self), str(self))
+
     def __str__(self) -> str:
         """Return the dimension in SI symbols: `N*m`, `kg*m^2`, `rad/s`, `1`; `?` if unknown."""
         if not self.powers:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import yaml
@@ -70,6 +70,7 @@ class _Open:
     is_mapping: bool
     nodes: list[Node] = field(default_factory=list)
     entries: dict[str, Entry] = field(default_factory=dict)
+    cut: set[str] = field(default_factory=set)
     key: Scalar | Table | Items | None = None
 
 
@@ -99,6 +100,8 @@ class _Builder:
                     self._end(event.start_mark, f"nested deeper than {MAX_DEPTH} levels", "depth")
             case yaml.MappingEndEvent() | yaml.SequenceEndEvent():
                 level = self.open.pop()
+                for key in level.cut:
+                    self._report_cut(level.entries[key])
                 span = self._span(level.start, event.end_mark)
                 ended: Node = Table(level.entries, span)
                 self._add(ended if level.is_mapping else Items(tuple(level.nodes), span))
@@ -144,7 +147,32 @@ class _Builder:
             self._entry(level, level.key, node)
             level.key = None
 
+    def _is_cut(self, level: _Open, key: Node, node: Node) -> bool:
+        """Join a value that `{...}` ended at a comma: a `(` is open, what follows has no value."""
+        last = next(reversed(level.entries.values()), None)
+        if not (last and isinstance(last.node, Scalar) and isinstance(key, Scalar)):
+            return False
+        value = last.node
+        is_open = not value.quoted and value.text.count("(") > value.text.count(")")
+        if not is_open or key.quoted or not isinstance(node, Scalar) or node.text or node.quoted:
+            return False
+        text = f"{value.text}, {key.text}"
+        width = key.span.column + key.span.width - value.span.column
+        is_one_line = key.span.line == value.span.line
+        span = replace(value.span, width=width) if is_one_line else value.span
+        level.entries[last.key] = replace(last, node=Scalar(text, span))
+        level.cut.add(last.key)
+        return True
+
+    def _report_cut(self, entry: Entry) -> None:
+        assert isinstance(entry.node, Scalar)
+        label = "in `{...}` YAML ends this value at its comma"
+        hint = f'quote it: `{entry.key}: "{entry.node.text}"`'
+        self.problems.error("yaml-feature", entry.node.span, label, hint)
+
     def _entry(self, level: _Open, key: Node, node: Node) -> None:
+        if self._is_cut(level, key, node):
+            return
         if not isinstance(key, Scalar):
             label = "a key is a name, not a list or a mapping"
             self.problems.error("key", key.span, label, "quote a text with brackets")

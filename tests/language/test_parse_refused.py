@@ -40,7 +40,7 @@ def first(text: str) -> tuple[int, str, str]:
         ("a not b", 3, "`not` was not expected here"),
         ("a and and b", 7, "`and` was not expected here"),
         ("a, b", 2, "`,` was not expected here"),
-        ("[a]", 1, "`[a]` was not expected here"),
+        ("[a]", 1, "a condition stands without brackets"),
         ("3 m s", 5, "`s` was not expected here"),
         ("3  m", 4, "`m` was not expected here"),
         (".5", 1, "`.5` was not expected here"),
