@@ -43,13 +43,21 @@ def _results(table: TruthTable) -> Iterator[tuple[str, Formula]]:
 
 def _check_rows(table: TruthTable, problems: Problems) -> None:
     """Exactly one row holds, whatever the conditions are; else what they are is shown."""
-    for earlier, later in combinations(table.rows, 2):
+    if any(not row.marks for row in table.rows):
+        return  # told as no row
+    rows = [row for row in table.rows if not row.is_rest]
+    for earlier, later in combinations(rows, 2):
         both = _common(earlier, later)
         if both is not None:
             label = f"`{later.name}` and `{earlier.name}` both hold at {_said(table, both)}"
             problems.error("overlap", later.span, label, "change a `-`: exactly one row holds")
-    open_row = _undecided(table.rows, (), len(table.conditions))
-    if open_row is not None and table.rows:
+    open_row = _undecided(rows, (), len(table.conditions))
+    rest = next((row for row in table.rows if row.is_rest), None)
+    if rest:
+        if open_row is None:
+            label = f"`{rest.name}` never holds: there is a row for every case"
+            problems.warning("dead", rest.span, label, "remove it")
+    elif open_row is not None and table.rows:
         label = f"no row of `{table.name}` holds at {_said(table, open_row)}"
         hint = f'add a row for it: `"{_text(open_row)}": {{...}}`'
         problems.error("incomplete", table.span, label, hint)

@@ -11,12 +11,16 @@ from language.problem import Span
 
 @dataclass(frozen=True)
 class TruthRow:
-    """A row of a truth table: what each condition is (None: whatever), and what it then writes."""
+    """A row of a truth table: what each condition is (None: whatever), and what it then writes.
+
+    A row of no marks was told to be none; `is_rest` is the last one, `else`: what no other is for.
+    """
 
     name: str
     marks: tuple[bool | None, ...]
     results: Mapping[str, Formula]
     span: Span
+    is_rest: bool = False
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Truth table reader: conditions by name, and rows like `"T F -": {permit: false}`."""
+"""Truth table reader: conditions by name, rows like `"T F -": {permit: false}`, at last `else`."""
 
 from __future__ import annotations
 
@@ -10,6 +10,13 @@ from language.reader import Reader
 from language.truth import TruthRow, TruthTable
 
 MARKS: Mapping[str, bool | None] = {"T": True, "F": False, "-": None}
+REST = "else"
+ALIKE: Mapping[str, str] = {
+    **dict.fromkeys("TtYy1", "T"),
+    **dict.fromkeys("FfNn0", "F"),
+    **dict.fromkeys("-*Xx", "-"),
+}
+"""How other tools write a mark."""
 MOST_CONDITIONS = 16
 """Conditions of a table: the search for an undecided row looks at 2^16 at most."""
 
@@ -37,24 +44,36 @@ class TruthTableReader(Reader):
             label = f"`{entry.key}` has {len(conditions)} conditions"
             hint = f"a truth table has at most {MOST_CONDITIONS}: split it"
             self.problems.error("huge", entry.span, label, hint)
-        rows = tuple(
-            self._row(row, key, len(conditions))
-            for row in self.table(body.get("rows"), f"{key}.rows")
-        )
+        entries = list(self.table(body.get("rows"), f"{key}.rows"))
+        rows = tuple(self._row(row, key, len(conditions)) for row in entries)
+        for row in rows[:-1]:
+            if row.is_rest:
+                label = f"`{REST}` is not the last row"
+                self.problems.error("table", row.span, label, "it is for what the others leave")
         return TruthTable(entry.key, conditions, rows, key, entry.span)
 
     def _row(self, entry: Entry, key: str, width: int) -> TruthRow:
-        marks = entry.key.split()
+        is_rest = entry.key == REST
+        marks = ["-"] * width if is_rest else entry.key.split()
         if len(marks) != width or not all(mark in MARKS for mark in marks):
             label = f"`{entry.key}` is no row of {width} conditions"
-            hint = "one of `T`, `F` or `-` for each, with blanks between, in the order of `if`"
-            self.problems.error("table", entry.span, label, hint)
-            marks = ["-"] * width
+            self.problems.error("table", entry.span, label, _hint(entry.key, width))
+            marks = []
         results = self.formulas(entry.node, f"{key}.rows.{entry.key}")
         for written in self.table(entry.node, entry.key):
             if written.key not in self.discrete:
                 label = f"`{written.key}` is not a discrete variable"
                 hint = nearest(written.key, self.discrete) or "declare it under `discrete`"
                 self.problems.error("name", written.span, label, hint)
-        name = " ".join(marks)
-        return TruthRow(name, tuple(MARKS[mark] for mark in marks), results, entry.span)
+        name = REST if is_rest else " ".join(marks)
+        return TruthRow(name, tuple(MARKS[mark] for mark in marks), results, entry.span, is_rest)
+
+
+def _hint(key: str, width: int) -> str:
+    """Return how a row is written: this one, where its marks can be told."""
+    marks = [ALIKE.get(mark, "") for mark in key if not mark.isspace()]
+    if len(marks) == width and all(marks):
+        return f'it is written `"{" ".join(marks)}"`'
+    if key in ("default", "otherwise", "rest"):
+        return f"the last row is `{REST}`, for what the others leave"
+    return "one of `T`, `F` or `-` for each, with blanks between, in the order of `if`"

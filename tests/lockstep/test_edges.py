@@ -183,7 +183,7 @@ tables:
       "T T F": {level: u}
       "T F F": {}
       "F T -": {level: -u, count: count + 3}
-      "F F -": {kind: low, level: previous(r) - 1.0e-308}
+      else: {kind: low, level: previous(r) - 1.0e-308}
   second: {if: {seen: kind == mid}, rows: {"T": {}, "F": {fell: rose}}}
   third: {if: {any: kind == low}, rows: {"-": {rose: level - r}}}
 modes: {a: {transitions: {b: {when: kind == mid}}}, b: {transitions: {a: {when: count > 2}}}}
