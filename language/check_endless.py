@@ -7,7 +7,6 @@ of the modes that are active comes between.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from itertools import islice
 
 from language.chart import ROOT, Chart, Node
@@ -16,12 +15,14 @@ from language.constants import exact_value
 from language.inquiry import Inquiry, Witness
 from language.model import Automaton, Transition
 from language.moment import ELAPSED, Moment, Story
-from language.operation import Expr, Unary
+from language.operation import Expr, Ref, Unary
 from language.precedence import node_of
 from language.problem import Problems, SpecError
 
 TURNING = ("memory.rising", "memory.falling", "memory.changed")
-"""What is true in the first micro-step of a tick only, so that it keeps nothing going."""
+"""What is true in the first micro-step of a tick only: what goes on goes on without it."""
+KEPT = ("memory.previous", "memory.delay")
+"""What says of the ticks before how a value changed, as what turns does."""
 AGES = (ELAPSED, "memory.every")
 """What is counted anew where a mode is entered."""
 ROUND_HINT = "let one of them wait, or its guard exclude the one before"
@@ -87,10 +88,10 @@ def _forever(automaton: Automaton, chart: Chart, way: Way, inquiry: Inquiry) -> 
                 between.append(Unary("not", moment.expression(other.when.tree)))
     except (KeyError, SpecError):
         return None
-    question = inquiry.question(story, (*taken, *between))
-    ages = () if not way[0].targets else AGES
-    own = inquiry.question(replace(story, facts=[]), taken).variables
-    if not (_is_fixed(automaton, question.variables, ages) and _is_fixed(automaton, own, TURNING)):
+    still = [Unary("not", Ref(name)) for name in story.extents if name.startswith(TURNING)]
+    question = inquiry.question(story, (*taken, *between, *still))
+    moving = (AGES if way[0].targets else ()) + (KEPT if still else ())
+    if not _is_fixed(automaton, question.variables, moving):
         return None
     if not question.variables:
         return Witness({}, "") if question.holds_at({}) else None
