@@ -10,16 +10,18 @@ from contextlib import suppress
 from fractions import Fraction
 
 from language.constants import exact_value
+from language.declaration import Formula
 from language.inquiry import Inquiry
 from language.model import Automaton, Mode, Transition
 from language.moment import ELAPSED, Moment
 from language.operation import Compare, Expr, Ref, Unary, Value, real, whole
 from language.precedence import comes_along, inside_first, winners
-from language.problem import Problems, SpecError
+from language.problem import Problems, Span, SpecError
 from language.region import by_priority
+from language.transition_table import STAY
 
-BY_PRIORITY = "give it a smaller priority, or remove it"
-BY_ORDER = "let the other guard exclude it, choose the other `order`, or remove it"
+BY_PRIORITY = "give it a smaller priority, or "
+BY_ORDER = "let the other guard exclude it, choose the other `order`, or "
 
 
 def check_transitions(automaton: Automaton, inquiry: Inquiry, problems: Problems) -> set[str]:
@@ -42,9 +44,9 @@ def check_transitions(automaton: Automaton, inquiry: Inquiry, problems: Problems
             if not guards.is_silent(transition):
                 continue
             if guards.never(transition):
-                label = "this never holds within the declared ranges"
+                label = f"{_guard(transition)} never holds within the declared ranges"
                 hint = "they exclude it, with the equations of the mode: correct one of them"
-                problems.warning("dead", transition.when.span, label, hint)
+                problems.warning("dead", _place(transition, transition.when), label, hint)
             elif not guards.report_shadow(transition, problems):
                 continue
             silent.add(transition.key)
@@ -79,7 +81,7 @@ def check_waits(automaton: Automaton, inquiry: Inquiry, problems: Problems) -> N
                 label += f"than a period of {times[2]}"
                 hint = "which of them elapses first may differ between simulation and target"
                 assert later.wait
-                problems.warning("near", later.wait.span, label, hint)
+                problems.warning("near", _place(later, later.wait), label, hint)
 
 
 def check_stuck(automaton: Automaton, silent: set[str], problems: Problems) -> None:
@@ -214,14 +216,25 @@ class _Guards:
 def _report_shadow(
     transition: Transition, what: str, waits: bool, problems: Problems, hint: str
 ) -> bool:
+    other = f"write `{STAY}`" if transition.in_cell else "remove it"
     if waits:
         label = f"this wait never elapses: {what} before, whenever the guard holds"
         assert transition.wait
-        problems.warning("timer", transition.wait.span, label, "wait for less, or remove it")
+        place = _place(transition, transition.wait)
+        problems.warning("timer", place, label, f"wait for less, or {other}")
     else:
-        label = f"this never fires: {what} first, whenever this holds"
-        problems.warning("shadowed", transition.when.span, label, hint)
+        label = f"this never fires: {what} first, whenever {_guard(transition)} holds"
+        problems.warning("shadowed", _place(transition, transition.when), label, hint + other)
     return True
+
+
+def _place(transition: Transition, formula: Formula) -> Span:
+    """Return where a formula stands; of a transition table its cell: other rows share it."""
+    return transition.span if transition.in_cell else formula.span
+
+
+def _guard(transition: Transition) -> str:
+    return f"the guard of `{transition.name}`" if transition.in_cell else "this"
 
 
 def _wait(automaton: Automaton, transition: Transition) -> Fraction:

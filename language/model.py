@@ -60,7 +60,8 @@ class Transition:
 
     In a chart it may wait for one of `events`, raise others, have several `targets` (none: it
     stays), enter what its target was left in (`history`), and not leave its source (`internal`);
-    where it `completes` its guard is that its source has come to its end.
+    where it `completes` its guard is that its source has come to its end. Of a transition table
+    its target is `in_cell`: several may share the guard.
     """
 
     name: str
@@ -81,6 +82,7 @@ class Transition:
     history: Keeping = ""
     internal: bool = False
     completes: bool = False
+    in_cell: bool = False
 
 
 @dataclass(frozen=True)

@@ -82,6 +82,7 @@ class TransitionReader(Reader):
             history=cast(Keeping, history),
             internal=internal == "true",
             completes="when" not in table.entries and not events,
+            in_cell=to is not None and to.span == entry.span,
         )
 
     def _targets(self, node: Node | None, entry: Entry) -> tuple[str, ...]:
