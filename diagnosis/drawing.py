@@ -13,7 +13,6 @@ from diagnosis import wording
 from diagnosis.digits import per_cent, significant
 from diagnosis.dossier import Dossier
 from diagnosis.location import acting
-from diagnosis.locus import drifts_of
 from diagnosis.locus_picture import locus_picture
 from diagnosis.missing_picture import missing_picture
 from diagnosis.place_sentence import PLACES
@@ -119,7 +118,7 @@ def _missing(dossier: Dossier, inputs: Mapping[str, str]) -> list[Drawing]:
     best = dossier.verdict.location[0]
     if dossier.diagnosis is None or dossier.verdict.verdict == "nothing_missing":
         return []
-    if best.free is None or not best.windows:
+    if not best.windows:
         return []
     bench = dossier.diagnosis.bench
     names = [one.name for one in bench.series]
@@ -129,10 +128,10 @@ def _missing(dossier: Dossier, inputs: Mapping[str, str]) -> list[Drawing]:
     what = f"missing {PLACES[section]} {name}"
     caption = (
         f"What is {what} over time, before effects are laid: the unknown that would explain what "
-        f"is recorded in {names[place]}, as an observer finds it."
+        f"is recorded in {names[place]}, give or take three standard deviations."
     )
-    drift = drifts_of(bench.series, best.free, best.drift)[place]
-    picture = missing_picture(best, bench.series[place], drift, what, unit, inputs)
+    series, unknown = bench.series[place], best.unknown[place]
+    picture = missing_picture(best, series, unknown, what, unit, inputs)
     return [Drawing("missing", caption, caption, picture)]
 
 

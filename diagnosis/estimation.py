@@ -14,9 +14,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from diagnosis.candidate import Candidate
+from diagnosis.gains import gains_of
 from diagnosis.normal import Columns, Normal, columns_of, normal_of, stepped
 from diagnosis.point import Point, point_of, values_at
-from diagnosis.prediction import Gains, Noises, Outcome, gains_of, predicted
+from diagnosis.prediction import Gains, Noises, Outcome, predicted
 from diagnosis.series import Series
 
 MOST_ROUNDS = 15

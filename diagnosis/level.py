@@ -13,8 +13,9 @@ import numpy as np
 
 from diagnosis.candidate import Candidate
 from diagnosis.estimation import Estimate, estimated, looked_at
+from diagnosis.gains import near, points_of
 from diagnosis.point import Point
-from diagnosis.prediction import Noises, near, noises_of, points_of
+from diagnosis.prediction import Noises, noises_of
 from diagnosis.series import Series
 
 REACH = 0.2

@@ -16,14 +16,14 @@ from diagnosis.bench import Bench
 from diagnosis.estimation import Estimate
 from diagnosis.freedom import freed
 from diagnosis.layers import Layer, drift
-from diagnosis.locus import Locus, locus_of
+from diagnosis.locus import Locus, locus_of, over_time
 from language.document import Table
 from language.known import entries_of
 from language.rewrite import reads
 
 
 def located(bench: Bench, base: Estimate) -> tuple[Locus, ...]:
-    """Return every place with what its freedom explains, the best first.
+    """Return every place with what its freedom explains, the best first, that over time.
 
     With each freedom the parameters are fitted anew: those of the base were bent by what it lacks,
     and a place would have to explain the bending as well.
@@ -37,7 +37,8 @@ def located(bench: Bench, base: Estimate) -> tuple[Locus, ...]:
         if np.isfinite(one.cost):
             locus = locus_of(bench, section, layer, one)
             found.append(dataclasses.replace(locus, gain=quiet - one.cost))
-    return tuple(sorted(found, key=lambda locus: -locus.gain))
+    found.sort(key=lambda locus: -locus.gain)
+    return tuple([over_time(bench, found[0]), *found[1:]] if found else [])
 
 
 def _loci(bench: Bench) -> list[tuple[str, Layer]]:
@@ -54,14 +55,14 @@ def _loci(bench: Bench) -> list[tuple[str, Layer]]:
 def led_by(loci: Sequence[Locus], paths: Sequence[str], bench: Bench) -> tuple[Locus, ...]:
     """Return places in which those of accepted effects lead, each with what is known there."""
     known = {locus.path: locus for locus in loci}
-    first = []
+    first: list[Locus] = []
     for path in dict.fromkeys(paths):
         section, _, place = path.partition(".")
         nearest = known.get(path) or known.get(acting(bench, section, place))
         found = nearest or Locus(section, place, 0.0, 0.0)
+        found = found if first else over_time(bench, found)
         first.append(dataclasses.replace(found, section=section, place=place, named=True))
-    rest = [locus for locus in loci if locus.path not in paths]
-    return (*first, *rest)
+    return (*first, *(locus for locus in loci if locus.path not in paths))
 
 
 def acting(bench: Bench, section: str, place: str) -> str:

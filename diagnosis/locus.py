@@ -16,21 +16,38 @@ from diagnosis.layers import DRIFT, Layer
 from diagnosis.prediction import burnt
 from diagnosis.scale import scale_of
 from diagnosis.series import Series
+from diagnosis.smoothing import smoothed
 
 Reals = NDArray[np.float64]
-LOUD = 2.0
-"""A drift beyond this many of its own standard deviations makes a window."""
+SURE = 3.0
+"""An unknown beyond this many of its standard deviations makes a window."""
 SHORTEST = 0.05
 """Windows nearer than this [s] are one."""
 MOST_WINDOWS = 12
 
 
 @dataclass(frozen=True)
+class Unknown:
+    """An unknown torque, force or error of a recording behind its burn-in, with its standard
+    deviation [SI], (samples,) each.
+    """
+
+    values: Reals
+    stds: Reals
+
+    @property
+    def sure(self) -> NDArray[np.bool_]:
+        """The samples (samples,) at which it is not nothing."""
+        return np.abs(self.values) > SURE * self.stds
+
+
+@dataclass(frozen=True)
 class Locus:
     """One place: `gain` [nats] of its freedom over none; `rms` of its drift [SI], and that as a
-    `part` of what acts there; the `windows` (start, end, recording) in which it is loud, its share
-    by mode, and what it goes `along` with. At a `named` one stands an effect that was accepted.
-    `free` is the base with this freedom - its state `drift` - and its parameters fitted beside it.
+    `part` of what acts there; its share by mode, and what it goes `along` with. At a `named` one
+    stands an effect that was accepted. `free` is a model with this freedom - its state `drift` -
+    and its parameters fitted beside it. Of the places that are told it is known over time
+    (`unknown`, for each recording), and in which `windows` (start, end, recording) it is there.
     """
 
     section: str
@@ -44,6 +61,7 @@ class Locus:
     named: bool = False
     free: Estimate | None = dataclasses.field(default=None, repr=False, compare=False)
     drift: str = ""
+    unknown: tuple[Unknown, ...] = dataclasses.field(default=(), repr=False, compare=False)
 
     @property
     def path(self) -> str:
@@ -54,28 +72,52 @@ class Locus:
 def locus_of(bench: Bench, section: str, layer: Layer, free: Estimate) -> Locus:
     """Return what the drift of a layer does at a place where it is free; the gains are not set."""
     drifts = drifts_of(bench.series, free, layer.named(DRIFT))
-    predictions = zip(bench.series, free.outcome.predictions, strict=True)
-    modes = [run.modes[burnt(one) : run.done] for one, run in predictions]
-    size = float(np.sqrt(np.mean(np.concatenate(drifts) ** 2)))
-    windows = [
-        window
-        for one, values in zip(bench.series, drifts, strict=True)
-        for window in _windows(values, size, one)
-    ]
-    windows.sort(key=lambda window: window[0] - window[1])
-    scale = scale_of(bench, section, layer.place, free)
+    size = _rms(drifts)
     return Locus(
         section,
         layer.place,
         0.0,
         size,
-        tuple(windows[:MOST_WINDOWS]),
-        _shares(bench, drifts, modes),
-        along(bench, free, drifts),
-        part=size / scale if scale > 0.0 else 0.0,
+        modes=_shares(bench, drifts, free),
+        along=along(bench, free, drifts),
+        part=_part(bench, section, layer.place, free, size),
         free=free,
         drift=layer.named(DRIFT),
     )
+
+
+def over_time(bench: Bench, locus: Locus) -> Locus:
+    """Return a place with what is unknown there over time, from all that was recorded."""
+    if locus.free is None or locus.unknown:
+        return locus
+    column = locus.free.candidate.predictor.states.index(locus.drift)
+    unknown = tuple(
+        Unknown(run.states[burnt(one) :, column], run.stds[burnt(one) :, column])
+        for one, run in zip(bench.series, smoothed(locus.free, bench.series), strict=True)
+    )
+    values = [one.values for one in unknown]
+    pairs = zip(bench.series, unknown, strict=True)
+    windows = [window for one, known in pairs for window in _windows(known, one)]
+    windows.sort(key=lambda window: window[0] - window[1])
+    size = _rms(values)
+    return dataclasses.replace(
+        locus,
+        rms=size,
+        windows=tuple(windows[:MOST_WINDOWS]),
+        modes=_shares(bench, values, locus.free),
+        along=along(bench, locus.free, values),
+        part=_part(bench, locus.section, locus.place, locus.free, size),
+        unknown=unknown,
+    )
+
+
+def _part(bench: Bench, section: str, place: str, free: Estimate, size: float) -> float:
+    scale = scale_of(bench, section, place, free)
+    return size / scale if scale > 0.0 else 0.0
+
+
+def _rms(values: Sequence[Reals]) -> float:
+    return float(np.sqrt(np.mean(np.concatenate(values) ** 2)))
 
 
 def drifts_of(series: Sequence[Series], free: Estimate, name: str) -> list[Reals]:
@@ -85,22 +127,23 @@ def drifts_of(series: Sequence[Series], free: Estimate, name: str) -> list[Reals
     return [run.states[burnt(one) : run.done, place] for one, run in runs]
 
 
-def _windows(values: Reals, size: float, series: Series) -> list[tuple[float, float, str]]:
-    """Return the times [s] of a recording at which a drift is loud."""
+def _windows(unknown: Unknown, series: Series) -> list[tuple[float, float, str]]:
+    """Return the times [s] of a recording at which something is missing."""
     period = float(series.period)
     start = float(series.start) + burnt(series) * period
-    loud = np.flatnonzero(np.abs(values) > LOUD * size) if size > 0.0 else np.array([], dtype=int)
-    if not len(loud):
+    there = np.flatnonzero(unknown.sure)
+    if not len(there):
         return []
-    parts = np.split(loud, np.flatnonzero(np.diff(loud) * period > SHORTEST) + 1)
-    return [(start + part[0] * period, start + part[-1] * period, series.name) for part in parts]
+    parts = np.split(there, np.flatnonzero(np.diff(there) * period > SHORTEST) + 1)
+    ends = [(float(part[0]), float(part[-1])) for part in parts]
+    return [(start + low * period, start + high * period, series.name) for low, high in ends]
 
 
-def _shares(
-    bench: Bench, drifts: Sequence[Reals], modes: Sequence[NDArray[np.int16]]
-) -> dict[str, float]:
+def _shares(bench: Bench, drifts: Sequence[Reals], free: Estimate) -> dict[str, float]:
     """Return how much of the drift's squares falls into each mode."""
     names = {mode.number: mode.name for mode in bench.automaton.modes.values()}
-    squares, where = np.concatenate(drifts) ** 2, np.concatenate(modes)
+    runs = zip(bench.series, free.outcome.predictions, strict=True)
+    where = np.concatenate([run.modes[burnt(one) : run.done] for one, run in runs])
+    squares = np.concatenate(drifts) ** 2
     whole = float(np.sum(squares)) or 1.0
     return {name: float(np.sum(squares[where == number])) / whole for number, name in names.items()}

@@ -6,28 +6,27 @@ from collections.abc import Mapping
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
-from diagnosis.locus import Locus
+from diagnosis.locus import SURE, Locus, Unknown
 from diagnosis.series import Series
 from engine.band import PALETTE
 from engine.plot import Picture
 from language.text import visible
 
-Reals = NDArray[np.float64]
 _, RED, GREEN, _, _, PURPLE, GREY = PALETTE
 MOST_INPUTS = 3
 
 
 def missing_picture(
-    locus: Locus, one: Series, drift: Reals, what: str, unit: str, inputs: Mapping[str, str]
+    locus: Locus, one: Series, unknown: Unknown, what: str, unit: str, inputs: Mapping[str, str]
 ) -> Picture:
-    """Return the picture of the `drift` (samples,) that the end of a recording asks for.
+    """Return the picture of what is `unknown` in a recording, give or take what makes a window.
 
     `what` it is and its `unit` are told; beneath stand those of the `inputs` (names with units)
     that move, in the unit of the first.
     """
-    first = one.count - len(drift)
+    values, reach = unknown.values, SURE * unknown.stds
+    first = one.count - len(values)
     times = float(one.start) + np.arange(first, one.count) * float(one.period)
     moving = [k for k in range(len(inputs)) if float(np.ptp(one.inputs[:, k])) > 0.0]
     names, units = list(inputs), list(inputs.values())
@@ -36,7 +35,8 @@ def missing_picture(
     heights = [1.7, 1.0] if moving else [1.7]
     rows = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)
     above, beneath = rows[0][0], rows[-1][0]
-    above.plot(times, drift, color=RED, lw=1.2)
+    above.fill_between(times, values - reach, values + reach, color=GREY, alpha=0.3, lw=0)
+    above.plot(times, values, color=RED, lw=1.2)
     above.axhline(0.0, color="black", lw=0.6)
     for start, end, name in locus.windows:
         if name == one.name:
@@ -51,5 +51,5 @@ def missing_picture(
     for axis in (above, beneath):
         axis.grid(alpha=0.3)
         axis.tick_params(labelsize=8)
-    beneath.set_xlabel("time [s]; red: where most is missing", fontsize=9)
+    beneath.set_xlabel("time [s]; red: where something is missing for sure", fontsize=9)
     return Picture(figure)

@@ -232,7 +232,7 @@ def test_the_report_is_one_page_that_needs_nothing_but_what_lies_beside_it(found
     assert page.open == []
     assert page.references
     assert [name for name in page.references if not (found.folder / "found" / name).exists()] == []
-    assert text.count("<svg") == text.count('<svg role="img" aria-label="') == 4
+    assert text.count("<svg") == text.count('<svg role="img" aria-label="') == 5
     names = re.findall(r'\bid="([^"]+)"', text)
     assert len(names) == len(set(names))
     assert set(re.findall(r"url\(#([^)]+)\)", text)) <= set(names)
