@@ -18,7 +18,7 @@ from language.model import CHART
 from language.problem import Problems, Span, nearest
 from language.project import Project, expanded
 from language.reader import Reader, about_of
-from language.requirement import requirements_of
+from language.requirement import requirements_in, requirements_of
 from language.scenario import SCENARIO_KEYS, read_scenario
 from language.syntax import Broken
 from language.system import read_system
@@ -56,6 +56,7 @@ class _TestReader(Reader):
 
     system: System
     scenario: Scenario
+    written: Document
     conditions: ConditionReader
 
     def __init__(self, problems: Problems, project: Project) -> None:
@@ -85,8 +86,14 @@ class _TestReader(Reader):
             span=at,
             source=document.source,
             about=about_of(tree),
-            requirements=requirements_of(document.root),
+            requirements=self._requirements(document.root),
         )
+
+    def _requirements(self, tree: Table) -> tuple[str, ...]:
+        """Return what a test names beside its expectations; its scenario names it, too."""
+        own = {key: entry for key, entry in tree.entries.items() if key != "expect"}
+        trees = (Table(own, tree.span), expanded(self.written, self.project).root)
+        return tuple(dict.fromkeys(n.requirement for each in trees for n in requirements_in(each)))
 
     def _load(self, tree: Table, document: Document) -> None:
         """The system and the scenario: named, or with the scenario written here."""
@@ -114,6 +121,7 @@ class _TestReader(Reader):
         document = self.project.read(self.project.path_of(named.text, named.span))
         self.system = read_system(document, self.project, overrides)  # type: ignore[arg-type]
         self.scenario = read_scenario(written, self.project, self.system)
+        self.written = written
 
     def _expectation(self, entry: Entry) -> Expectation | None:
         told = len(self.problems.found)

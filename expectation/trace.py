@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from expectation.expected import Test
 from language.document import Document, Scalar, Table
 from language.requirement import requirements_in
+from language.tree import entries
 
 CITED = re.compile(
     r"(?:\b([A-Za-z]\w*) )?\b((?:modes|regions|tables|parameters|inputs|states|discrete|equations"
@@ -137,12 +138,22 @@ def _written(document: Document, path: str) -> list[str]:
     if head != "templates":
         return [path]
     template, _, inner = rest.partition(".")
-    modes = document.root.get("modes")
     return [
-        f"modes.{entry.key}" + (f".{inner}" if inner else "")
-        for entry in (modes if isinstance(modes, Table) else ())
-        if isinstance(entry.node, Table) and _text(entry.node, "like") == template
+        f"{mode}.{inner}" if inner else mode
+        for mode, table in _modes(document.root, ())
+        if _text(table, "like") == template
     ]
+
+
+def _modes(table: Table, path: tuple[str, ...]) -> Iterator[tuple[str, Table]]:
+    """Yield each mode with its key path: those of regions, and those inside modes, too."""
+    for key in ("modes", "regions"):
+        for entry in entries(table.get(key)):
+            if isinstance(entry.node, Table):
+                here = (*path, key, entry.key)
+                if key == "modes":
+                    yield ".".join(here), entry.node
+                yield from _modes(entry.node, here)
 
 
 def _proofs(test: Test, passed: Mapping[str, bool]) -> Iterator[tuple[str, Proof]]:

@@ -19,6 +19,7 @@ from language.passage import EFFECT, EVERY, Path, changed
 from language.problem import Problems, Source, nearest
 from language.project import expanded
 from language.reader import Reader
+from language.requirement import requirements_in
 from language.rewrite import renamed, substituted
 from language.tree import at, put, resourced
 from language.values import with_value
@@ -171,6 +172,7 @@ class _InstanceReader(Reader):
         for name, node in inputs.items():
             tree = put(tree, ("equations", names[name]), node)
         region = {key: body.entries[key] for key in REGION if key in body.entries}
+        region |= _required(entry, body)
         if "modes" not in region:
             always = Table(
                 {"always": Entry("always", entry.span, Table({}, entry.span))}, entry.span
@@ -226,6 +228,14 @@ class _InstanceReader(Reader):
                 hint = f"`inputs: {{{name}: ...}}`"
                 self.problems.error("missing", entry.span, label, hint)
         return found
+
+
+def _required(entry: Entry, body: Table) -> dict[str, Entry]:
+    """Return `req` of an instance: its own, and all of what it is of that becomes nothing else."""
+    kept = {key: each for key, each in body.entries.items() if key not in (*SECTIONS, *REGION)}
+    named = [*requirements_in(entry.node), *requirements_in(Table(kept, body.span))]
+    names = tuple(Scalar(each.requirement, each.span) for each in named)
+    return {"req": Entry("req", entry.span, Items(names, entry.span))} if names else {}
 
 
 def _equations(mode: Table) -> Iterator[str]:

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import io
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from codegen.source import c_files
 from expectation.expected import Test
 from expectation.trace import Trace, traced
-from language.document import Document, read_text
+from language.document import Document, Scalar, read_text
+from language.instance import with_instances
 from language.load import automaton_of, program_of
 from language.model import Automaton
+from language.problem import Problems
 from language.project import Project, expanded, read_document
 from language.system import read_system
+from language.tree import at, entries
 from modewright.tests import load_tests, run_test, tests_of
 
 
@@ -32,9 +36,9 @@ def trace(
     """
     project = Project(root or Path())
     documents = _documents(specs, project)
-    made = [expanded(document, project) for document in documents]
-    names = {document.name for document in documents}
-    tests = [test for test in load_tests(tests_of(root), root) if names & _used(test)]
+    made = [_whole(document, project) for document in documents]
+    names = {name for document in documents for name in (document.name, *_of(document, project))}
+    tests = [test for test in load_tests(tests_of(root), root) if names & _used(test, project)]
     verdicts = [_verdicts(test) if run else {} for test in tests]
     code = {
         document.name: c_files(program_of(automaton_of(document, project)))
@@ -79,10 +83,31 @@ def _documents(specs: Sequence[str], project: Project) -> list[Document]:
     return list(found.values())
 
 
-def _used(test: Test) -> set[str]:
-    """Return the names of a test's system and of what is in it."""
-    automata = {instance.automaton.name for instance in test.system.instances.values()}
-    return {test.system.name, *automata}
+def _whole(document: Document, project: Project) -> Document:
+    """Return a document with what it extends, and with the instances of an automaton laid."""
+    made = expanded(document, project)
+    if made.kind != "automaton":
+        return made
+    return dataclasses.replace(made, root=with_instances(made.root, project, Problems()))
+
+
+def _of(document: Document, project: Project) -> Iterator[str]:
+    """Yield the names of what an automaton has instances of."""
+    made = expanded(document, project)
+    if made.kind == "automaton":
+        for entry in entries(made.root.get("instances")):
+            of = at(made.root, ("instances", entry.key, "of"))
+            assert isinstance(of, Scalar)
+            yield read_document(project.path_of(of.text, of.span)).name
+
+
+def _used(test: Test, project: Project) -> set[str]:
+    """Return the names of a test's system, and of all that is in it."""
+    found = {test.system.name}
+    for instance in test.system.instances.values():
+        document = read_document(Path(instance.automaton.span.source.name))
+        found.update((instance.automaton.name, document.name, *_of(document, project)))
+    return found
 
 
 def _verdicts(test: Test) -> dict[str, bool]:

@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 from expectation.trace import Trace
 from modewright import show_trace, traces
 from modewright.cli import app
+from modewright.tests import load_test
 from tests.expectation.latching import AUTOMATON, HEAD, project
 
 REQUIRED = (
@@ -80,3 +81,57 @@ def test_the_command_runs_tests_and_is_strict(found: Trace) -> None:
     assert "spec/test_latched.yaml:2: latched, failed" in told.output
     assert json.loads(Path("trace.json").read_text())["unimplemented"] == ["L-4"]
     assert CliRunner().invoke(app, ["trace", "latch", "--out", "t.txt"]).exit_code == 1
+
+
+PAIR = """\
+language: 1
+automaton: pair
+period: 1 ms
+numbers: float64
+inputs: {volts: {unit: V, range: [-10, 10], default: 0 V}}
+instances:
+  main: {of: latch, inputs: {level: volts}, req: P-1}
+  spare: {of: latch, inputs: {level: 0 V}}
+outputs: [mode]
+"""
+
+
+def test_requirements_of_instances_are_those_of_what_has_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Everywhere in what they are of: a file, an input, a template, a transition."""
+    project(tmp_path, "met: {event: high, req: L-3}")
+    spec = REQUIRED.replace("automaton: latch\n", "automaton: latch\nreq: L-6\n").replace(
+        "level: {unit: V,", "level: {unit: V, req: L-7,"
+    )
+    (tmp_path / "spec" / "latch.yaml").write_text(spec)
+    (tmp_path / "spec" / "pair.yaml").write_text(PAIR)
+    monkeypatch.chdir(tmp_path)
+    found = traces.trace(["pair"])
+    claims = {
+        each.name: {claim.path: claim for claim in each.claims} for each in found.requirements
+    }
+    assert {name: list(paths) for name, paths in claims.items()} == {
+        "L-3": ["templates.main_upper", "templates.spare_upper"],
+        "P-1": ["regions.main"],
+        "L-6": ["regions.main", "regions.spare"],
+        "L-7": ["regions.main", "regions.spare"],
+        **{name: [f"regions.{k}.modes.low.transitions.high" for k in ("main", "spare")]
+           for name in ("L-1", "L-2")},
+    }  # fmt: skip
+    assert all(claim.code for paths in claims.values() for claim in paths.values())
+    assert claims["L-1"]["regions.main.modes.low.transitions.high"].place == "spec/latch.yaml:12"
+    assert found.of_state("traced") == ["L-3"]
+    assert CliRunner().invoke(app, ["trace", "pair", "--strict"]).exit_code == 1
+
+
+@pytest.mark.parametrize("is_apart", [False, True])
+def test_a_scenario_names_requirements_of_its_test(tmp_path: Path, is_apart: bool) -> None:
+    head = HEAD.replace("  horizon", "  req: L-1\n  horizon")
+    path = project(tmp_path, "met: {event: high}", head=head)
+    if is_apart:
+        inner = head.partition("scenario:\n")[2].partition("expect:")[0].replace("  ", "", 1)
+        text = f"language: 1\nscenario: steps\n{inner}".replace("\n  ", "\n")
+        (tmp_path / "spec" / "steps.yaml").write_text(text)
+        path.write_text("language: 1\ntest: latched\nscenario: steps\nexpect: {a: {event: high}}\n")
+    assert load_test(str(path), tmp_path).requirements == ("L-1",)
