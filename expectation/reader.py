@@ -15,10 +15,11 @@ from language.document import Document, Entry, Node, Scalar, Table, require_kind
 from language.event_name import EventName, read_event
 from language.experiment import Scenario, System
 from language.model import CHART
+from language.overlay import without
 from language.problem import Problems, Span, nearest
 from language.project import Project, expanded
 from language.reader import Reader, about_of
-from language.requirement import requirements_in, requirements_of
+from language.requirement import all_requirements, requirements_of
 from language.scenario import SCENARIO_KEYS, read_scenario
 from language.syntax import Broken
 from language.system import read_system
@@ -86,14 +87,10 @@ class _TestReader(Reader):
             span=at,
             source=document.source,
             about=about_of(tree),
-            requirements=self._requirements(document.root),
+            requirements=all_requirements(
+                without(document.root, "expect"), expanded(self.written, self.project).root
+            ),
         )
-
-    def _requirements(self, tree: Table) -> tuple[str, ...]:
-        """Return what a test names beside its expectations; its scenario names it, too."""
-        own = {key: entry for key, entry in tree.entries.items() if key != "expect"}
-        trees = (Table(own, tree.span), expanded(self.written, self.project).root)
-        return tuple(dict.fromkeys(n.requirement for each in trees for n in requirements_in(each)))
 
     def _load(self, tree: Table, document: Document) -> None:
         """The system and the scenario: named, or with the scenario written here."""

@@ -33,6 +33,11 @@ def requirements_in(node: Node, path: tuple[str, ...] = ()) -> Iterator[Named]:
         yield from requirements_in(entry.node, (*path, entry.key))
 
 
+def all_requirements(*trees: Table) -> tuple[str, ...]:
+    """Return the requirements that are named in trees, each once."""
+    return tuple(dict.fromkeys(each.requirement for t in trees for each in requirements_in(t)))
+
+
 def _items(table: Table) -> Iterator[Scalar]:
     node = table.get("req")
     nodes = node.nodes if isinstance(node, Items) else (node,)

@@ -66,7 +66,8 @@ class _Trees:
         """Yield what differs below a path; a mode that is new is told with what is in it."""
         thing = thing_of(path, self.after if new is not None else self.before)
         if isinstance(old, Table) and isinstance(new, Table):
-            yield from _moved(path, old, new)
+            if path != ("instances",) or "automaton" in self.after.entries:
+                yield from _moved(path, old, new)
             for key in _keys(old, new):
                 yield from self.changes((*path, key), old.get(key), new.get(key))
             return

@@ -11,8 +11,9 @@ COUNTED = {"modes": "numbers of modes move", "faults": "bits of faults move"}
 ORDERED = {
     "events": "what comes at once is heard in another order",
     "regions": "what is done at once is done in another order",
+    "instances": "what is done at once is done in another order",
 }
-"""Sections in which it counts who stands before whom."""
+"""Sections in which it counts who stands before whom; `instances` are regions of an automaton."""
 
 
 def what_moves(section: str, old: Table, new: Table) -> str:

@@ -204,6 +204,7 @@ faults: {left: {}, right: {}}
 modes: {a: {}, b: {modes: {c: {}, d: {}}}}
 regions: {r: {modes: {on: {number: 1}, off: {number: 0}}}, s: {modes: {up: {}}}}
 parameters: {k: {value: 1}, m: {value: 2}}
+instances: {x: {of: z}, y: {of: z}}
 """
 
 
@@ -233,6 +234,11 @@ parameters: {k: {value: 1}, m: {value: 2}}
                 "faults | new |  |  | ",
             ],
         ),
+        (
+            "x: {of: z}, y: {of: z}",
+            "y: {of: z}, x: {of: z}",
+            ["instances | order | x, y | y, x | what is done at once is done in another order"],
+        ),
         ("right: {}", "right: {}, new: {}", ["faults | new |  |  | "]),
         ("e: {from: input}, f", "g: {}, e: {from: input}, f", ["events | g |  |  | "]),
         ("{on: {number: 1}, off: {number: 0}}", "{off: {number: 0}, on: {number: 1}}", []),
@@ -243,3 +249,8 @@ def test_an_order_is_told_where_it_means_something(old: str, new: str, told: lis
     assert ORDER.count(old) == 1
     found = changes(ORDER.replace(old, new), ORDER)
     assert [" | ".join((c.group, c.thing, c.before, c.after, c.note)) for c in found] == told
+
+
+def test_the_instances_of_a_system_have_no_order() -> None:
+    text = "language: 1\nsystem: s\ninstances: {x: {of: z}, y: {of: z}}\n"
+    assert changes(text.replace("x: {of: z}, y: {of: z}", "y: {of: z}, x: {of: z}"), text) == []
