@@ -19,7 +19,7 @@ from language.operation import Expr, Ref, Unary
 from language.precedence import node_of
 from language.problem import Problems, SpecError
 
-TURNING = ("memory.rising", "memory.falling", "memory.changed")
+TURNING = "memory.changed"
 """What is true in the first micro-step of a tick only: what goes on goes on without it."""
 KEPT = ("memory.previous", "memory.delay")
 """What says of the ticks before how a value changed, as what turns does."""

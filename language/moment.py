@@ -199,6 +199,10 @@ class Moment:
             self.story.extents[ELAPSED] = Extent(low=Fraction(0))
             time = expression(part.arguments[0], constant_names(automaton))
             return Compare(">=", Ref(ELAPSED), time)
+        if part.function in ("rising", "falling"):
+            level = expression(part.arguments[0], self.known)
+            now = level if part.function == "rising" else Unary("not", level)
+            return Binary("and", self._changed(part), now)
         name = f"memory.{part.function}_{len(self.story.extents)}{self.tag}"
         if part.function in ("changed", "every"):
             self.story.extents[name] = Extent("truth")
@@ -208,15 +212,17 @@ class Moment:
                     return aged  # each tick after the first
                 self.story.facts.append(Binary("or", Unary("not", Ref(name)), aged))
             return Ref(name)
-        if part.function in EDGES:
-            self.story.extents[name] = Extent("truth")
-            level = expression(part.arguments[0], self.known)
-            now = level if part.function == "rising" else Unary("not", level)
-            self.story.facts.append(Binary("or", Unary("not", Ref(name)), now))
-            return Ref(name)
         kind = type_of(automaton, part.arguments[0])
         self.story.extents[name] = replace(self._extent_of(part.arguments[0]), type=kind)
         return Ref(name, kind == "whole")
+
+    def _changed(self, part: Application) -> Expr:
+        """Return whether a condition changed, which is what a rise and a fall of it share."""
+        change = Application("changed", part.arguments, part.span)
+        key = memory_key(change)
+        if key not in self.known:
+            self.known[key] = self._remembered(change)
+        return self.known[key]
 
     def _aged(self, part: Application) -> Expr:
         """Return that a mode has been active for the whole ticks of a time."""

@@ -68,6 +68,10 @@ def test_no_shipped_spec_raises_an_alarm(path: Path, monkeypatch: pytest.MonkeyP
         ("when: x * v > 20 m^2/s", "when: x > 0 m", ["dead"]),
         ("when: rising(x > 1 m)", "when: x > 1 m", []),
         ("when: x > 1 m", "when: rising(x > 1 m)", ["shadowed"]),
+        ("when: changed(x > 1 m)", "when: falling(x > 1 m)", ["shadowed"]),
+        ("when: rising(x > 1 m)", "when: changed(x > 1 m) and x > 1 m", ["shadowed"]),
+        ("when: rising(x > 1 m)", "when: changed(x > 1 m) and x > 0 m", []),
+        ("when: rising(x > 1 m)", "when: rising(x > 2 m)", []),
         ("when: x > 0 m", "when: sin(x / 1 m) > 0.5", []),
         ("when: x > 0 m", "when: tanh(v * 1 s/m) > 0.99", []),  # never, but nothing knows it
     ],
