@@ -58,13 +58,13 @@ class Project:
     def _named(self, wanted: Callable[[str], bool]) -> dict[str, list[Path]]:
         own: dict[str, list[Path]] = {}
         for path in _yaml_files(self.root / "spec"):
-            for kind, name in _heads_in(path):
+            for kind, name in _heads_in(path, self.texts):
                 if wanted(kind):
                     own.setdefault(name, []).append(path)
         shipped = Path(str(resources.files("spec")))
         if shipped.resolve() != (self.root / "spec").resolve():
             for path in _yaml_files(shipped):
-                for kind, name in _heads_in(path):
+                for kind, name in _heads_in(path, {}):
                     if wanted(kind):
                         own.setdefault(name, [path])
         return own
@@ -168,11 +168,13 @@ def _yaml_files(folder: Path) -> Iterator[Path]:
         yield from sorted(path for path in folder.rglob("*.yaml") if path.is_file())
 
 
-def _heads_in(path: Path) -> list[tuple[str, str]]:
+def _heads_in(path: Path, texts: Mapping[Path, str]) -> list[tuple[str, str]]:
+    text = texts.get(path.resolve()) if texts else None
     try:
-        text = path.read_text("utf-8", errors="replace")[:65536]
+        text = path.read_text("utf-8", errors="replace") if text is None else text
     except OSError:
         return []
-    found = [(match.group(1), match.group(2).strip("'\"")) for match in HEAD.finditer(text)]
+    heads = HEAD.finditer(text[:65536])
+    found = [(match.group(1), match.group(2).strip("'\"")) for match in heads]
     inside = [key for kind, _ in found for key in INSIDE.get(kind, ())]
     return [(kind, name) for kind, name in found if kind not in inside]

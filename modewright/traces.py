@@ -21,6 +21,9 @@ from language.system import read_system
 from language.tree import at, entries
 from modewright.tests import load_tests, run_test, tests_of
 
+HEADINGS = ("name", "id", "requirement")
+"""What a first row begins with that names the columns, in any case of its letters."""
+
 
 def trace(
     specs: Sequence[str],
@@ -51,11 +54,13 @@ def trace(
 def requirements(path: Path | None) -> dict[str, str]:
     """Return the requirements of a CSV: names in its first column, texts in the second.
 
-    Raises SpecError.
+    Its first row may name the columns. Raises SpecError.
     """
     if path is None:
         return {}
-    rows = csv.reader(io.StringIO(read_text(path)[1]))
+    rows = list(csv.reader(io.StringIO(read_text(path)[1])))
+    if rows and rows[0] and rows[0][0].strip().lower() in HEADINGS:
+        rows = rows[1:]
     return {
         row[0].strip(): row[1].strip() if len(row) > 1 else ""
         for row in rows

@@ -9,7 +9,7 @@ from pathlib import Path
 from language.model import CHART
 from language.problem import Span
 from modewright.lsp.mode_name import Meaning, Part, mode_parts, parts_of
-from modewright.lsp.name import Name
+from modewright.lsp.name import ASKED, Name
 from modewright.lsp.namespace import Declared, Namespace, column_name, mode_path, namespace
 from modewright.lsp.world import World
 
@@ -75,7 +75,7 @@ def meaning(world: World, space: Namespace, name: Name) -> Meaning:
     elif name.of in ("mode", "region") and name.path[-2:-1] in (("modes",), ("regions",)):
         yield whole, _of_key(space, name)
     elif name.of == "mode" and name.owner is not None:
-        yield from _mode_of_owner(space, name)
+        yield from _mode_of(*_owner(space, name.owner), parts_of(name.text))
     elif name.of == "mode":
         yield from mode_parts(space, parts_of(name.text), name.path)
     elif name.of == "column":
@@ -86,6 +86,10 @@ def meaning(world: World, space: Namespace, name: Name) -> Meaning:
         parts = parts_of(name.text)
         if name.of == "model_mode":
             yield from _of_model(space, parts)
+            return
+        region = region_of(space, name.owner or "") if name.of == "compared" else None
+        if region:
+            yield from _mode_of(*region, parts)
             return
         if name.of == "signal" and "measures" in name.path and space.model:
             space = space.model
@@ -117,12 +121,18 @@ def _value(space: Namespace, parts: Sequence[Part], name: Name) -> Meaning:
     if not parts:
         return
     head, *rest = parts
-    declared = space.names.get(("value", head[1])) if name.of != "asked_mode" or rest else None
+    declared = (
+        space.names.get(("value", head[1])) if name.of not in ASKED.values() or rest else None
+    )
+    if declared is None and head[1] in space.instances:
+        declared = space.names.get(("spec", head[1]))  # an automaton alone is its own instance
     if head[1] in space.instances and rest:
         yield head, declared
         yield from _value(space.instances[head[1]], rest, replace(name, path=()))
     elif space.model and rest and head[1] == space.model.document.name:
         yield from _of_model(space, parts)
+    elif name.of == "asked_fault":
+        yield head, space.names.get(("fault", head[1]))
     elif declared and not rest:
         yield head, declared
     else:
@@ -131,15 +141,27 @@ def _value(space: Namespace, parts: Sequence[Part], name: Name) -> Meaning:
         yield from found or [(head, event or declared)]
 
 
-def _mode_of_owner(space: Namespace, name: Name) -> Meaning:
-    """Yield what a mode of an instance stands for, or of a region of one."""
-    head, _, region = (name.owner or "").partition(".")
-    if head in space.instances:
-        space = space.instances[head]
-    else:
-        region = ".".join(filter(None, (head, region)))
+def region_of(space: Namespace, path: str) -> tuple[Namespace, str] | None:
+    """Return whose modes a name in an expression has, and of which region; None for other names.
+
+    It is `mode`, `est.mode`, `est.gap`, or alone `gap`.
+    """
+    inner, region = _owner(space, path)
+    if region.rpartition(".")[2] == "mode":
+        return inner, region.rpartition(".")[0]
+    return (inner, region) if ("region", region) in inner.names else None
+
+
+def _owner(space: Namespace, path: str) -> tuple[Namespace, str]:
+    """Return the automaton that a path begins with, and the region that is left of it."""
+    head, _, region = path.partition(".")
+    return (space.instances[head], region) if head in space.instances else (space, path)
+
+
+def _mode_of(space: Namespace, region: str, parts: Sequence[Part]) -> Meaning:
+    """Yield what a mode of a region stands for, or of the chart where none is named."""
     before = parts_of(region) if region else []
-    found = list(mode_parts(space, [*before, *parts_of(name.text)]))
+    found = list(mode_parts(space, [*before, *parts]))
     yield from found[len(before) :]
 
 

@@ -17,6 +17,8 @@ FREE = (
     *("if", "invariant", "expect"),
 )
 """Sections whose keys are no names of the spec."""
+ASKED = {"in": "asked_mode", "fault": "asked_fault"}
+"""What these functions are asked about."""
 
 
 @dataclass(frozen=True)
@@ -111,22 +113,25 @@ def _events(place: Place, scalar: Scalar) -> Iterator[Name]:
 
 
 def _in_expression(place: Place, scalar: Scalar, word: str) -> Iterator[Name]:
-    """What stands beside `est.mode ==` is a mode of `est`, what `in(...)` asks for is a mode."""
+    """What stands beside `est.mode ==` is a mode of `est`, what `in(...)` asks for is a mode.
+
+    Beside another name it is one if that is a region, which is known where names have a meaning.
+    """
     try:
         trees = parse_balance(scalar) if word == "balance" else (parse_expression(scalar),)
     except SpecError:
         return
     parts = [part for tree in trees for part in walk(tree)]
     owners: dict[Span, str] = {}
-    asked: set[Span] = set()
+    asked: dict[Span, str] = {}
     for part in parts:
         match part:
-            case Relation(_, Read(path, _), Read(_, span), _) if path.split(".")[-1] == "mode":
-                owners[span] = path.removesuffix("mode").removesuffix(".")
-            case Application("in", arguments):
-                asked.update(each.span for each in arguments)
+            case Relation("==" | "!=", Read() as left, Read() as right, _):
+                owners |= {right.span: left.path, left.span: right.path}
+            case Application(("in" | "fault") as function, arguments):
+                asked |= dict.fromkeys((each.span for each in arguments), ASKED[function])
     for part in parts:
         if isinstance(part, Read):
             owner = owners.get(part.span)
-            of = "asked_mode" if part.span in asked else "value" if owner is None else "mode"
+            of = asked.get(part.span) or ("value" if owner is None else "compared")
             yield Name(part.path, part.span, place.path, of, owner=owner)

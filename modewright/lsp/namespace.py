@@ -69,6 +69,11 @@ class Namespace:
     model: Namespace | None = None
     of: Namespace | None = None
 
+    @property
+    def is_automaton(self) -> bool:
+        """Whether this is an automaton, or a variant of one."""
+        return ("spec", "automaton") in {(each.group, each.kind) for each in self.names.values()}
+
     def group(self, *groups: str) -> list[Declared]:
         """Return what is declared in some groups."""
         return [each for (group, _), each in self.names.items() if group in groups]
@@ -102,6 +107,8 @@ def namespace_of(world: World, path: Path, document: Document, depth: int = 0) -
         made.of = target
         made.names.update(target.names)
         made.instances.update(target.instances)
+        if target.is_automaton:  # it runs alone, and is an instance of its own name
+            made.instances[target.document.name] = target
     if document.kind == "study":  # a bare name is that of all instances that have it
         for inner in made.instances.values():
             for each in inner.group("value"):
