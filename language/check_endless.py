@@ -18,6 +18,7 @@ from language.moment import ELAPSED, Moment, Story
 from language.operation import Expr, Ref, Unary
 from language.precedence import node_of
 from language.problem import Problems, SpecError
+from language.syntax import TIMES, Application, walk
 
 TURNING = "memory.changed"
 """What is true in the first micro-step of a tick only: what goes on goes on without it."""
@@ -43,13 +44,25 @@ def check_endless(automaton: Automaton, inquiry: Inquiry, problems: Problems) ->
             path = " -> ".join(f"`{each.source}`" for each in (*way, way[0]))
             label = "this fires in every micro-step of a tick"
             label += f": {path}" if way[0].targets else ""
-            own = automaton.source(way[0]).name
-            staying = f"`to: []` starts nothing anew: write `to: {own}` and `after(...)`, or "
-            staying += "`rising(...)`"
             hint = EVENT_HINT if way[0].events else ROUND_HINT
-            hint = hint if way[0].targets else staying
+            hint = hint if way[0].targets else _staying(automaton, way[0])
             place = f"at {found.text}; " if found.text else ""
             problems.warning("cycle", way[-1].span, label, place + hint)
+
+
+def _staying(automaton: Automaton, way: Transition) -> str:
+    """Return what is written in place of a transition without target that fires on and on."""
+    own = automaton.source(way)
+    reads_time = any(
+        isinstance(part, Application) and part.function in TIMES for part in walk(way.when.tree)
+    )
+    if not reads_time and not way.wait:
+        return "`to: []` starts nothing anew: write `rising(...)`"
+    if own in automaton.superstates:
+        hint = f"`to: []` starts no time anew, and `to: {own.name}` starts what is inside anew: let"
+        return f"{hint} a mode of a region beside go to itself when `in({own.name}) and after(...)`"
+    hint = f"`to: []` starts nothing anew: write `to: {own.name}` and `after(...)`"
+    return hint if reads_time else f"{hint}, or `rising(...)`"
 
 
 def _followers(automaton: Automaton, chart: Chart, way: Transition) -> Iterator[str]:

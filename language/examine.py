@@ -6,6 +6,7 @@ It runs where a spec is checked, not where it is only used: what has errors neve
 from __future__ import annotations
 
 from language.check_cycle import check_cycles
+from language.check_end import check_ends
 from language.check_endless import check_endless
 from language.check_past import check_past
 from language.check_reached import check_behind
@@ -22,6 +23,7 @@ def examine(automaton: Automaton, problems: Problems) -> None:
     silent = check_transitions(automaton, inquiry, problems)
     check_behind(automaton, silent, problems)
     check_stuck(automaton, silent, problems)
+    check_ends(automaton, problems)
     check_waits(automaton, inquiry, problems)
     check_cycles(automaton, problems)
     check_endless(automaton, inquiry, problems)
