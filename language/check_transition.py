@@ -9,13 +9,14 @@ from collections.abc import Iterator
 from contextlib import suppress
 from fractions import Fraction
 
+from language.activity import is_complete
 from language.constants import exact_value
 from language.declaration import Formula
 from language.inquiry import Inquiry
 from language.model import Automaton, Mode, Transition
 from language.moment import ELAPSED, Moment
 from language.operation import Compare, Expr, Ref, Unary, Value, real, whole
-from language.precedence import comes_along, inside_first, winners
+from language.precedence import comes_along, events_that_come, inside_first, node_of, winners
 from language.problem import Problems, Span, SpecError
 from language.region import by_priority
 from language.transition_table import STAY
@@ -44,6 +45,8 @@ def check_transitions(automaton: Automaton, inquiry: Inquiry, problems: Problems
             if not guards.is_silent(transition):
                 continue
             if guards.never(transition):
+                if transition.completes:
+                    continue  # language/check_chart.py
                 label = f"{_guard(transition)} never holds within the declared ranges"
                 hint = "they exclude it, with the equations of the mode: correct one of them"
                 problems.warning("dead", _place(transition, transition.when), label, hint)
@@ -55,13 +58,7 @@ def check_transitions(automaton: Automaton, inquiry: Inquiry, problems: Problems
 
 def _never_raised(automaton: Automaton, transition: Transition) -> bool:
     """Tell whether a transition waits for events that never come."""
-    chart = automaton.tree
-    if chart is None or not transition.events:
-        return False
-    ways = (way for mode in automaton.all_modes for way in mode.transitions)
-    come = {name for name, signal in chart.signals.items() if signal.is_input}
-    come.update(name for way in ways for name in way.raises)
-    return not come & {*transition.events}
+    return bool(transition.events) and not events_that_come(automaton) & {*transition.events}
 
 
 def check_waits(automaton: Automaton, inquiry: Inquiry, problems: Problems) -> None:
@@ -120,8 +117,11 @@ class _Guards:
         """Return a guard, None if it has no form that questions can be asked of."""
         if transition.key not in self.known:
             self.known[transition.key] = None
-            if transition.completes:
-                return None
+            chart, source = self.automaton.tree, self.automaton.source(transition)
+            node = node_of(self.automaton, source)
+            if transition.completes and chart and node:
+                self.known[transition.key] = is_complete(chart, node, "mode")
+                return self.known[transition.key]
             with suppress(KeyError, SpecError):
                 self.known[transition.key] = self.moment.expression(transition.when.tree)
         return self.known[transition.key]
@@ -140,7 +140,7 @@ class _Guards:
         for leaf, ways in found:
             inside = _Guards(self.automaton, leaf, self.inquiry)
             first = [way for way in ways if not _held(self.automaton, way)]
-            first = [way for way in first if comes_along(way, transition)]
+            first = [way for way in first if comes_along(self.automaton, way, transition)]
             others = [_not(guard) for guard in map(inside.of, first) if guard is not None]
             if not others or not inside.together_never(inside.of(transition), *others):
                 return False
@@ -195,7 +195,8 @@ class _Guards:
         """Return the transitions that fire first wherever both guards hold from one time on."""
         wait = _held(self.automaton, transition)
         before = winners(self.automaton, self.mode, transition)
-        ways = [way for way in self.mode.transitions if comes_along(way, transition)]
+        own = self.mode.transitions
+        ways = [way for way in own if comes_along(self.automaton, way, transition)]
         ways += [way for way in before if way not in ways]
         return [way for way in ways if self.of(way) is not None and self._wins(way, before, wait)]
 

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from language.chart import Node
 from language.model import Automaton, Mode, Transition
+from language.once import once
 from language.region import by_priority
 from language.syntax import MEMORY, Application, walk
 
@@ -26,7 +27,7 @@ def winners(automaton: Automaton, mode: Mode, transition: Transition) -> list[Tr
     chart, node = automaton.tree, node_of(automaton, mode)
     if chart and node and chart.order == "outer_first":
         found += [way for outer in chart.chain(node)[1:] for way in _lasting(automaton, outer)]
-    return [way for way in found if comes_along(way, transition)]
+    return [way for way in found if comes_along(automaton, way, transition)]
 
 
 def inside_first(automaton: Automaton, mode: Mode) -> Iterator[tuple[Mode, list[Transition]]]:
@@ -44,11 +45,19 @@ def inside_first(automaton: Automaton, mode: Mode) -> Iterator[tuple[Mode, list[
         yield automaton.by_key[leaf.mode], found
 
 
-def comes_along(way: Transition, other: Transition) -> bool:
+def comes_along(automaton: Automaton, way: Transition, other: Transition) -> bool:
     """Tell whether a transition may be taken in every micro-step in which another may."""
-    if way.completes:
-        return False
-    return not way.events or (bool(other.events) and {*other.events} <= {*way.events})
+    awaited = {*other.events} & events_that_come(automaton)
+    return not way.events or (bool(other.events) and awaited <= {*way.events})
+
+
+@once
+def events_that_come(automaton: Automaton) -> frozenset[str]:
+    """Return the events of a chart that are inputs or that a transition raises."""
+    signals = automaton.tree.signals if automaton.tree else {}
+    raised = (way.raises for mode in automaton.all_modes for way in mode.transitions)
+    inputs = (name for name, signal in signals.items() if signal.is_input)
+    return frozenset((*inputs, *(name for names in raised for name in names)))
 
 
 def _lasting(automaton: Automaton, node: Node) -> Iterator[Transition]:
