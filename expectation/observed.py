@@ -20,6 +20,7 @@ from language.event_name import EventName
 from language.experiment import System
 from language.kind import Enumeration, Kind, Whole
 from language.lower import assigned, expression, is_whole
+from language.mode import ALWAYS
 from language.operation import Expr, Ref, Value
 
 BETWEEN = -1
@@ -50,8 +51,15 @@ class Observed:
     system: System
 
     def modes_at(self, point: int) -> dict[str, str]:
-        """Return the active modes at a point by `instance` or `instance.region`."""
-        return {said(place): found[point] for place, found in self.modes.items()}
+        """Return the active modes at a point by `instance` or `instance.region`.
+
+        That an automaton without modes, or whose regions have them all, is `always` is not told.
+        """
+        return {
+            said(place): found[point]
+            for place, found in self.modes.items()
+            if found[point] != ALWAYS
+        }
 
     def times_of(self, event: EventName) -> list[float]:
         """Return when an event happened [s].

@@ -27,18 +27,22 @@ def print_json(value: Mapping[str, Any]) -> None:
 
 
 def events_table(events: Sequence[Event]) -> Table:
-    """Return a table of transitions."""
+    """Return a table of transitions; of many the first ones and the last ones."""
     table = Table(
         escape("time [s]"), "automaton", "transition", "from", "to",
         box=None, pad_edge=False, header_style="bold",
     )  # fmt: skip
-    for event in events[:MOST_EVENTS]:
+    left_out = max(0, len(events) - MOST_EVENTS)
+    begun = MOST_EVENTS // 2 if left_out else len(events)
+    for number, event in enumerate(events):
+        if begun <= number < begun + left_out:
+            if number == begun:
+                table.add_row("...", f"{left_out} more", "", "", "")
+            continue
         change = (event.source, event.target or escape("[]"))
         if event.kind != "transition":
             change = (event.source, escape(event.message))
         table.add_row(f"{event.time:.9f}", event.instance, event.transition, *change)
-    if len(events) > MOST_EVENTS:
-        table.add_row("...", f"{len(events) - MOST_EVENTS} more", "", "", "")
     return table
 
 

@@ -63,3 +63,7 @@ def test_a_fault_that_is_not_expected_fails_at_its_tick(tmp_path: Path) -> None:
         (False, 0.03),
     ]
     assert found.outcomes[1].values == {"charger.faults": 3}
+    assert found.outcomes[1].modes == {
+        "charger.charge": "session.cv",
+        "charger.thermal": "cooling.pump",
+    }

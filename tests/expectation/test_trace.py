@@ -135,3 +135,12 @@ def test_a_scenario_names_requirements_of_its_test(tmp_path: Path, is_apart: boo
         (tmp_path / "spec" / "steps.yaml").write_text(text)
         path.write_text("language: 1\ntest: latched\nscenario: steps\nexpect: {a: {event: high}}\n")
     assert load_test(str(path), tmp_path).requirements == ("L-1",)
+
+
+@pytest.mark.parametrize("heading", ["name,text", "ID, Title", "Requirement"])
+def test_the_heading_of_a_list_is_no_requirement(tmp_path: Path, heading: str) -> None:
+    path = tmp_path / "needs.csv"
+    path.write_text(f"{heading}\nL-5,nobody did it\nname,stays\n")
+    assert traces.requirements(path) == {"L-5": "nobody did it", "name": "stays"}
+    path.write_text("L-5,nobody did it\n")
+    assert traces.requirements(path) == {"L-5": "nobody did it"}

@@ -35,7 +35,11 @@ def test_what_is_no_transition_is_told_with_its_message() -> None:
     assert row.split()[-3:] == ["heating", "left", "it"]
 
 
-def test_a_long_table_ends_with_the_number_of_events_left_out() -> None:
+def test_a_long_table_has_its_first_and_its_last_events_and_says_what_is_between() -> None:
     lines = printed([event(float(i)) for i in range(MOST_EVENTS + 2)])
-    assert len(lines) == MOST_EVENTS + 2
-    assert lines[-1].split() == ["...", "2", "more"]
+    half = MOST_EVENTS // 2
+    assert lines[half + 1].split() == ["...", "2", "more"]
+    del lines[half + 1]
+    shown = [float(line.split()[0]) for line in lines[1:]]
+    assert shown == [*range(half), *range(half + 2, MOST_EVENTS + 2)]
+    assert len(printed([event(float(i)) for i in range(MOST_EVENTS)])) == MOST_EVENTS + 1
