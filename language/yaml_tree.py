@@ -7,7 +7,7 @@ from typing import Any
 
 import yaml
 
-from language.document import Entry, Items, Node, Scalar, Table
+from language.document import Entry, Items, Node, Scalar, Table, lines_of
 from language.problem import Problems, Source, Span
 
 Mark = Any
@@ -30,7 +30,7 @@ def parse(source: Source, text: str) -> Table:
             if builder.is_full or len(problems.found) >= MAX_FOUND:
                 break
     except yaml.YAMLError as error:
-        problems.error("yaml", *_describe(source, error))
+        problems.error("yaml", *_describe(source, text, error))
     problems.stop_if_any()
     if builder.root is None:
         place = Span(source, 1, 1)
@@ -43,7 +43,11 @@ def parse(source: Source, text: str) -> Table:
     return builder.root
 
 
-def _describe(source: Source, error: yaml.YAMLError) -> tuple[Span, str, str]:
+def _describe(source: Source, text: str, error: yaml.YAMLError) -> tuple[Span, str, str]:
+    if isinstance(error, yaml.reader.ReaderError):
+        before = lines_of(f"{text.encode()[: error.position].decode(errors='ignore')}|")
+        label = f"this is not YAML: it has the character U+{error.character:04X}"
+        return Span(source, len(before), len(before[-1])), label, "delete it, or write it in words"
     mark = getattr(error, "problem_mark", None)
     what = getattr(error, "problem", None) or getattr(error, "reason", None) or "not valid YAML"
     if mark is None:
