@@ -30,21 +30,28 @@ def format(
     paths = [path for file in files for path in _specs(file)]
     made: dict[Path, bytes] = {}
     for path in paths:
-        _, text = read_text(path)
-        data = formatted(text, str(path)).encode()
-        if data != path.read_bytes():
+        read_text(path)  # refuses what is no text
+        before = path.read_bytes()
+        data = formatted(before.decode(), str(path)).encode()
+        if data != before:
             made[path] = data
-    for path in made:
-        console().print(
-            f"{'would change' if check else 'changed'} {path}", soft_wrap=True, markup=False
-        )
+    notes = {path: _note(path) for path in made}
     if not check:
         for path in made:
             require_place(path)
         write_files(made)
+    for path, note in notes.items():
+        verb = "would change" if check else "changed"
+        console().print(f"{verb} {path}{note}", soft_wrap=True, markup=False)
     console().print(f"{counted(len(paths), 'spec')} read, {counted(len(made), 'change')}")
     if check and made:
         raise typer.Exit(PROBLEMS)
+
+
+def _note(path: Path) -> str:
+    """Return what else comes of writing a file: it is a new one, other hard links keep the old."""
+    others = path.stat().st_nlink - 1
+    return f" (no longer one file with its {counted(others, 'other hard link')})" if others else ""
 
 
 def _specs(path: Path) -> list[Path]:

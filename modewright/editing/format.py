@@ -24,9 +24,16 @@ MARK = "\ufeff"
 def formatted(text: str, name: str = "") -> str:
     """Return the text of a spec laid out. Raises SpecError where it is no YAML of ours.
 
-    A pass that would change what is said, in a text that no rule here foresees, is left out.
+    A pass that would change what is said, in a text that no rule here foresees, is left out. A mark
+    before the text stays, and all lines end as the first one does.
     """
-    made = text.removeprefix(MARK)
+    made = _laid_out(text.removeprefix(MARK).replace("\r\n", "\n"), name)
+    if text.partition("\n")[0].endswith("\r"):
+        made = made.replace("\n", "\r\n")
+    return MARK + made if text.startswith(MARK) else made
+
+
+def _laid_out(made: str, name: str) -> str:
     said = _said(made, name)
     for _ in range(MOST_ROUNDS):
         before = made

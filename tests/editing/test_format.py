@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import random
 from pathlib import Path
 
@@ -14,6 +16,7 @@ from language.project import document_of
 from modewright.cli import app
 from modewright.editing.format import formatted
 from modewright.editing.page import page_of
+from modewright.files import OutputError
 from tests.editing.corpus import ROOT, documents, plain
 
 HERE = Path(__file__).parent
@@ -87,3 +90,40 @@ def test_check_writes_nothing_and_says_what_would_change(tmp_path: Path) -> None
     assert CliRunner().invoke(app, ["format", str(tmp_path)]).exit_code == 0
     assert untidy.read_text() == TIDY
     assert CliRunner().invoke(app, ["format", "--check", str(tmp_path)]).exit_code == 0
+
+
+@pytest.mark.parametrize("mark", ["", "\ufeff"])
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+def test_line_ends_and_a_mark_of_utf_8_stay(tmp_path: Path, mark: str, end: str) -> None:
+    path = tmp_path / "a.yaml"
+    path.write_bytes((mark + UNTIDY.replace("\n", end)).encode())
+    assert CliRunner().invoke(app, ["format", str(path)]).exit_code == 0
+    assert path.read_bytes() == (mark + TIDY.replace("\n", end)).encode()
+    assert formatted(mark + TIDY.replace("\n", end)) == mark + TIDY.replace("\n", end)
+
+
+def test_a_file_with_two_names_is_told_to_part(tmp_path: Path) -> None:
+    path, other = tmp_path / "a.yaml", tmp_path / "other"
+    path.write_text(UNTIDY)
+    other.hardlink_to(path)
+    told = CliRunner().invoke(app, ["format", str(path)]).output
+    assert f"changed {path} (no longer one file with its 1 other hard link)" in told
+    assert (path.read_text(), other.read_text()) == (TIDY, UNTIDY)
+    path.write_text(UNTIDY)
+    assert f"changed {path}\n" in CliRunner().invoke(app, ["format", str(path)]).output
+
+
+def test_what_cannot_be_written_is_not_told_as_changed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "a.yaml"
+    path.write_text(UNTIDY)
+
+    def full(descriptor: int, *_: object) -> None:
+        os.close(descriptor)
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr("modewright.files.os.fdopen", full)
+    told = CliRunner().invoke(app, ["format", str(path)])
+    assert isinstance(told.exception, OutputError) and told.stdout == ""
+    assert path.read_text() == UNTIDY and list(tmp_path.iterdir()) == [path]
