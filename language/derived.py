@@ -42,8 +42,8 @@ def with_model(
         balances = {name: flow[name] for name in observer.states}
         a = matrix(balances, observer.states, point)
         c = matrix(seen, observer.states, point)
-        _check_constant(automaton, observer, a, "A")
-        _check_constant(automaton, observer, c, "C")
+        for rows, which in ((a, "A"), (c, "C")):
+            _check_constant(automaton, observer, rows, which)
         b = _inputs(automaton, balances, point)
         inputs = tuple(u for u in automaton.inputs if any(u in row for row in b.values()))
         f, f_constants = _rests(balances, (*observer.states, *inputs), point, f"{name}_f")

@@ -263,14 +263,13 @@ class DimensionCheck:
         equality = tree.operator in ("==", "!=")
         if wholes_of(tree.left, first, tree.right, second):
             return "truth"
+        named = [kind for kind in (first, second) if isinstance(kind, str | Enumeration)]
         if equality and (first is None or second is None):
             return "truth"
-        if equality and first == second and isinstance(first, str | Enumeration):
-            return "truth"
-        named = [kind for kind in (first, second) if isinstance(kind, str | Enumeration)]
         if equality and len(named) == 2:
-            label = f"`{tree.operator}` compares {said(named[0])} and {said(named[1])}"
-            self.report("type", tree.span, label)
+            if first != second:
+                label = f"`{tree.operator}` compares {said(named[0])} and {said(named[1])}"
+                self.report("type", tree.span, label)
             return "truth"
         if equality and "truth" in (first, second):
             condition = tree.left if first == "truth" else tree.right

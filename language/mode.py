@@ -140,22 +140,23 @@ class ModeReader(Reader):
         found = dict(site.above.equations) if site.above else {}
         found |= self.formulas(self._shared(site).get("equations"), "equations")
         own = self.formulas(table.get("equations"), f"{site.key}.equations")
-        for name, formula in own.items():
-            if name in found:
-                label = f"`{name}` has an equation for every mode already"
-                hint = f"it is given at {found[name].span}"
-                self.problems.error("duplicate", formula.span, label, hint)
-        return found | own
+        return self._joined(found, own, "an equation for every mode")
 
     def _updates(self, table: Table, site: Site) -> dict[str, Formula]:
         handed = dict(site.above.update) if site.above else {}
         own = self.formulas(table.get("update"), f"{site.key}.update")
+        return self._joined(handed, own, "an update in a mode around this one")
+
+    def _joined(
+        self, given: dict[str, Formula], own: dict[str, Formula], what: str
+    ) -> dict[str, Formula]:
+        """Return both; what a mode gives a second time is reported."""
         for name, formula in own.items():
-            if name in handed:
-                label = f"`{name}` has an update in a mode around this one already"
-                hint = f"it is given at {handed[name].span}"
+            if name in given:
+                label = f"`{name}` has {what} already"
+                hint = f"it is given at {given[name].span}"
                 self.problems.error("duplicate", formula.span, label, hint)
-        return handed | own
+        return given | own
 
     def _flow(self, table: Table, site: Site) -> dict[str, Balance]:
         """Return the balances of a mode, with the terms that are added to them."""

@@ -71,10 +71,7 @@ def run_motion(
     model = automaton.model
     assert model and automaton.period is not None
     first = runs[0]
-    for run in runs:
-        if _way(run) != _way(first):
-            label = "all runs of an automaton have one method, one number of substeps and one point"
-            problems.error("run", run.span, label)
+    _require_one_way(runs, problems)
     point = Point(automaton, values, {})
     if first.linearise is not None:
         model = linearised(model, first, point, problems)
@@ -107,6 +104,13 @@ def run_motion(
         *motion_variables(field, method),
     )
     return Motion(made, variables, method.constants, dataclasses.replace(info, events=events))
+
+
+def _require_one_way(runs: list[ModelRun], problems: Problems) -> None:
+    for run in runs:
+        if _way(run) != _way(runs[0]):
+            label = "all runs of an automaton have one method, one number of substeps and one point"
+            problems.error("run", run.span, label)
 
 
 def run_block(automaton: Automaton, run: ModelRun, rest: Expr | None = None) -> Block:

@@ -49,6 +49,8 @@ def require_place(path: Path) -> None:
     """Raise OutputError for a path that cannot be written."""
     if path.is_dir():
         raise OutputError(f"{path}: this is a folder; name a file in it")
+    if path.exists() and not path.is_file() and not _is_stream(path):
+        raise OutputError(f"{path}: this is a device or a socket; name a file")
     folder = _target(path).parent
     if not folder.is_dir():
         raise OutputError(f"{path}: there is no folder {folder}")

@@ -27,11 +27,9 @@ from language.units import (
 from tests.language.making import automaton, si
 
 M, KG, S, A, K = ("m", "kg", "s", "A", "K")
-N = {M: 1, KG: 1, S: -2}
-J = {M: 2, KG: 1, S: -2}
-W = {M: 2, KG: 1, S: -3}
+N, PA = {M: 1, KG: 1, S: -2}, {M: -1, KG: 1, S: -2}
+J, W = {M: 2, KG: 1, S: -2}, {M: 2, KG: 1, S: -3}
 V = {M: 2, KG: 1, S: -3, A: -1}
-PA = {M: -1, KG: 1, S: -2}
 MEANING: dict[str, tuple[Fraction, dict[str, int]]] = {
     # symbol: (factor to SI, powers of the base units)
     "m": (Fraction(1), {M: 1}),

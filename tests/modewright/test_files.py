@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import socket
 import subprocess
 import sys
 import threading
@@ -89,3 +90,10 @@ def test_an_output_replaces_no_spec(tmp_path: Path) -> None:
         require_calibration(spec)
     require_calibration(fitted)
     require_calibration(tmp_path / "new.yaml")
+
+
+def test_a_socket_is_no_place_for_an_output(tmp_path: Path) -> None:
+    with socket.socket(socket.AF_UNIX) as bound:
+        bound.bind(str(tmp_path / "s"))
+        with pytest.raises(OutputError, match="this is a device or a socket"):
+            require_writable(tmp_path / "s")
