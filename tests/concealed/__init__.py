@@ -1,0 +1,1 @@
+"""Truth generator with concealed physics: recordings of an electric driveline with backlash."""
