@@ -1,0 +1,132 @@
+"""Kept: results of a plan in a store of a study, a block a case; none is diagnosed twice."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pyarrow
+import pyarrow.parquet
+
+from sweep.block import DONE, STOPPED, Block, Row
+from sweep.manifest import Manifest
+from sweep.measure import Column
+from sweep.preparation import digest_of
+from sweep.store import Store, locked, open_store
+from sweep.study import Presentation
+from tests.proof.answer import Answer
+from tests.proof.cases import Cases, Label, made
+from tests.proof.plan import Plan
+from tests.proof.result import Result, diagnosed
+from tests.verify.store import CODE, ROOT, code_digest
+
+VARIED = (Column("strength", "real", ""), Column("rate", "real", "Hz"))
+MEASURES = (
+    Column("verdict", "text", ""),
+    Column("cpu", "real", "s"),
+    Column("wall", "real", "s"),
+    Column("sindy", "text", ""),
+    Column("free_gain", "text", ""),
+)
+
+
+def answers(plan: Plan, seed: int, jobs: int, most: int | None, generator: str) -> list[Answer]:
+    """Return what a diagnosis says of each case of a plan; what is missing is diagnosed now."""
+    cases = made(plan, seed, generator)
+    known = cases.known(_fewest(plan.most, most))
+    folder = ROOT / "build" / "proof" / _digest()[:16] / cases.folder.name / plan.name
+    with locked(folder):
+        store = open_store(folder, _manifest(plan, seed, cases))
+        _fill(store, plan, cases, list(known.items()), seed, jobs)
+        rows = {row["scenario"]: row for row in _rows(store)}
+    return [_answer(rows[name], plan, label) for name, label in known.items()]
+
+
+def _answer(row: Mapping[str, Any], plan: Plan, label: Label) -> Answer:
+    simpler = {name: row[name] for name in ("sindy", "free_gain")}
+    return Answer(row["scenario"], plan.name, label, _verdict(row["verdict"]), row["cpu"], simpler)
+
+
+def _fewest(*counts: int | None) -> int | None:
+    return min((count for count in counts if count is not None), default=None)
+
+
+def _verdict(text: str) -> dict[str, object]:
+    found: dict[str, object] = json.loads(text or "{}")
+    return found
+
+
+def _digest() -> str:
+    return code_digest((*CODE, "diagnosis"))
+
+
+def _manifest(plan: Plan, seed: int, cases: Cases) -> Manifest:
+    """Return of what the results are: of the code, the seed, and the sealed labels."""
+    identity = {
+        "code": _digest(),
+        "seed": str(seed),
+        "labels": cases.seal,
+        "plan": repr(plan),
+        "kept": repr(MEASURES),
+    }
+    count = len(cases.known())
+    return Manifest(
+        f"diagnosis_{plan.name}", digest_of(identity), identity, count, 1,
+        VARIED, {}, MEASURES, Presentation(by=("variant", "strength", "rate")),
+    )  # fmt: skip
+
+
+def _fill(
+    store: Store, plan: Plan, cases: Cases, known: list[tuple[str, Label]], seed: int, jobs: int
+) -> None:
+    """Diagnose the cases that the store does not have, some at a time, and keep each."""
+    finished = store.finished()
+    missing = [number for number in range(len(known)) if number not in finished]
+    with ThreadPoolExecutor(jobs) as pool:
+        work = {pool.submit(partial(_row, plan, cases, *known[n], n, seed)): n for n in missing}
+        try:
+            for done, future in enumerate(as_completed(work), 1):
+                row = future.result()
+                store.write(Block(row.number, row.number + 1), [row])
+                _tell(plan, known[row.number][1], row, f"{done} of {len(work)}")
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
+
+
+def _row(plan: Plan, cases: Cases, name: str, label: Label, number: int, seed: int) -> Row:
+    own = tuple(effect["id"] for effect in label["effects"]) if plan.without_own else ()
+    result: Result = diagnosed(cases.folder / name, own)
+    return Row(
+        number=number, variant=plan.name, scenario=name, sample=0, replicate=0, seed=seed,
+        values={"strength": plan.strength, "rate": float(label["rate_Hz"])},
+        status=DONE if result.verdict else STOPPED, message=result.message,
+        measures={"verdict": result.verdict, "cpu": result.cpu_s, "wall": result.wall_s,
+                  "sindy": result.sindy, "free_gain": result.free_gain},
+    )  # fmt: skip
+
+
+def _tell(plan: Plan, label: Label, row: Row, progress: str) -> None:
+    answer = _answer({"scenario": row.scenario, **row.measures}, plan, label)
+    cpu = f"{row.measures['cpu']:.1f} CPU s"
+    said = row.message or answer.said
+    print(
+        f"{plan.name} {progress}: {row.values['rate']:g} Hz, {answer.true}: {said}, {cpu}",
+        flush=True,
+    )
+
+
+def _rows(store: Store) -> Iterator[dict[str, Any]]:
+    for path in store.paths():
+        yield from pyarrow.parquet.read_table(path).to_pylist()
+
+
+def written(folder: Path, path: Path) -> None:
+    """Join all results below a folder in one Parquet file."""
+    tables = [pyarrow.parquet.read_table(one) for one in sorted(folder.rglob("*.parquet"))]
+    joined = pyarrow.concat_tables([table.replace_schema_metadata(None) for table in tables])
+    pyarrow.parquet.write_table(joined, path, compression="zstd", compression_level=19)

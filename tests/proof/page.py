@@ -1,0 +1,77 @@
+"""Page: docs/proof.md, written from the answers of a study."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, StrictUndefined
+
+from tests.proof.answer import Answer
+from tests.proof.bar import Bar, by_effect
+from tests.proof.rate import Rate, rate_of
+from tests.verify.store import ROOT, code_digest
+
+PAGE = ROOT / "docs" / "proof.md"
+FOLDER = ROOT / "docs" / "proof"
+METHOD = ("diagnosis", "spec/effects")
+"""What the page belongs to: it is true of this code."""
+MARK = "Digest of `diagnosis/` and `spec/effects/`: `"
+
+
+def method_digest() -> str:
+    """Return the first digits of the digest that the page belongs to."""
+    return code_digest(METHOD)[:16]
+
+
+def page(every: Sequence[Answer], found: Sequence[Bar], about: Mapping[str, Any]) -> str:
+    """Return the page; `about` are the seed, the seals, baselines, controls and machines."""
+    template = Path(str(files("tests.proof") / "proof.md.jinja")).read_text("utf-8")
+    shown = Environment(undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    full, weak = ([one for one in every if one.plan == name] for name in ("full", "weak"))
+    return shown.from_string(template).render(
+        mark=MARK,
+        digest=method_digest(),
+        bars=found,
+        effects=_effects(full, weak),
+        rates=_rates(full),
+        counts={name: sum(one.plan == name for one in every) for name in _plans(every)},
+        **about,
+    )
+
+
+def _plans(every: Sequence[Answer]) -> list[str]:
+    return list(dict.fromkeys(one.plan for one in every))
+
+
+def _effects(full: Sequence[Answer], weak: Sequence[Answer]) -> list[dict[str, Any]]:
+    """Return a row for each effect: how often it is named, as it is and weak, and for what else."""
+    small = by_effect(weak)
+    rows = []
+    for name, rate in by_effect(full).items():
+        own = [one for one in full if one.true == name]
+        other = sorted({one.said for one in own if not one.is_named})
+        row = {
+            "name": name,
+            "full": _cell(rate),
+            "weak": _cell(small.get(name, Rate(0, 0))),
+            "placed": _cell(rate_of(one.is_placed() for one in own)),
+            "other": ", ".join(word.replace("_", " ") for word in other),
+        }
+        rows.append(row)
+    return rows
+
+
+def _rates(full: Sequence[Answer]) -> list[tuple[int, str]]:
+    """Return how often the first name is right at each sampling rate [Hz]."""
+    known = sorted({one.label["rate_Hz"] for one in full})
+    return [
+        (rate, rate_of(one.is_named for one in full if one.label["rate_Hz"] == rate).text)
+        for rate in known
+    ]
+
+
+def _cell(rate: Rate) -> str:
+    return f"{rate.hits} of {rate.count}" if rate.count else ""

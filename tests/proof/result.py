@@ -1,0 +1,74 @@
+"""Result: what a sealed diagnosis says of a case in a folder of a random name."""
+
+from __future__ import annotations
+
+import json
+import os
+import secrets
+import shutil
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from tests.verify.store import ROOT
+
+LONGEST = 900.0
+"""Time after which a diagnosis is given up [s]."""
+FILES = {"added_inertia": "compliance", "second_gap": "backlash"}
+"""Effects of the library whose verdict has another name where they are laid."""
+ALONE = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": str(ROOT)}
+
+
+@dataclass(frozen=True)
+class Result:
+    """A verdict as JSON text, empty where there is none; `message` says why. Times in seconds.
+
+    `sindy` and `free_gain` are what simpler methods name (see baseline).
+    """
+
+    verdict: str
+    cpu_s: float
+    wall_s: float
+    message: str = ""
+    sindy: str = ""
+    free_gain: str = ""
+
+
+def diagnosed(case: Path, without: tuple[str, ...] = ()) -> Result:
+    """Diagnose a copy of a case on one core, with some effects taken out of the library."""
+    with tempfile.TemporaryDirectory(prefix="sealed") as folder:
+        copy = Path(folder) / secrets.token_hex(8)
+        shutil.copytree(case, copy)
+        found = Path(folder) / "found.json"
+        library = [str(_library(Path(folder) / "effects", without))] if without else []
+        command = [sys.executable, "-m", "tests.proof.sealed", str(copy), str(found), *library]
+        try:
+            done = subprocess.run(
+                command,
+                cwd=folder,
+                env=os.environ | ALONE,
+                capture_output=True,
+                text=True,
+                timeout=LONGEST,
+                check=False,
+            )
+        except subprocess.TimeoutExpired:
+            return Result("", LONGEST, LONGEST, f"no verdict after {LONGEST:g} s")
+        if done.returncode or not found.exists():
+            last = done.stderr.strip().splitlines()[-1:]
+            return Result("", 0.0, 0.0, f"exit code {done.returncode}: {' '.join(last)}")
+        kept: dict[str, Any] = json.loads(found.read_text())
+    return Result(json.dumps(kept["verdict"]), kept["cpu_s"], kept["wall_s"], **kept["baselines"])
+
+
+def _library(folder: Path, without: tuple[str, ...]) -> Path:
+    """Copy the effects that are shipped but some of them."""
+    with_all = Path(str(files("spec"))) / "effects"
+    shutil.copytree(with_all, folder)
+    for name in without:
+        (folder / f"{FILES.get(name, name)}.yaml").unlink()
+    return folder

@@ -1,0 +1,96 @@
+"""Answers and bars, from verdicts written by hand."""
+
+from __future__ import annotations
+
+import random
+from typing import Any
+
+import pytest
+
+from tests.proof.answer import Answer
+from tests.proof.bar import bars
+from tests.proof.control import permuted
+
+PLACES = {"actuator_lag": "inputs.T_em", "tyre_slip": "elements.vehicle", "road_grade": "flow.w_w"}
+
+
+def label(*effects: str) -> dict[str, Any]:
+    return {
+        "effects": [{"id": name, "place": PLACES[name]} for name in effects],
+        "rate_Hz": 100,
+        "base": {"J_em": 0.05, "k": 6000.0},
+    }
+
+
+def verdict(*effects: str, says: str = "effect", place: str = "", **more: Any) -> dict[str, Any]:
+    return {
+        "verdict": says,
+        "effects": [{"id": name, "place": PLACES[name]} for name in effects],
+        "candidates": [{"id": name, "probability": 0.95} for name in effects],
+        "ambiguous_with": [],
+        "location": {"places": [place or PLACES[name] for name in effects]},
+        "fit": {"held_out": {"w": {"nrmse_before": 0.5, "nrmse_after": 0.1}}},
+        "base": {"k": {"after": {"value": 6120.0}}},
+        **more,
+    }
+
+
+def answer(true: tuple[str, ...], said: dict[str, Any], plan: str = "full") -> Answer:
+    return Answer("case", plan, label(*true), said, 8.0)
+
+
+def test_a_name_is_the_first_of_a_verdict_that_is_an_effect() -> None:
+    right = answer(("tyre_slip",), verdict("tyre_slip"))
+    assert right.is_named and right.is_placed() and right.probability == 0.95
+    (error,) = right.base_errors
+    assert error == pytest.approx(0.02)
+    assert (right.misfit("before"), right.misfit("after")) == (0.5, 0.1)
+    second = answer(("tyre_slip",), verdict("road_grade", "tyre_slip"))
+    assert not second.is_named
+    assert second.is_stated and not second.is_placed() and second.is_placed(2)
+
+
+def test_ambiguous_counts_as_not_named_but_states_a_set() -> None:
+    both = [{"id": "tyre_slip", "place": "x"}, {"id": "road_grade", "place": "y"}]
+    said = verdict(says="ambiguous", ambiguous_with=both)
+    found = answer(("tyre_slip",), said)
+    assert not found.is_named and found.is_stated and found.said == "ambiguous"
+    assert len(found.stated) == 2 and found.probability is None
+
+
+def test_no_verdict_is_a_failure_and_an_alarm() -> None:
+    failed = answer((), {}, "clean")
+    assert failed.said == "failed" and failed.is_alarm and not failed.is_named
+    assert not answer((), verdict(says="nothing_missing"), "clean").is_alarm
+
+
+def test_bars_count_what_they_say() -> None:
+    found = {
+        bar.about: bar
+        for bar in bars(
+            [
+                answer(("tyre_slip",), verdict("tyre_slip")),
+                answer(("road_grade",), verdict("tyre_slip")),
+                answer((), verdict(says="nothing_missing"), "clean"),
+                answer((), verdict("tyre_slip"), "clean"),
+                answer(("road_grade", "tyre_slip"), verdict("tyre_slip", "road_grade"), "pairs"),
+                answer(("road_grade",), verdict("tyre_slip"), "removed"),
+            ]
+        )
+    }
+    assert found["first name right"].measured == 0.5
+    assert not found["first name right"].met
+    assert found["first name right, worst effect (road_grade)"].measured == 0.0
+    assert found["names given with >= 0.9 that are right"].measured == 0.5
+    assert found["expected calibration error"].measured == pytest.approx(0.45)
+    assert found["false alarms"].measured == 0.5
+    assert found["two effects: both found"].met
+    assert not found["effect not in the library: a wrong name with >= 0.9"].met
+    assert found["held-out NRMSE falls by, median of the right ones"].measured == pytest.approx(0.8)
+
+
+def test_permuted_labels_fall_to_chance() -> None:
+    names = list(PLACES)
+    every = [answer((name,), verdict(name)) for name in names * 200]
+    share = permuted(every, random.Random(1))
+    assert share == pytest.approx(1 / len(names), abs=0.05)
