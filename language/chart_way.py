@@ -69,7 +69,12 @@ def _check_together(
 def _check_internal(
     source: Node, transition: Transition, targets: Sequence[Node], problems: Problems
 ) -> None:
-    outside = [t for t in targets if not source.holds(t.index) or t.index == source.index]
-    if transition.internal and (outside or source.kind != "compound"):
+    if not transition.internal:
+        return
+    if any(not source.holds(t.index) or t.index == source.index for t in targets):
         label = f"an internal transition leads to what is inside `{source.path}`"
         problems.error("target", transition.span, label, "`to: []` where nothing is entered")
+    elif targets and source.kind == "parallel":
+        label = f"`{source.path}` has regions: no transition of its own is internal"
+        hint = "give it to the modes of one region; without `internal` all regions are left"
+        problems.error("target", transition.span, label, hint)
