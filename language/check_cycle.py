@@ -32,7 +32,7 @@ def report_refiring(automaton: Automaton, problems: Problems) -> None:
     """Report transitions to a mode and back that fire for ever at one instant, with a witness."""
     for way, witness in _forever(automaton, range(1, 3)):
         label = f"this fires again at the same instant, for ever: {_path(way)}"
-        hint = f"at {witness.text}; write the direction of motion too, like "
+        hint = f"{witness.place}write the direction of motion too, like "
         hint += "`x >= limit and v > 0 m/s`" + _open_ended(automaton)
         problems.error("refire", _bare(automaton, way).when.span, label, hint)
 
@@ -41,7 +41,7 @@ def check_cycles(automaton: Automaton, problems: Problems) -> None:
     """Warn of longer ways round that are taken for ever at one instant: a run stops there."""
     for way, witness in _forever(automaton, range(3, LONGEST + 1)):
         label = f"from here the modes change for ever at one instant: {_path(way)}"
-        hint = f"at {witness.text}; let one of them wait, or its guard exclude the one before"
+        hint = f"{witness.place}let one of them wait, or its guard exclude the one before"
         hint += _open_ended(automaton)
         problems.warning("cycle", _bare(automaton, way).when.span, label, hint)
 

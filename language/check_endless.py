@@ -46,8 +46,7 @@ def check_endless(automaton: Automaton, inquiry: Inquiry, problems: Problems) ->
             label += f": {path}" if way[0].targets else ""
             hint = EVENT_HINT if way[0].events else ROUND_HINT
             hint = hint if way[0].targets else _staying(automaton, way[0])
-            place = f"at {found.text}; " if found.text else ""
-            problems.warning("cycle", way[-1].span, label, place + hint)
+            problems.warning("cycle", way[-1].span, label, found.place + hint)
 
 
 def _staying(automaton: Automaton, way: Transition) -> str:

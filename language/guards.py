@@ -65,7 +65,8 @@ def _report(
         return False
     label = f"nothing proves that `{earlier.name}` and `{later.name}` exclude each other"
     if isinstance(found, Witness):
-        label = f"`{earlier.name}` and `{later.name}` are both enabled at {found.text}"
+        at = f"at {found.text}" if found.text else "at one instant"
+        label = f"`{earlier.name}` and `{later.name}` are both enabled {at}"
     hint = "give them different priorities: the smallest wins"
     problems.error("priority", later.when.span, label, hint)
     return True

@@ -40,6 +40,11 @@ class Witness:
     point: Point
     text: str
 
+    @property
+    def place(self) -> str:
+        """How a help begins: `at x = 0.5; `, empty where no value that is told matters."""
+        return f"at {self.text}; " if self.text else ""
+
 
 class Inquiry:
     """Asks about one automaton; parameters have their present values unless they are free."""

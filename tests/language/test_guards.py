@@ -201,3 +201,8 @@ def test_what_is_taken_for_disjoint_never_holds_together(
 @given(conditions, conditions)
 def test_exclusion_is_mutual(p: str, q: str) -> None:
     assert excluded(tree(p), tree(q)) == excluded(tree(q), tree(p))
+
+
+def test_where_only_time_matters_the_witness_is_an_instant() -> None:
+    (found,) = overlaps("after(20 ms)", "after(30 ms)")
+    assert "`p` and `q` are both enabled at one instant" in found
