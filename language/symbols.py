@@ -19,6 +19,8 @@ PREFIXES = {
     "M": Fraction(10**6),
     "c": Fraction(1, 100),
     "m": Fraction(1, 1000),
+    "u": Fraction(1, 10**6),
+    "n": Fraction(1, 10**9),
 }
 PREFIXED: Mapping[str, tuple[Powers, str]] = {
     # symbol: powers of m, kg, s, A, K, prefixes that are known
@@ -29,11 +31,17 @@ PREFIXED: Mapping[str, tuple[Powers, str]] = {
     "N": ((1, 1, -2, 0, 0), "km"),
     "J": ((2, 1, -2, 0, 0), "k"),
     "Pa": ((-1, 1, -2, 0, 0), "kM"),
-    "Hz": ((0, 0, -1, 0, 0), "k"),
+    "Hz": ((0, 0, -1, 0, 0), "kM"),
+    "ohm": ((2, 1, -3, -2, 0), "kMm"),
+    "F": ((-2, -1, 4, 2, 0), "mun"),
+    "H": ((2, 1, -2, -2, 0), "mu"),
+    "Wb": ((2, 1, -2, -1, 0), "m"),
+    "T": ((0, 1, -2, -1, 0), "m"),
 }
 TIME: Powers = (0, 0, 1, 0, 0)
 MASS: Powers = (0, 1, 0, 0, 0)
 WORK: Powers = (2, 1, -2, 0, 0)
+CHARGE: Powers = (0, 0, 1, 1, 0)
 TEMPERATURE: Powers = (0, 0, 0, 0, 1)
 NOTHING: Powers = (0, 0, 0, 0, 0)
 
@@ -52,6 +60,8 @@ SYMBOLS: Mapping[str, Symbol] = {
     "h": (Fraction(3600), TIME, 0),
     "Wh": (Fraction(3600), WORK, 0),
     "kWh": (Fraction(3600 * 1000), WORK, 0),
+    "Ah": (Fraction(3600), CHARGE, 0),
+    "mAh": (Fraction(3600, 1000), CHARGE, 0),
     "bar": (Fraction(10**5), (-1, 1, -2, 0, 0), 0),
     "L": (Fraction(1, 1000), (3, 0, 0, 0, 0), 0),
     "K": (Fraction(1), TEMPERATURE, 0),
@@ -76,6 +86,14 @@ OFTEN_WRITTEN: Mapping[str, str] = {
     **dict.fromkeys(("RPM", "U/min"), "rpm"),
     **dict.fromkeys(("C", "celsius", "Celsius"), "degC"),
     **dict.fromkeys(("Kg", "KG"), "kg"),
+    **dict.fromkeys(("Ohm", "OHM", "Ohms", "ohms"), "ohm"),
+    **dict.fromkeys(("kOhm", "KOhm"), "kohm"),
+    **dict.fromkeys(("MOhm", "Megohm"), "Mohm"),
+    **dict.fromkeys(("mOhm",), "mohm"),
+    **dict.fromkeys(("farad", "Farad"), "F"),
+    **dict.fromkeys(("henry", "Henry"), "H"),
+    **dict.fromkeys(("volt", "Volt", "volts", "Volts"), "V"),
+    **dict.fromkeys(("amp", "Amp", "amps", "ampere", "Ampere"), "A"),
     **dict.fromkeys(("watt", "Watt", "watts", "Watts"), "W"),
     **dict.fromkeys(("minute", "minutes", "mins"), "min"),
     **dict.fromkeys(("hour", "hours", "hr"), "h"),

@@ -24,7 +24,7 @@ MECHANICAL: dict[tuple[int, ...], str] = {
 """How dimensions of mechanics are shown: powers of m, kg, s."""
 COMMON: dict[tuple[int, ...], str] = {
     (2, 1, -3, -1, 0): "V",
-    (2, 1, -3, -2, 0): "V/A",
+    (2, 1, -3, -2, 0): "ohm",
     (-2, -1, 3, 2, 0): "A/V",
     (2, 1, -2, -2, 0): "V*s/A",
     (-2, -1, 4, 2, 0): "A*s/V",

@@ -63,6 +63,24 @@ MEANING: dict[str, tuple[Fraction, dict[str, int]]] = {
     "bar": (Fraction(10**5), PA),
     "Hz": (Fraction(1), {S: -1}),
     "kHz": (Fraction(10**3), {S: -1}),
+    "MHz": (Fraction(10**6), {S: -1}),
+    "ohm": (Fraction(1), {M: 2, KG: 1, S: -3, A: -2}),
+    "kohm": (Fraction(10**3), {M: 2, KG: 1, S: -3, A: -2}),
+    "Mohm": (Fraction(10**6), {M: 2, KG: 1, S: -3, A: -2}),
+    "mohm": (Fraction(1, 10**3), {M: 2, KG: 1, S: -3, A: -2}),
+    "F": (Fraction(1), {M: -2, KG: -1, S: 4, A: 2}),
+    "mF": (Fraction(1, 10**3), {M: -2, KG: -1, S: 4, A: 2}),
+    "nF": (Fraction(1, 10**9), {M: -2, KG: -1, S: 4, A: 2}),
+    "uF": (Fraction(1, 10**6), {M: -2, KG: -1, S: 4, A: 2}),
+    "H": (Fraction(1), {M: 2, KG: 1, S: -2, A: -2}),
+    "uH": (Fraction(1, 10**6), {M: 2, KG: 1, S: -2, A: -2}),
+    "mH": (Fraction(1, 10**3), {M: 2, KG: 1, S: -2, A: -2}),
+    "Wb": (Fraction(1), {M: 2, KG: 1, S: -2, A: -1}),
+    "mWb": (Fraction(1, 10**3), {M: 2, KG: 1, S: -2, A: -1}),
+    "mT": (Fraction(1, 10**3), {KG: 1, S: -2, A: -1}),
+    "T": (Fraction(1), {KG: 1, S: -2, A: -1}),
+    "Ah": (Fraction(60 * 60), {S: 1, A: 1}),
+    "mAh": (Fraction(36, 10), {S: 1, A: 1}),
     "L": (Fraction(1, 10**3), {M: 3}),
     "K": (Fraction(1), {K: 1}),
     "degC": (Fraction(1), {K: 1}),
@@ -295,6 +313,6 @@ modes: {only: {}}
     assert made.states["x"].range == (Fraction(-5, 1000), Fraction(5, 1000))
 
 
-@pytest.mark.parametrize("text", ["V", "V/A", "N/m", "A*s/V", "V*s/A", "K/W", "N*m", "W", "Pa"])
+@pytest.mark.parametrize("text", ["V", "ohm", "N/m", "A*s/V", "V*s/A", "K/W", "N*m", "W", "Pa"])
 def test_a_dimension_is_shown_by_its_common_name(text: str) -> None:
     assert shown_unit(str(parse_unit(text).dimension)) == shown_unit(text) == text
