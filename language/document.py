@@ -45,6 +45,12 @@ class Entry:
     span: Span
     node: Node
 
+    @property
+    def text_span(self) -> Span:
+        """The place of the key itself, without its quotes."""
+        is_quoted = self.span.width == len(self.key) + 2
+        return self.span.inside(1, len(self.key)) if is_quoted else self.span
+
 
 @dataclass(frozen=True)
 class Table:

@@ -148,7 +148,7 @@ def document_of(source: Source, text: str) -> Document:
     problems.stop_if_any()
     head = heads[0]
     assert isinstance(head.node, Scalar)
-    return Document(head.key, head.node.text, head.node.span, root, source)
+    return Document(head.key, head.node.text, head.node.text_span, root, source)
 
 
 def _check_version(root: Table, problems: Problems) -> None:

@@ -68,26 +68,26 @@ def _expected_modes(place: Place, table: Table) -> Iterator[Name]:
 def _in_key(place: Place, entry: Entry) -> Iterator[Name]:
     section, path = place.section, (*place.path, entry.key)
     if section == "modes":
-        yield Name(entry.key, entry.span, path, "mode", is_key=True)
+        yield Name(entry.key, entry.text_span, path, "mode", is_key=True)
     elif section == "transitions":
         to = entry.node.get("to") if isinstance(entry.node, Table) else None
         if to is None:
-            yield Name(entry.key, entry.span, path, "mode", is_key=True)
+            yield Name(entry.key, entry.text_span, path, "mode", is_key=True)
     elif "transition_table" in place.path:
         of = "mode" if section == "rows" else "column"
         if section in ("rows", "columns") or place.path[-2] == "rows":
-            yield Name(entry.key, entry.span, path, of, is_key=True)
+            yield Name(entry.key, entry.text_span, path, of, is_key=True)
     elif section in ("regions", "templates", "faults", "events"):
-        yield Name(entry.key, entry.span, path, section[:-1], is_key=True)
+        yield Name(entry.key, entry.text_span, path, section[:-1], is_key=True)
     elif section == "effects":
         effect, _, at = entry.key.partition("@")
-        yield Name(effect, entry.span.inside(0, len(effect)), path, "effect")
-        yield Name(at, entry.span.inside(len(effect) + 1, len(at)), path)
+        yield Name(effect, entry.text_span.inside(0, len(effect)), path, "effect")
+        yield Name(at, entry.text_span.inside(len(effect) + 1, len(at)), path)
     elif place.path[:1] == ("tables",):
         if len(place.path) == len(("tables", "a name", "rows", "a row")):
-            yield Name(entry.key, entry.span, path, is_key=True)
+            yield Name(entry.key, entry.text_span, path, is_key=True)
     elif not any(key in FREE for key in place.path):
-        yield Name(entry.key, entry.span, path, is_key=True)
+        yield Name(entry.key, entry.text_span, path, is_key=True)
 
 
 def _in_scalar(place: Place, scalar: Scalar) -> Iterator[Name]:

@@ -168,14 +168,14 @@ def _one(file: Path, path: tuple[str, ...], entry: Entry) -> Declared | None:
     is_value = len(path) == 1 or section == "equations"
     if section in VALUES and not is_inner and is_value:
         word = VALUES[section]
-        return Declared(file, "value", entry.key, word, entry.span, entry.node)
+        return Declared(file, "value", entry.key, word, entry.text_span, entry.node)
     if section == "columns" and "transition_table" in path:
         name = column_name(path, entry.key)
-        return Declared(file, "column", name, "column of a table", entry.span, entry.node)
+        return Declared(file, "column", name, "column of a table", entry.text_span, entry.node)
     if section in OTHERS:
         word = OTHERS[section]
         name = _name(word, path, entry.key)
-        return Declared(file, word, name, word, entry.span, entry.node)
+        return Declared(file, word, name, word, entry.text_span, entry.node)
     return None
 
 

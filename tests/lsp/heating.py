@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -54,7 +55,8 @@ def hover(talk: Talk, path: Path, place: tuple[int, int]) -> str:
 
 def applied(text: str, edits: list[dict[str, Any]]) -> str:
     lines = text.split("\n")
-    for edit in sorted(edits, key=lambda e: str(e["range"]["start"]), reverse=True):
+    places = ((e["range"]["start"]["line"], e["range"]["start"]["character"]) for e in edits)
+    for _, edit in sorted(zip(places, edits, strict=True), key=itemgetter(0), reverse=True):
         start, end = edit["range"]["start"], edit["range"]["end"]
         assert start["line"] == end["line"]
         line = lines[start["line"]]

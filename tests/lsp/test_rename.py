@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -115,6 +116,30 @@ def test_events_columns_and_rows_of_tables_are_renamed(
         wanted = before.replace("initial: idle", "initial: rest").replace("{idle: {}", "{rest: {}")
         wanted += sign + after
     assert applied(CHART, edits) == wanted
+
+
+QUOTED = """\
+language: 1
+automaton: 'quoted'
+step: 1 ms
+parameters: {"lim": {value: 5 1/s, about: "a limit"}, "k": {derived: "2 * lim", unit: 1/s}}
+initial: "up"
+modes: {"up": {transitions: {"down": {when: x > 1}}}, 'down': {}}
+states: {x: {initial: 0}}
+flow: {x: "der(x) = k - lim * x"}
+outputs: ["x"]
+"""
+
+
+@pytest.mark.parametrize("part", ["'quoted'", '"lim"', '"up"', "'down'", '"x"'])
+def test_what_is_quoted_is_renamed_inside_its_quotes(talk: Talk, tmp_path: Path, part: str) -> None:
+    path = tmp_path / "spec" / "quoted.yaml"
+    path.parent.mkdir()
+    assert [each for each in talk.open(path, QUOTED) if each["severity"] == 1] == []
+    name = part.strip("\"'")
+    asked = {**talk.at(path, *where(QUOTED, part, 1)), "newName": "other"}
+    (edits,) = talk.ask("textDocument/rename", asked)["changes"].values()
+    assert applied(QUOTED, edits) == re.sub(rf"\b{name}\b", "other", QUOTED)
 
 
 NESTED = """\
