@@ -16,7 +16,14 @@ from language.inquiry import Inquiry
 from language.model import Automaton, Mode, Transition
 from language.moment import ELAPSED, Moment
 from language.operation import Compare, Expr, Ref, Unary, Value, real, whole
-from language.precedence import comes_along, events_that_come, inside_first, node_of, winners
+from language.precedence import (
+    comes_along,
+    events_that_come,
+    inside_first,
+    means_the_same,
+    node_of,
+    winners,
+)
 from language.problem import Problems, Span, SpecError
 from language.region import by_priority
 from language.transition_table import STAY
@@ -117,14 +124,20 @@ class _Guards:
         """Return a guard, None if it has no form that questions can be asked of."""
         if transition.key not in self.known:
             self.known[transition.key] = None
-            chart, source = self.automaton.tree, self.automaton.source(transition)
-            node = node_of(self.automaton, source)
-            if transition.completes and chart and node:
-                self.known[transition.key] = is_complete(chart, node, "mode")
-                return self.known[transition.key]
             with suppress(KeyError, SpecError):
-                self.known[transition.key] = self.moment.expression(transition.when.tree)
+                self.known[transition.key] = self._guard(transition)
         return self.known[transition.key]
+
+    def _guard(self, transition: Transition) -> Expr | None:
+        automaton, source = self.automaton, self.automaton.source(transition)
+        node = node_of(automaton, source)
+        if transition.completes and automaton.tree and node:
+            return is_complete(automaton.tree, node, "mode")
+        if source.key == self.mode.key:
+            return self.moment.expression(transition.when.tree)
+        if not means_the_same(transition):
+            return None
+        return self.moment.seen_by(source).expression(transition.when.tree)
 
     def together_never(self, *conditions: Expr | None) -> bool:
         """Tell whether conditions never hold together, whatever the tunables are."""

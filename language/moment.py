@@ -7,6 +7,7 @@ functions with memory give is any value: an edge only where its condition is as 
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -57,6 +58,7 @@ class Moment:
         self.mode = mode
         self.story = story or Story()
         self.tag = f" {self.story.moments}" if self.story.moments else ""
+        self.elapsed = ELAPSED
         self.story.moments += 1
         self.known: dict[str, Expr] = dict(constant_names(automaton))
         for name, thing in automaton.inputs.items():
@@ -70,6 +72,16 @@ class Moment:
         """Return an expression of this moment. Raises KeyError where a name is not known here."""
         self._define([tree])
         return expression(tree, self.known)
+
+    def seen_by(self, outer: Mode) -> Moment:
+        """Return this moment as a mode around ours has it: it is active for as long, or longer."""
+        seen = copy.copy(self)
+        seen.known = {key: value for key, value in self.known.items() if key[:6] != "after "}
+        seen.elapsed = f"{ELAPSED} {outer.key}"
+        ages = Ref(seen.elapsed, True), Ref(ELAPSED, True)
+        self.story.extents.update((age.name, Extent("whole", low=Fraction(0))) for age in ages)
+        self.story.facts.append(Compare(">=", *ages))
+        return seen
 
     def after(self, transition: Transition) -> Moment:
         """Return the moment after a transition: exit, reset and entry, each read as a whole."""
@@ -226,9 +238,9 @@ class Moment:
 
     def _aged(self, part: Application) -> Expr:
         """Return that a mode has been active for the whole ticks of a time."""
-        self.story.extents[ELAPSED] = Extent("whole", low=Fraction(0))
+        self.story.extents[self.elapsed] = Extent("whole", low=Fraction(0))
         ticks = whole(ticks_of(self.automaton, part.arguments[0]))
-        return Compare(">=", Ref(ELAPSED, True), ticks)
+        return Compare(">=", Ref(self.elapsed, True), ticks)
 
     def _extent_of(self, tree: Tree) -> Extent:
         """Return the bounds of a name that is delayed."""

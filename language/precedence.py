@@ -26,7 +26,7 @@ def winners(automaton: Automaton, mode: Mode, transition: Transition) -> list[Tr
     found = [way for _, way in by_priority(mode)[:position]]
     chart, node = automaton.tree, node_of(automaton, mode)
     if chart and node and chart.order == "outer_first":
-        found += [way for outer in chart.chain(node)[1:] for way in _lasting(automaton, outer)]
+        found += [way for outer in chart.chain(node)[1:] for way in _ways(automaton, outer)]
     return [way for way in found if comes_along(automaton, way, transition)]
 
 
@@ -41,7 +41,7 @@ def inside_first(automaton: Automaton, mode: Mode) -> Iterator[tuple[Mode, list[
     for leaf in chart.leaves_of(node) if node.number is None else ():
         chain = chart.chain(leaf)
         inner = chain[: _place(chain, node)]
-        found = [way for each in inner for way in _lasting(automaton, each)]
+        found = [way for each in inner for way in _ways(automaton, each)]
         yield automaton.by_key[leaf.mode], found
 
 
@@ -60,12 +60,19 @@ def events_that_come(automaton: Automaton) -> frozenset[str]:
     return frozenset((*inputs, *(name for names in raised for name in names)))
 
 
-def _lasting(automaton: Automaton, node: Node) -> Iterator[Transition]:
-    """Yield the transitions of a node whose guards mean the same where another mode reads them."""
-    for way in automaton.by_key[node.mode].transitions if node.mode in automaton.by_key else ():
-        parts = walk(way.when.tree)
-        if not any(isinstance(part, Application) and part.function in MEMORY for part in parts):
-            yield way
+def means_the_same(way: Transition) -> bool:
+    """Tell whether the guard of a mode can be read where one inside it reads its own.
+
+    Edges and beats are those of an activation. Of `after` is known that no mode is active for
+    longer than one around it.
+    """
+    parts = walk(way.when.tree)
+    used = {part.function for part in parts if isinstance(part, Application)}
+    return used.isdisjoint({*MEMORY} - {"after"})
+
+
+def _ways(automaton: Automaton, node: Node) -> tuple[Transition, ...]:
+    return automaton.by_key[node.mode].transitions if node.mode in automaton.by_key else ()
 
 
 def _place(chain: tuple[Node, ...], node: Node) -> int:
