@@ -15,8 +15,9 @@ from language.problem import SpecError
 from language.symbols import SYMBOLS
 from modewright.editing.guide import Place, kind_of_file, places, root_shape
 from modewright.editing.shape import Choice, Kind, MappingOf, Part, Value, kinds_in, shapes
+from modewright.lsp.asked import asked
 from modewright.lsp.namespace import Declared, Namespace, namespace_of
-from modewright.lsp.positions import column_of
+from modewright.lsp.positions import column_of, units_of
 from modewright.lsp.world import World
 
 MARK = "zzCURSORzz"
@@ -57,12 +58,35 @@ def complete(world: World, path: Path, text: str, position: types.Position) -> l
     if marked is None:
         return _heads()
     place, is_key = marked
-    if is_key:
-        found_here = _keys(space, place)
-    else:
-        kinds = kinds_in(place.kind)
-        found_here = (item for kind in kinds for item in _values(world, space, kind, before))
-    return list({item.label: item for item in found_here if MARK not in item.label}.values())
+    found_here = _keys(space, place) if is_key else _at(world, space, place, before)
+    items = {item.label: item for item in found_here if MARK not in item.label}
+    dotted = _dotted(text, position, world.encoding)
+    return [_instead(item, dotted) if dotted else item for item in items.values()]
+
+
+def _at(world: World, space: Namespace, place: Place, before: str) -> Iterator[Item]:
+    """What a value may be: what alone fits, where one thing is asked for, else all it may read."""
+    alone = None if _is_after_number(before) else asked(space, place, before)
+    if alone is not None:
+        yield from (_item(each, name) for name, each in alone)
+        return
+    for kind in kinds_in(place.kind):
+        yield from _values(world, space, kind, before)
+
+
+def _dotted(text: str, position: types.Position, encoding: str) -> types.Range | None:
+    """Return the place of a dotted name that is being written: editors see its last part alone."""
+    at, line, start, column = _word(text, position, encoding)
+    if "." not in line[start:column]:
+        return None
+    ends = (units_of(line, count, encoding) for count in (start, column))
+    return types.Range(*(types.Position(at, end) for end in ends))
+
+
+def _instead(item: Item, place: types.Range) -> Item:
+    """Return an item that takes a place as a whole."""
+    item.text_edit = types.TextEdit(place, item.insert_text or item.label)
+    return item
 
 
 def _heads() -> list[Item]:
@@ -77,12 +101,8 @@ def _marked(
 
     What is being written is seldom YAML: a colon, or the ends of brackets, may be missing.
     """
-    lines = text.splitlines() or [""]
-    lines.append("")
-    at = min(position.line, len(lines) - 1)
-    line = lines[at]
-    column = column_of(line, position, encoding)
-    start = column - len(re.search(r"[\w$.]*$", line[:column]).group())  # type: ignore[union-attr]
+    lines = [*(text.splitlines() or [""]), ""]
+    at, line, start, column = _word(text, position, encoding)
     end = column + len(re.match(r"\w*", line[column:]).group())  # type: ignore[union-attr]
     before, after = line[:start], line[end:]
     closing = _closing(before)
@@ -94,6 +114,16 @@ def _marked(
         except SpecError:
             continue
     return None
+
+
+def _word(text: str, position: types.Position, encoding: str) -> tuple[int, str, int, int]:
+    """Return the number of a line, its text, and from where to where a word is written there."""
+    lines = [*(text.splitlines() or [""]), ""]
+    at = min(position.line, len(lines) - 1)
+    column = column_of(lines[at], position, encoding)
+    written = re.search(r"[\w$.]*$", lines[at][:column])
+    assert written
+    return at, lines[at], column - len(written.group()), column
 
 
 def _closing(text: str) -> str:
@@ -191,12 +221,16 @@ def _values(world: World, space: Namespace, kind: Kind, before: str) -> Iterator
         case Value("name", of) if of in GROUPS:
             yield from (_item(each, each.name) for each in space.group(*GROUPS[of]))
         case Value(("expression" | "balance" | "literal" | "name"), _):
-            if re.search(r"(^|[^\w.])\d[\d.]*(e[-+]?\d+)? $", before):
+            if _is_after_number(before):
                 yield from _units()
                 return
             yield from _scope(space)
             if kind != Value("literal"):
                 yield from (Item(f, kind=K.Function, insert_text=f"{f}(") for f in KNOWN)
+
+
+def _is_after_number(before: str) -> bool:
+    return re.search(r"(^|[^\w.])\d[\d.]*(e[-+]?\d+)? $", before) is not None
 
 
 def _scope(space: Namespace) -> Iterator[Item]:

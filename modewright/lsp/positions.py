@@ -18,8 +18,8 @@ def range_of(span: Span, encoding: str) -> types.Range:
     line = max(0, span.line - 1)
     lines = span.source.lines
     text = lines[line] if line < len(lines) else ""
-    start = _units(text, span.column - 1, encoding)
-    end = _units(text, span.column - 1 + span.width, encoding)
+    start = units_of(text, span.column - 1, encoding)
+    end = units_of(text, span.column - 1 + span.width, encoding)
     return types.Range(types.Position(line, start), types.Position(line, max(end, start)))
 
 
@@ -55,6 +55,7 @@ def uri_of(path: Path) -> str:
     return path.resolve().as_uri()
 
 
-def _units(text: str, count: int, encoding: str) -> int:
+def units_of(text: str, count: int, encoding: str) -> int:
+    """Return where an editor sees a column of a line, from 0."""
     codec, width = CODECS[encoding]
     return len(text[: max(0, count)].encode(codec, errors="replace")) // width

@@ -14,12 +14,13 @@ from modewright.editing.format import formatted
 from modewright.lsp.completion import complete
 from modewright.lsp.desk import Desk
 from modewright.lsp.hover import hover, mention_at
+from modewright.lsp.outline import outline
 from modewright.lsp.positions import range_of
 from modewright.lsp.rename import definition, references, rename
 from modewright.lsp.renamed import RenameRefused
 from modewright.lsp.repair import repairs
 
-TRIGGERS = [" ", ".", "{", ","]
+TRIGGERS = [" ", ".", "{", ",", "("]
 """Characters after which an editor asks for completions by itself."""
 
 
@@ -120,6 +121,10 @@ def _answer_about_names(server: LanguageServer, desk: Desk) -> None:
     def referred(params: types.ReferenceParams) -> list[types.Location]:
         world, path = desk.world(params.text_document.uri)
         return references(world, path, params.position, params.context.include_declaration)
+
+    @server.feature(types.TEXT_DOCUMENT_DOCUMENT_SYMBOL)
+    def outlined(params: types.DocumentSymbolParams) -> list[types.DocumentSymbol]:
+        return outline(*desk.world(params.text_document.uri))
 
     @server.feature(types.TEXT_DOCUMENT_PREPARE_RENAME)
     def prepared(params: types.PrepareRenameParams) -> types.Range | None:
