@@ -30,6 +30,8 @@ def asked(space: Namespace, place: Place, before: str) -> list[Named] | None:
     compared = re.search(r"([\w.$]+)\s*[!=]=\s*$", before)
     if compared:
         return _compared(space, compared[1])
+    if place.path[:1] == ("expect",) and place.section == "modes":
+        return _listed(space, place.path)
     if place.section == "raise":
         return [(each.name, each) for each in space.group("event") if not _is_input(each)]
     if place.section == "event" and space.document.kind != "test":
@@ -67,6 +69,19 @@ def _compared(space: Namespace, path: str) -> list[Named] | None:
         (each.name.removeprefix(own), each)
         for each in inner.group("mode")
         if each.name.startswith(own) and not each.name.startswith(others)
+    ]
+
+
+def _listed(space: Namespace, path: tuple[str, ...]) -> list[Named] | None:
+    """Return the innermost modes of the region beside which a test lists them."""
+    expected = space.document.root.get("expect")
+    own = expected.get(path[1]) if isinstance(expected, Table) else None
+    of = own.get("of") if isinstance(own, Table) else None
+    region = of.text if isinstance(of, Scalar) else ""
+    found = _compared(space, region) or _compared(space, f"{region}.mode".removeprefix("."))
+    outer = tuple(name for name, _ in found or ())
+    return found and [
+        (name, each) for name, each in found if not any(o.startswith(f"{name}.") for o in outer)
     ]
 
 

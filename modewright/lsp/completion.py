@@ -68,7 +68,10 @@ def _at(world: World, space: Namespace, place: Place, before: str) -> Iterator[I
     """What a value may be: what alone fits, where one thing is asked for, else all it may read."""
     alone = None if _is_after_number(before) else asked(space, place, before)
     if alone is not None:
-        yield from (_item(each, name) for name, each in alone)
+        for name, each in alone:
+            is_word = each.group == "value" and not name.endswith(each.name)
+            word = Item(name, kind=K.EnumMember, detail=f"word of {each.name}")
+            yield word if is_word else _item(each, name)
         return
     for kind in kinds_in(place.kind):
         yield from _values(world, space, kind, before)

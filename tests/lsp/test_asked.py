@@ -83,6 +83,8 @@ def test_a_test_is_offered_the_modes_of_a_region_and_faults(
     talk.open(path, TEST)
     text = TEST.replace("lone.charge == idle, before", f"{new}, before")
     assert sorted(labels(talk, path, text)) == sorted(expected)
+    listed = TEST.replace("modes: [idle]", "modes: [idle, |]")
+    assert labels(talk, path, listed) == ["idle", "session.cc", "session.cv"]
 
 
 def test_a_dotted_name_is_replaced_as_a_whole(talk: Talk, tmp_path: Path) -> None:
