@@ -23,11 +23,11 @@ for python in $(PYTHON) python3 python3.14 python3.13 python3.12 python3.11 ""; 
 done
 endef
 
-.PHONY: help setup demo test verify verify-part bench check format generate lock clean
+.PHONY: help setup demo test verify verify-part prove-diagnosis bench check format generate lock clean
 .PHONY: check-lock check-format check-lint check-types check-floors check-specs check-tests check-generated
 
 help: ## list the targets
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-11s %s\n", $$1, $$2 }' Makefile
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-15s %s\n", $$1, $$2 }' Makefile
 
 setup: $(STAMP) ## build .venv with everything, this project included
 	@:
@@ -77,6 +77,9 @@ verify-part: setup ## measure a fixed part of the figures, as CI does
 	$(BIN)/python tests/verify/command_line.py
 	$(BIN)/python tests/verify/editor.py
 	$(BIN)/python tests/verify/static_checks.py
+
+prove-diagnosis: setup ## diagnose the sealed cases blind, write docs/proof.md (hours; resumable)
+	$(BIN)/python -m tests.proof $(ARGS)
 
 bench: setup ## measure speed against rivals; with ARGS="--peers diffrax,pathsim" those too
 	$(BIN)/python tests/bench/run.py $(ARGS)

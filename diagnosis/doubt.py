@@ -50,13 +50,18 @@ def is_doubtful(
         shrink = 1.0 / inflation(selection.base, bench.series)
         unexplained = max((locus.gain for locus in loci), default=0.0) * shrink
         return unexplained > UNEXPLAINED * threshold
-    drifts = selection.model.noises.drifts
-    if all(drifts.get(name, 0.0) < STILL * unit for name, unit in units.items()):
+    if is_still(selection, units):
         return False
     gained = sum(tried.evidence.train for tried in selection.accepted if tried.evidence)
     return _left_over(bench, selection.model, selection.accepted) > max(
         LEFT * threshold, LEFT_PART * gained
     )
+
+
+def is_still(selection: Selection, units: Mapping[str, float]) -> bool:
+    """Tell whether a model with what was accepted needs no drift."""
+    drifts = selection.model.noises.drifts
+    return all(drifts.get(name, 0.0) < STILL * unit for name, unit in units.items())
 
 
 def _left_over(bench: Bench, model: Estimate, accepted: Sequence[Tried]) -> float:

@@ -6,12 +6,13 @@ import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from diagnosis.adequacy import is_inadequate, refused
 from diagnosis.alone import LEFT_OUT, SIMULATED, alone, forgets
 from diagnosis.bench import Bench
 from diagnosis.bootstrap import bootstrapped, kept_thresholds
 from diagnosis.case import Case
 from diagnosis.description import Description, described
-from diagnosis.doubt import explains_more, is_doubtful, selected_formula
+from diagnosis.doubt import explains_more, is_doubtful, is_still, selected_formula
 from diagnosis.estimation import Estimate
 from diagnosis.evidence import inflation
 from diagnosis.hidden import with_hidden
@@ -73,7 +74,20 @@ def _judged_by_observer(case: Case, raw: Bench, ways: Sequence[Way], tell: Tell)
         says, selection = "unknown", selected_formula(selection, formula)
     else:
         formula = None
+        if says == "effect" and not is_still(selection, units):
+            says, selection = _adequate(bench, selection, UNKNOWN * most, tell)
     return Judgement(bench, base, selection, loci, says, thresholds, formula)
+
+
+def _adequate(
+    bench: Bench, selection: Selection, needed: float, tell: Tell
+) -> tuple[Says, Selection]:
+    """Return a selection, or one without effects that leave more unexplained than they explain."""
+    if not is_inadequate(bench, selection, needed):
+        return "effect", selection
+    names = ", ".join(tried.layer.id for tried in selection.accepted)
+    tell(f"much is left unexplained beside {names}: it is something else")
+    return "unknown", refused(selection)
 
 
 def _judged_by_simulation(

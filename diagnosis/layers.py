@@ -63,6 +63,11 @@ class Layer:
         return f"{name}_{self.ending}"
 
 
+def has_parameters(layer: Layer) -> bool:
+    """Tell whether an effect has numbers to fit; one that has none follows anything at all."""
+    return layer.effect.body.get("parameters") is not None
+
+
 def effects_in(folder: Path) -> tuple[Effect, ...]:
     """Return the effects of a folder, by name. Raises SpecError."""
     problems = Problems()

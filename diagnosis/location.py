@@ -28,7 +28,9 @@ def located(bench: Bench, base: Estimate) -> tuple[Locus, ...]:
     With each freedom the parameters are fitted anew: those of the base were bent by what it lacks,
     and a place would have to explain the bending as well.
     """
-    free = [(section, layer, freed(bench, base, layer)) for section, layer in _loci(bench)]
+    free = [
+        (section, layer, freed(bench, base, layer)) for section, layer in places_of_freedom(bench)
+    ]
     quiet = freed(bench, base).cost
     known = [one.cost for *_, one in free if np.isfinite(one.cost)]
     quiet = quiet if np.isfinite(quiet) else max(known, default=0.0)
@@ -41,8 +43,8 @@ def located(bench: Bench, base: Estimate) -> tuple[Locus, ...]:
     return tuple([over_time(bench, found[0]), *found[1:]] if found else [])
 
 
-def _loci(bench: Bench) -> list[tuple[str, Layer]]:
-    """A drift for each balance of forces, each elastic element, each compared output."""
+def places_of_freedom(bench: Bench) -> list[tuple[str, Layer]]:
+    """Return a drift for each balance of forces, each elastic element, each compared output."""
     loci = [("flow", layer) for layer in bench.drifts]
     elements = bench.document.root.get("elements")
     for entry in elements if isinstance(elements, Table) else ():

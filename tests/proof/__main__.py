@@ -3,49 +3,110 @@
 from __future__ import annotations
 
 import argparse
+import random
 import sys
 from collections import Counter
 from collections.abc import Sequence
 
 from tests.proof.answer import Answer
-from tests.proof.bar import bars
+from tests.proof.bar import Bar, bars
 from tests.proof.cases import GENERATOR
 from tests.proof.catalogue import pairs_of
-from tests.proof.kept import answers
-from tests.proof.plan import SEED, plans
+from tests.proof.control import most_frequent, permuted, simpler, simpler_alarms
+from tests.proof.kept import answers, joined
+from tests.proof.page import published
+from tests.proof.plan import SEED, Plan, plans
+from tests.proof.seals import is_sealed, sealed, seals_of
+from tests.verify.store import ROOT
+
+VERDICTS = ROOT / "docs" / "evidence" / "proof.parquet"
+EXAMPLES = """\
+python -m tests.proof --seal             # make all cases, write the hashes of their labels
+python -m tests.proof                    # diagnose what is not diagnosed yet, write docs/proof.md
+python -m tests.proof --seed 5 --share 0.1 --plans full,clean    # a look at other cases"""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Diagnose what is not diagnosed yet; return 0 if every bar is met."""
     given = _parser().parse_args(arguments)
-    wanted = given.plans.split(",") if given.plans else None
+    study = plans(pairs_of(given.generator), given.seed, given.share)
+    if given.seal:
+        sealed(seals_of(study, given.seed, given.generator))
+        return 0
+    wanted = given.plans.split(",") if given.plans else [plan.name for plan in study]
     every: list[Answer] = []
-    for plan in plans(pairs_of(given.generator), given.seed, given.share):
-        if wanted is None or plan.name in wanted:
+    for plan in study:
+        if plan.name in wanted:
             every += answers(plan, given.seed, given.jobs, given.first, given.generator)
     found = bars(every)
     for bar in found:
         print(f"{'met ' if bar.met else 'OPEN'} {bar.about}: {bar.asked}: {bar.text}")
-    _print_wrong(every)
+    for line in (*_wrong(every), *_beside(every, given.seed)):
+        print(line)
+    if given.first is None and len(wanted) == len(study):
+        _publish(study, every, found, given)
     return 0 if all(bar.met for bar in found) else 1
 
 
-def _print_wrong(every: Sequence[Answer]) -> None:
-    wrong = Counter(
-        (one.plan, one.true, one.said) for one in every if one.plan == "full" and not one.is_named
-    )
-    for (plan, true, said), count in sorted(wrong.items()):
-        print(f"{plan}: {true} was called {said} {count} times")
+def _publish(
+    study: Sequence[Plan], every: list[Answer], found: list[Bar], given: argparse.Namespace
+) -> None:
+    """Write the page of a whole study whose labels were sealed before."""
+    seals = seals_of(study, given.seed, given.generator)
+    if is_sealed(seals):
+        joined(study, given.seed, given.generator, VERDICTS)
+        published(every, found, seals, _beside(every, given.seed))
+        print("wrote docs/proof.md")
+    else:
+        print("docs/proof.md is left as it is: the labels of this study are not sealed")
+
+
+def _beside(every: Sequence[Answer], seed: int) -> list[str]:
+    """Return what controls and simpler methods reach on the same cases."""
+    full, clean = ([one for one in every if one.plan == name] for name in ("full", "clean"))
+    if not full:
+        return []
+    chance = permuted(full, random.Random(seed))
+    lines = [
+        f"against permuted labels: first name right {chance:.1%}",
+        f"the most frequent label: {most_frequent(full).text}",
+        "recalibration alone: names nothing",
+    ]
+    for method, words in (
+        ("sindy", "sparse regression of what the recalibrated base lacks (PySINDy)"),
+        ("free_gain", "the effect with the largest gain in free simulation"),
+    ):
+        alarms = f"; false alarms {simpler_alarms(clean, method).text}" if clean else ""
+        lines.append(f"{words}: {simpler(full, method).text}{alarms}")
+    return lines
+
+
+def _wrong(every: Sequence[Answer]) -> list[str]:
+    """Return what was called what, where it is not right."""
+    kinds = Counter((one.plan, one.true, one.said) for one in every if _is_wrong(one))
+    return [f"{plan}: {true}: {said}, {n} times" for (plan, true, said), n in sorted(kinds.items())]
+
+
+def _is_wrong(one: Answer) -> bool:
+    if one.plan == "clean":
+        return one.is_alarm
+    return one.said != "unknown" if one.plan == "removed" else not one.is_named
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="python -m tests.proof", description=__doc__)
+    parser = argparse.ArgumentParser(
+        prog="python -m tests.proof",
+        description=__doc__,
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     parser.add_argument("--seed", type=int, default=SEED)
     parser.add_argument("--jobs", type=int, default=2, help="diagnoses at a time (2)")
     parser.add_argument("--plans", help="some of full,clean,weak,pairs,removed")
     parser.add_argument("--first", type=int, help="so many cases of each plan only")
     parser.add_argument("--share", type=float, default=1.0, help="of the cases of each plan (1)")
     parser.add_argument("--generator", default=GENERATOR, help=f"a package ({GENERATOR})")
+    parser.add_argument("--seal", action="store_true", help="only write the hashes of all labels")
     return parser
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from functools import partial
 from pathlib import Path
@@ -38,7 +38,7 @@ def answers(plan: Plan, seed: int, jobs: int, most: int | None, generator: str) 
     """Return what a diagnosis says of each case of a plan; what is missing is diagnosed now."""
     cases = made(plan, seed, generator)
     known = cases.known(_fewest(plan.most, most))
-    folder = ROOT / "build" / "proof" / _digest()[:16] / cases.folder.name / plan.name
+    folder = _folder(plan, cases)
     with locked(folder):
         store = open_store(folder, _manifest(plan, seed, cases))
         _fill(store, plan, cases, list(known.items()), seed, jobs)
@@ -49,6 +49,10 @@ def answers(plan: Plan, seed: int, jobs: int, most: int | None, generator: str) 
 def _answer(row: Mapping[str, Any], plan: Plan, label: Label) -> Answer:
     simpler = {name: row[name] for name in ("sindy", "free_gain")}
     return Answer(row["scenario"], plan.name, label, _verdict(row["verdict"]), row["cpu"], simpler)
+
+
+def _folder(plan: Plan, cases: Cases) -> Path:
+    return ROOT / "build" / "proof" / _digest()[:16] / cases.folder.name / plan.name
 
 
 def _fewest(*counts: int | None) -> int | None:
@@ -125,8 +129,10 @@ def _rows(store: Store) -> Iterator[dict[str, Any]]:
         yield from pyarrow.parquet.read_table(path).to_pylist()
 
 
-def written(folder: Path, path: Path) -> None:
-    """Join all results below a folder in one Parquet file."""
-    tables = [pyarrow.parquet.read_table(one) for one in sorted(folder.rglob("*.parquet"))]
-    joined = pyarrow.concat_tables([table.replace_schema_metadata(None) for table in tables])
-    pyarrow.parquet.write_table(joined, path, compression="zstd", compression_level=19)
+def joined(study: Sequence[Plan], seed: int, generator: str, path: Path) -> None:
+    """Join all results of a study in one Parquet file."""
+    folders = [_folder(plan, made(plan, seed, generator)) for plan in study]
+    files = [one for folder in folders for one in sorted(folder.rglob("*.parquet"))]
+    tables = [pyarrow.parquet.read_table(one).replace_schema_metadata(None) for one in files]
+    table = pyarrow.concat_tables(tables)
+    pyarrow.parquet.write_table(table, path, compression="zstd", compression_level=19)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +10,7 @@ from jinja2 import Environment, StrictUndefined
 
 from tests.proof.answer import Answer
 from tests.proof.bar import Bar, by_effect
+from tests.proof.picture import draw
 from tests.proof.rate import Rate, rate_of
 from tests.verify.store import ROOT, code_digest
 
@@ -26,19 +26,30 @@ def method_digest() -> str:
     return code_digest(METHOD)[:16]
 
 
-def page(every: Sequence[Answer], found: Sequence[Bar], about: Mapping[str, Any]) -> str:
-    """Return the page; `about` are the seed, the seals, baselines, controls and machines."""
-    template = Path(str(files("tests.proof") / "proof.md.jinja")).read_text("utf-8")
+def published(
+    every: Sequence[Answer], found: Sequence[Bar], seals: Mapping[str, Any], beside: Sequence[str]
+) -> None:
+    """Write the page with its figures and figures of evidence."""
+    draw(every, FOLDER)
+    PAGE.write_text(page(every, found, seals, beside), encoding="utf-8")
+
+
+def page(
+    every: Sequence[Answer], found: Sequence[Bar], seals: Mapping[str, Any], beside: Sequence[str]
+) -> str:
+    """Return the page; `beside` are lines on controls and simpler methods."""
+    template = Path(__file__).with_name("proof.md.jinja").read_text("utf-8")
     shown = Environment(undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     full, weak = ([one for one in every if one.plan == name] for name in ("full", "weak"))
     return shown.from_string(template).render(
         mark=MARK,
         digest=method_digest(),
+        seals=seals,
         bars=found,
         effects=_effects(full, weak),
         rates=_rates(full),
         counts={name: sum(one.plan == name for one in every) for name in _plans(every)},
-        **about,
+        beside=beside,
     )
 
 
