@@ -149,7 +149,7 @@ class DimensionCheck:
                 kind = self.kind(operand)
                 if isinstance(kind, Whole):
                     return Whole(-kind.high, -kind.low)
-                return self._number(kind, operand)
+                return self.number(kind, operand)
             case Not(operand, _):
                 self.truth(operand, "not")
                 return "truth"
@@ -175,9 +175,9 @@ class DimensionCheck:
 
     def real(self, tree: Tree) -> Dimension | None:
         """Return the dimension of a quantity; reports what is none."""
-        return self._number(self.kind(tree), tree)
+        return self.number(self.kind(tree), tree)
 
-    def _number(self, kind: Kind | None, tree: Tree) -> Dimension | None:
+    def number(self, kind: Kind | None, tree: Tree) -> Dimension | None:
         """What a whole number is in arithmetic of reals: a number without a unit."""
         kind = as_real(kind)
         if isinstance(kind, Dimension):
@@ -208,7 +208,7 @@ class DimensionCheck:
         wholes = wholes_of(tree.left, first, tree.right, second)
         if wholes and tree.operator != "/":
             return self._safe(combined(tree.operator, *wholes), tree)
-        left, right = self._number(first, tree.left), self._number(second, tree.right)
+        left, right = self.number(first, tree.left), self.number(second, tree.right)
         if left is None or right is None:
             return None
         if tree.operator in "*/":
@@ -276,7 +276,7 @@ class DimensionCheck:
             label = "this is true or false, a quantity is needed"
             self.report("type", condition.span, label, compared_hint(tree, condition))
             return "truth"
-        left, right = self._number(first, tree.left), self._number(second, tree.right)
+        left, right = self.number(first, tree.left), self.number(second, tree.right)
         if left is None or right is None:
             return "truth"
         if equality:

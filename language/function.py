@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from language.aliases import FUNCTIONS
 from language.call import WHERE, lookup_kind, memory_kind
+from language.kind import Whole
 from language.problem import nearest
-from language.syntax import MEMORY, Application, Name, Tree, is_zero
+from language.syntax import MEMORY, Application, Name, Tree, children, is_zero, whole_literal
 from language.units import NUMBER, Dimension, root
 
 if TYPE_CHECKING:
@@ -17,6 +19,8 @@ if TYPE_CHECKING:
 ANGLE = Dimension(angle=1)
 SAME = {"abs": 1, "min": 2, "max": 2, "clip": 3}
 """Functions whose arguments and value have one dimension, with their number of arguments."""
+MOST_LAYERS = 4
+"""Functions of whole numbers inside each other: each holds copies of what is inside."""
 NUMBERS = {"exp": 1, "tanh": 1, "floor": 1, "sign": 1}
 ANGLES = {"sin": 1, "cos": 1, "tan": 1}
 ARGUMENTS = {**SAME, **NUMBERS, **ANGLES, "sqrt": 1, "atan2": 2}
@@ -43,10 +47,51 @@ def function_kind(check: DimensionCheck, tree: Application) -> Kind | None:
         label = f"`{name}` takes {wanted} argument(s), not {len(arguments)}"
         check.report("arguments", tree.span, label)
         return None
-    kinds = [check.real(argument) for argument in arguments]
+    given = [check.kind(argument) for argument in arguments]
+    if name in SAME and is_of_wholes(arguments, [isinstance(kind, Whole) for kind in given]):
+        return _whole(check, tree, given)
+    pairs = zip(given, arguments, strict=True)
+    kinds = [check.number(kind, argument) for kind, argument in pairs]
     if any(kind is None for kind in kinds):
         return None
     return _elementary(check, tree, [kind for kind in kinds if kind is not None])
+
+
+def is_of_wholes(arguments: Sequence[Tree], wholes: Sequence[bool]) -> bool:
+    """Tell whether some arguments are whole numbers, and all others literals like `2`."""
+    pairs = zip(arguments, wholes, strict=True)
+    return any(wholes) and all(whole or whole_literal(tree) is not None for tree, whole in pairs)
+
+
+def _whole(check: DimensionCheck, tree: Application, given: Sequence[Kind | None]) -> Whole | None:
+    """`min`, `max`, `abs` and `clip` of whole numbers are whole; what is inside is copied."""
+    if _layers(tree) > MOST_LAYERS:
+        label = f"`{tree.function}` of whole numbers is nested too deeply"
+        check.report("expression", tree.span, label, "give what is inside an equation of its own")
+        return None
+    ranges = []
+    for argument, kind in zip(tree.arguments, given, strict=True):
+        value = whole_literal(argument) or 0
+        ranges.append(kind if isinstance(kind, Whole) else Whole(value, value))
+    first = ranges[0]
+    match tree.function:
+        case "abs":
+            low = max(first.low, -first.high, 0)
+            return Whole(low, max(abs(first.low), abs(first.high)))
+        case "min":
+            return Whole(min(r.low for r in ranges), min(r.high for r in ranges))
+        case "max":
+            return Whole(max(r.low for r in ranges), max(r.high for r in ranges))
+        case _:
+            _, bottom, top = ranges
+            low = min(max(first.low, bottom.low), top.low)
+            return Whole(low, max(bottom.high, min(first.high, top.high)))
+
+
+def _layers(tree: Tree) -> int:
+    """Return how many functions of one kind stand inside each other."""
+    inside = max((_layers(part) for part in children(tree)), default=0)
+    return inside + (isinstance(tree, Application) and tree.function in SAME)
 
 
 def _elementary(

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 from language.balance import coefficient_of
 from language.declaration import Formula
+from language.function import SAME, is_of_wholes
 from language.limit import is_limited
 from language.model import Automaton, Balance, Mode, Region
 from language.once import once
@@ -112,7 +113,36 @@ def _application(tree: Application, known: Names) -> Expr:
         case Application(function, _, _) if function in MEMORY:
             return known[memory_key(tree)]
         case Application(function, arguments, _):
+            wholes = _wholes_of(arguments, known) if function in SAME else None
+            if wholes:
+                return _of_wholes(function, wholes)
             return Call(function, tuple(_real(part, known) for part in arguments))
+
+
+def _wholes_of(arguments: Sequence[Tree], known: Names) -> list[Expr] | None:
+    """Return arguments as whole numbers, where they are and literals beside them; else None."""
+    made = [_typed(argument, known) for argument in arguments]
+    if not is_of_wholes(arguments, [whole for _, whole in made]):
+        return None
+    pairs = zip(arguments, made, strict=True)
+    return [expr if whole else Value(whole_literal(tree) or 0) for tree, (expr, whole) in pairs]
+
+
+def _of_wholes(function: str, parts: Sequence[Expr]) -> Expr:
+    """Return `abs`, `min`, `max` or `clip` of whole numbers; the order is that of the reals."""
+    first = parts[0]
+    match function:
+        case "abs":
+            return Select(Compare("<", first, Value(0)), Unary("-", first), first)
+        case "min":
+            return Select(Compare("<", parts[1], first), parts[1], first)
+        case "max":
+            return Select(Compare(">", parts[1], first), parts[1], first)
+        case _:
+            _, low, high = parts
+            return Select(
+                Compare(">", first, low), Select(Compare("<", first, high), first, high), low
+            )
 
 
 def assigned(tree: Tree, known: Names, whole: bool) -> Expr:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from pathlib import Path
 
 import pytest
@@ -20,6 +21,7 @@ period: 10 ms
 numbers: float64
 """
 VALUES = (0.5, -0.0, 2.0, float("nan"), 1e308, -3.0, float("inf"), 0.25)
+WHOLES = (3, -3, 2147483647, 7, -2147483647, 0, 16777217, 2147483646)
 
 
 def edge(folder: Path, body: str) -> Program:
@@ -31,8 +33,8 @@ def edge(folder: Path, body: str) -> Program:
 def verdict(used: Program) -> Verdict:
     """Run eight ticks with special values in all inputs."""
     inputs: list[Tick] = [
-        {v.name: value > 0.3 if v.type == "truth" else value for v in used.inputs}
-        for value in VALUES
+        {v.name: {"truth": value > 0.3, "whole": whole}.get(v.type, value) for v in used.inputs}
+        for value, whole in zip(VALUES, itertools.cycle(WHOLES), strict=False)
     ]
     found = compare(taped(used, inputs))
     assert found.ticks == len(VALUES)
@@ -124,6 +126,22 @@ equations:
   r: "{" - ".join(["(if u > 1 or v < 2 and not (u >= v) then u / 3 else -u * v / 7 / -u)"] * 20)}"
 modes: {{only: {{}}}}
 outputs: [r]
+""",
+    "whole numbers in functions": """\
+inputs: {j: {type: int, range: [-2147483647, 2147483647]}, u: {unit: "1"}}
+discrete:
+  k: {type: int, initial: 0, range: [0, 5]}
+  top: {type: int, initial: -2147483647, range: [-2147483647, 2147483647]}
+  size: {type: int, initial: 0, range: [0, 2147483647]}
+  held: {type: int, initial: 0, range: [-3, 7]}
+equations: {half: "min(k, 3) / 2", more: "max(min(k, 3), 0.5)", odd: "clip(j, top, -k)", r: u * odd}
+initial: a
+modes:
+  a:
+    update: {k: "min(k + 1, 5)", top: "max(j, top)", size: abs(j), held: "clip(j, -3, 7)"}
+    transitions: {b: {when: "min(k, held) == 3"}}
+  b: {update: {k: "max(0, k - abs(held))"}, transitions: {a: {when: u > 0}}}
+outputs: [mode, k, top, size, held, half, more, odd, r]
 """,
     "beats and changes": """\
 inputs: {u: {unit: "1"}, go: {type: bool}}
