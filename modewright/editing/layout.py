@@ -118,14 +118,18 @@ def aligned(text: str) -> str:
 
 
 def _column(group: list[tuple[Token, Token]]) -> int:
-    """Return where aligned values start: behind the longest key that was not longer already.
+    """Return where aligned values start: where they do, else behind the longest key of them.
 
-    Values are aligned where two of them start in one column and not for want of blanks.
+    Values are aligned where two of them start in one column and not for want of blanks; a key that
+    reaches beyond that column is left alone.
     """
     columns = [value.start for _, value in group]
     spread = [value.start for colon, value in group if value.start > colon.end + 1]
     limit = max((column for column in spread if columns.count(column) > 1), default=0)
-    return max((colon.end + 1 for colon, _ in group if colon.end < limit), default=0)
+    within = [(colon, value) for colon, value in group if colon.end < limit]
+    if all(value.start == limit for _, value in within):
+        return limit
+    return max((colon.end + 1 for colon, _ in within), default=0)
 
 
 def _groups(page: Page) -> Iterator[list[tuple[Token, Token]]]:

@@ -27,6 +27,15 @@ def test_an_untidy_spec_is_laid_out_by_the_rules() -> None:
     assert formatted(UNTIDY) == TIDY
 
 
+def test_a_column_stays_where_its_author_put_it() -> None:
+    head = "language: 1\nautomaton: a\nparameters:\n"
+    kept = head + "  a:      {value: 1}\n  b_long: {value: 2}\n  c_longer: {value: 3}\n"
+    wide = head + "  a:        {value: 1}\n  b_long:   {value: 2}\n"
+    half = head + "  a:        {value: 1}\n  b:        {value: 2}\n  b_long: {value: 3}\n"
+    assert [formatted(kept), formatted(wide)] == [kept, wide]
+    assert formatted(half) == half.replace(":        {", ":      {")
+
+
 def test_every_spec_here_says_the_same_and_a_second_pass_changes_nothing() -> None:
     for path, document in documents(("spec", "tests/data")):
         text = path.read_text("utf-8-sig")
