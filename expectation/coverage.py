@@ -16,7 +16,7 @@ from expectation.expected import Test
 from expectation.probe import LOOK, probed, reached_array
 from language.hoist import hoisted
 from language.load import lowered
-from language.model import Automaton
+from language.model import CHART, Automaton
 from language.program import Program
 
 STRUCTURE = ("modes", "regions", "transitions")
@@ -62,7 +62,7 @@ class Coverage:
     def missed(self) -> list[str]:
         """Return what was not reached, one line each."""
         lines = [
-            f"mode `{'.'.join(names_of(key))}` was not entered"
+            f"mode `{'.'.join(names_of(key.removeprefix(f'regions.{CHART}.')))}` was not entered"
             for key in self.all_modes
             if key not in self.modes
         ]

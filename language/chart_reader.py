@@ -91,7 +91,8 @@ class ChartReader:
             always = Table({ALWAYS: Entry(ALWAYS, at, Table({}, at))}, at)
             own["modes"] = Entry("modes", at, always)
         if "modes" in own and all(entry.key != CHART for entry in entries):
-            self._region(Entry(CHART, at, Table(own, at)), ROOT, "")
+            table = self.modes.table(Table(own, at), "regions", REGION_KEYS)
+            self._enter(Entry(CHART, at, table), table, ROOT, CHART, CHART, True, "", None)
         entries.sort(key=lambda entry: entry.key != CHART)
         for entry in entries:
             self._region(entry, ROOT, "")
@@ -183,8 +184,8 @@ class ChartReader:
             for entry in self.modes.named(raw.table.get("regions"), f"{key}.regions"):
                 self._region(entry, index, prefix)
         elif raw.kind == "compound":
-            base = "" if key == f"regions.{CHART}" else f"{key}."
-            for entry in self.modes.named(raw.table.get("modes"), f"{key}.modes"):
+            base = f"{key}." if key else ""
+            for entry in self.modes.named(raw.table.get("modes"), f"{base}modes"):
                 inner = f"{base}modes.{entry.key}"
                 table = self.modes.table(entry.node, inner)
                 where = f"{prefix}{entry.key}"

@@ -46,7 +46,7 @@ class ModeReader(Reader):
         beside = tuple(self._region(entry) for entry in entries if entry is not chart)
         if chart is not None:
             return (self._region(chart), *beside)
-        modes = self._modes(self.root.get("modes"), CHART)
+        modes = self._modes(self.root.get("modes"), CHART, "")
         if not modes:
             always = Entry(ALWAYS, at, Table({}, at))
             modes = {ALWAYS: self.mode(always, Site(f"modes.{ALWAYS}", CHART, 0))}
@@ -66,18 +66,18 @@ class ModeReader(Reader):
 
     def _region(self, entry: Entry) -> Region:
         table = self.table(entry.node, f"regions.{entry.key}", REGION_KEYS)
-        modes = self._modes(table.get("modes"), entry.key)
+        modes = self._modes(table.get("modes"), entry.key, f"regions.{entry.key}.")
         if not modes:
             self.problems.error("missing", entry.span, "a region has at least one mode in `modes`")
             self.problems.stop_if_any()
         return Region(entry.key, modes, self._initial(table, modes, entry.span), entry.span)
 
-    def _modes(self, node: Node | None, region: str) -> dict[str, Mode]:
+    def _modes(self, node: Node | None, region: str, base: str) -> dict[str, Mode]:
+        """Return the modes of a region; their key paths begin with `base`."""
         modes: dict[str, Mode] = {}
         for entry in self.named(node, "modes"):
-            key = f"modes.{entry.key}"
-            table = self.like(self.table(entry.node, key))
-            site = Site(key if region == CHART else f"regions.{region}.{key}", region, len(modes))
+            table = self.like(self.table(entry.node, f"modes.{entry.key}"))
+            site = Site(f"{base}modes.{entry.key}", region, len(modes))
             modes[entry.key] = self.mode(Entry(entry.key, entry.span, table), site)
         check_numbers(modes.values(), self.problems)
         return modes

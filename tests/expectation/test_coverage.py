@@ -20,8 +20,9 @@ from language.project import Project
 from language.traversal import walk
 from modewright import tests
 from modewright.cli import app
+from modewright.covered import covered_graph
 from modewright.diagram_svg import SHADES
-from tests.expectation.latching import HEAD, project
+from tests.expectation.latching import AUTOMATON, HEAD, project
 
 ROOT = Path(__file__).parent.parent.parent
 
@@ -158,3 +159,26 @@ def test_a_guard_with_too_many_conditions_is_told(tmp_path: Path) -> None:
     spec.write_text(spec.read_text().replace("level > 1 V", many))
     (found,) = coverage(tests.load_test(str(path), tmp_path))
     assert found.missed() == ["`modes.low.transitions.high.when` is not measured: 11 conditions"]
+
+
+@pytest.mark.parametrize("more", ["", "micro_steps: 2\n"])
+def test_what_stands_in_the_region_chart_has_the_path_of_the_file(
+    tmp_path: Path, more: str
+) -> None:
+    path = project(tmp_path, "any: {always: level < 20 V}")
+    spec = tmp_path / "spec" / "latch.yaml"
+    head, _, rest = AUTOMATON.partition("initial: low\nmodes:")
+    modes, _, outputs = rest.partition("outputs")
+    inner = f"initial: low\nmodes:{modes}".replace("\n", "\n    ").rstrip()
+    spec.write_text(f"{head}{more}regions:\n  chart:\n    {inner}\noutputs{outputs}")
+    path.write_text(path.read_text().replace("5 ms: 2 V, 20 ms: -2 V, 30 ms: 3 V", "5 ms: 0 V"))
+    (found,) = coverage(tests.load_test(str(path), tmp_path))
+    assert found.missed() == [
+        "mode `high` was not entered",
+        "`regions.chart.modes.low.transitions.high` was not taken",
+        "`regions.chart.modes.low.transitions.high.when`: `level > 1 V` was never true",
+        "`regions.chart.modes.high.transitions.low` was not taken",
+        "`regions.chart.modes.high.transitions.low.when` was never read",
+    ]
+    (chart,) = covered_graph(found, tmp_path).regions
+    assert {box.name: box.shade for box in chart.modes} == {"low": "covered", "high": "missed"}
