@@ -18,7 +18,7 @@ from modewright.api import Replayed
 from modewright.doctor import Finding
 
 MOST_EVENTS = 40
-"""Longest table of events shown to a person; all of them are in --json."""
+"""Most transitions shown to a person; all of them are in --json."""
 
 
 def print_json(value: Mapping[str, Any]) -> None:
@@ -27,23 +27,31 @@ def print_json(value: Mapping[str, Any]) -> None:
 
 
 def events_table(events: Sequence[Event]) -> Table:
-    """Return a table of transitions; of many the first ones and the last ones."""
+    """Return a table of transitions; of many the middle is left out."""
     table = Table(
         escape("time [s]"), "automaton", "transition", "from", "to",
         box=None, pad_edge=False, header_style="bold",
     )  # fmt: skip
-    left_out = max(0, len(events) - MOST_EVENTS)
-    begun = MOST_EVENTS // 2 if left_out else len(events)
-    for number, event in enumerate(events):
-        if begun <= number < begun + left_out:
-            if number == begun:
-                table.add_row("...", f"{left_out} more", "", "", "")
-            continue
-        change = (event.source, event.target or escape("[]"))
+    kept = sorted(_kept(events))
+    for number, before in zip(kept, [-1, *kept], strict=False):
+        if number > before + 1:
+            table.add_row("...", f"{number - before - 1} more", "", "", "")
+        event = events[number]
+        change = (event.source, event.target)
         if event.kind != "transition":
             change = (event.source, escape(event.message))
         table.add_row(f"{event.time:.9f}", event.instance, event.transition, *change)
     return table
+
+
+def _kept(events: Sequence[Event]) -> set[int]:
+    """Return which events are shown: of many the first, the last, and what is no transition."""
+    numbers = range(len(events))
+    if len(events) <= MOST_EVENTS:
+        return set(numbers)
+    others = [number for number in numbers if events[number].kind != "transition"]
+    half = MOST_EVENTS // 2
+    return {*numbers[:half], *numbers[-half:], *others[:MOST_EVENTS]}
 
 
 def verdict_table(verdicts: Iterable[Verdict]) -> Table:

@@ -43,3 +43,15 @@ def test_a_long_table_has_its_first_and_its_last_events_and_says_what_is_between
     shown = [float(line.split()[0]) for line in lines[1:]]
     assert shown == [*range(half), *range(half + 2, MOST_EVENTS + 2)]
     assert len(printed([event(float(i)) for i in range(MOST_EVENTS)])) == MOST_EVENTS + 1
+
+
+def test_what_is_no_transition_is_shown_in_the_middle_of_a_long_table() -> None:
+    events = [event(float(i)) for i in range(MOST_EVENTS + 5)]
+    events[MOST_EVENTS // 2 + 1] = event(MOST_EVENTS // 2 + 1.0, "range")
+    rows = [line.split()[:3] for line in printed(events)[MOST_EVENTS // 2 + 1 :][:4]]
+    assert rows == [
+        ["...", "1", "more"],
+        ["21.000000000", "keeper", "trip"],
+        ["...", "3", "more"],
+        ["25.000000000", "keeper", "trip"],
+    ]
