@@ -74,7 +74,8 @@ class Observed:
         exact = [
             one.time
             for one in self.events
-            if (one.instance, one.target) == (event.instance, names[1])
+            if one.instance == event.instance
+            and names[1] in one.target.split(", ")
             and (is_tree or one.region == event.region)
             and names[0] in ("", one.source)
         ]

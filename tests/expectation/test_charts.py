@@ -12,6 +12,7 @@ from pathlib import Path
 from engine.simulate import simulate
 from expectation.coverage import coverage, probed_programs
 from expectation.expected import Test
+from expectation.judging import judged
 from language.operation import Store
 from language.traversal import walk
 from modewright import tests
@@ -175,9 +176,9 @@ expect:
 """
 
 
-def briefly(folder: Path, more: str = "") -> Test:
+def briefly(folder: Path, more: str = "", spec: str = BRIEF) -> Test:
     (folder / "spec").mkdir()
-    (folder / "spec" / "brief.yaml").write_text(BRIEF)
+    (folder / "spec" / "brief.yaml").write_text(spec)
     path = folder / "spec" / "test_briefly.yaml"
     path.write_text(BRIEF_TEST + more)
     return tests.load_test(str(path), folder)
@@ -200,3 +201,15 @@ def test_a_transition_to_nothing_enters_nothing(tmp_path: Path) -> None:
     assert (run.difference, len(run.outcomes)) == ("", 3)
     events = simulate(run.test.system, run.test.scenario).events[-3:]
     assert [(each.source, each.target) for each in events] == [("op.left.last", "")] * 3
+
+
+def test_a_transition_with_several_targets_enters_each_of_them(tmp_path: Path) -> None:
+    """`first` and `waits` are left in the tick of their entry, at 0."""
+    more = """\
+  one:   {event: op.left.first, at: 0 s}
+  other: {event: op.right.waits, count: 1}
+"""
+    test = briefly(
+        tmp_path, more, BRIEF.replace("op.left.first,", "[op.left.first, op.right.waits],")
+    )
+    assert [each.message for each in judged(test, simulate(test.system, test.scenario))] == [""] * 3
