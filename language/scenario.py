@@ -173,6 +173,12 @@ class _ScenarioReader(StimulusReader):
             self.problems.error("dimension", tree.span, label)
         return value
 
+    def _periods(self, name: str) -> set[Fraction]:
+        """Return the periods [s] of the sampled automata that read an input."""
+        readers = (c.target[0] for c in self.system.connections.values() if name in c.reads)
+        periods = (self.system.instances[reader].automaton.period for reader in readers)
+        return {period for period in periods if period is not None}
+
     def _inputs(self, tree: Table, at: Span) -> dict[str, Stimulus]:
         known = self.system.inputs
         found = self._recorded()
@@ -185,7 +191,7 @@ class _ScenarioReader(StimulusReader):
                 label = f"input `{entry.key}` is given by the recording, too"
                 self.problems.error("duplicate", entry.span, label)
             thing = known[entry.key]
-            found[entry.key] = self.stimulus(entry, thing)
+            found[entry.key] = self.stimulus(entry, thing, self._periods(entry.key))
         for name, thing in known.items():
             if name not in found and thing.default is not None:
                 found[name] = Stimulus((Piece(Fraction(0), thing.default),), truth=thing.truth)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from fractions import Fraction
 
 from language.declaration import Formula
@@ -30,7 +30,7 @@ from language.syntax import (
 )
 from language.units import NO_UNIT, SECOND, Unit, fits, parse_unit
 
-FORMS = ("steps", "ramp", "chirp", "table")
+FORMS = ("steps", "ramp", "chirp", "table", "pulses")
 INPUT_KEYS = ("start", *FORMS, "hold")
 JUMPING = (Choice, Relation, Logic, Not, Truth)
 TIME = Unit("s", Fraction(1), SECOND)
@@ -55,19 +55,24 @@ def held(points: Sequence[Point]) -> tuple[Piece, ...]:
 class StimulusReader(Reader):
     """The forms of an input in a scenario, one method each."""
 
-    def stimulus(self, entry: Entry, of: SystemInput) -> Stimulus:
-        """Return the stimulus of an input of a system."""
+    def stimulus(
+        self, entry: Entry, of: SystemInput, periods: Collection[Fraction] = ()
+    ) -> Stimulus:
+        """Return the stimulus of an input that automata of some periods [s] read."""
         unit, truth = of.unit, of.truth
         if isinstance(entry.node, Scalar):
             return Stimulus((self._piece(entry.key, entry.node, of),), truth=truth)
         table = self.table(entry.node, f"inputs.{entry.key}", INPUT_KEYS)
         forms = [key for key in FORMS if table.get(key) is not None]
+        if forms == ["pulses"]:
+            return Stimulus(tuple(self._pulses(entry, table, of, periods)), truth=truth)
         if len(forms) > 1 or (of.type != "real" and forms not in ([], ["steps"])):
             other = table.entries[forms[-1]]
             label = f"`{forms[0]}` and `{forms[-1]}` exclude each other"
             if of.type != "real":
                 what = "true or false" if truth else "a whole number or a name"
-                label = f"an input that is {what} has a value or `steps`"
+                pulses = ", or `pulses`" if truth else ""
+                label = f"an input that is {what} has a value or `steps`{pulses}"
             self.problems.error("form", other.span, label)
             return Stimulus((Piece(Fraction(0), Fraction(0)),), truth=truth)
         if forms == ["table"]:
@@ -127,6 +132,32 @@ class StimulusReader(Reader):
             if found and time <= found[-1].start:
                 self.problems.error("order", step.span, "steps are in the order of time")
             found.append(Piece(time, value))
+        return found
+
+    def _pulses(
+        self, entry: Entry, table: Table, of: SystemInput, periods: Collection[Fraction]
+    ) -> list[Piece]:
+        """Return what is true for one period of its reader from each time on: for one tick."""
+        found = [Piece(Fraction(0), Fraction(0))]
+        node = table.entries["pulses"]
+        if not of.truth or len({*periods}) != 1:
+            label = "`pulses` are of an input that is true or false, read by sampled automata of "
+            self.problems.error(
+                "form", node.span, f"{label}one period", "`steps` give any values at any times"
+            )
+            return found
+        if "start" in table.entries:
+            label = "`pulses` have no `start`: before and after each the input is false"
+            self.problems.error("form", table.entries["start"].span, label)
+        (period,) = {*periods}
+        for item in self.items(node.node, "pulses"):
+            time = self.time(item, "the time of a pulse", item.span)
+            if time < found[-1].start:
+                label = "pulses are in the order of time, a period apart"
+                self.problems.error("order", item.span, label)
+            if len(found) > 1 and time == found[-1].start:
+                found.pop()
+            found += [Piece(time, Fraction(1)), Piece(time + period, Fraction(0))]
         return found
 
     def _table(self, entry: Entry, table: Table, unit: Unit) -> tuple[Piece, ...]:
