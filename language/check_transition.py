@@ -5,7 +5,7 @@ that are nearer to each other than a period. Warnings: nothing of it is ambiguou
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from fractions import Fraction
 
@@ -117,6 +117,7 @@ class _Guards:
         self.inquiry = inquiry
         self.moment = Moment(automaton, mode)
         self.known: dict[str, Expr | None] = {}
+        self.waits: dict[str, Fraction] = {}
         for transition in mode.transitions:
             self.of(transition)
 
@@ -127,6 +128,12 @@ class _Guards:
             with suppress(KeyError, SpecError):
                 self.known[transition.key] = self._guard(transition)
         return self.known[transition.key]
+
+    def held(self, transition: Transition) -> Fraction:
+        """Return how long a guard has to hold: whole ticks of a sampled automaton, else [s]."""
+        if transition.key not in self.waits:
+            self.waits[transition.key] = _held(self.automaton, transition)
+        return self.waits[transition.key]
 
     def _guard(self, transition: Transition) -> Expr | None:
         automaton, source = self.automaton, self.automaton.source(transition)
@@ -149,10 +156,10 @@ class _Guards:
     def is_first_inside(self, transition: Transition, problems: Problems) -> bool:
         """Warn of a superstate's transition before which one inside always fires."""
         found = list(inside_first(self.automaton, self.mode))
-        held = _held(self.automaton, transition)
+        held = self.held(transition)
         for leaf, ways in found:
             inside = _Guards(self.automaton, leaf, self.inquiry)
-            first = [way for way in ways if not _held(self.automaton, way)]
+            first = [way for way in ways if not self.held(way)]
             first = [way for way in first if comes_along(self.automaton, way, transition)]
             others = [_not(guard) for guard in map(inside.of, first) if guard is not None]
             if not others or not inside.together_never(inside.of(transition), *others):
@@ -165,7 +172,7 @@ class _Guards:
 
         Where that is not so it is neither dead nor shadowed: one question for most transitions.
         """
-        held = _held(self.automaton, transition)
+        held = self.held(transition)
         others = (_not(self.of(way)) for way in self._first(transition))
         return self.together_never(self.of(transition), *self._lasted(held), *others)
 
@@ -182,16 +189,16 @@ class _Guards:
         guard = self.of(transition)
         if guard is None:
             return False
-        before = winners(self.automaton, self.mode, transition)
-        wait = _held(self.automaton, transition)
+        before = {way.key for way in winners(self.automaton, self.mode, transition)}
+        wait = self.held(transition)
         first = self._first(transition)
-        at_once = [way for way in first if way in before and not _held(self.automaton, way)]
+        at_once = [way for way in first if way.key in before and not self.held(way)]
         lasted = self._lasted(wait)
         for way in first:
-            own = self._lasted(wait - _held(self.automaton, way)) if way in before else ()
+            own = self._lasted(wait - self.held(way)) if way.key in before else ()
             if self.together_never(guard, *own, _not(self.of(way))):
                 what, hint = f"`{way.name}` fires", BY_PRIORITY
-                if way not in self.mode.transitions:
+                if way.source != transition.source:
                     what, hint = (
                         f"`{way.name}` of `{way.source}`, which is around it, fires",
                         BY_ORDER,
@@ -206,17 +213,19 @@ class _Guards:
 
     def _first(self, transition: Transition) -> list[Transition]:
         """Return the transitions that fire first wherever both guards hold from one time on."""
-        wait = _held(self.automaton, transition)
-        before = winners(self.automaton, self.mode, transition)
+        wait = self.held(transition)
+        before = {way.key: way for way in winners(self.automaton, self.mode, transition)}
         own = self.mode.transitions
-        ways = [way for way in own if comes_along(self.automaton, way, transition)]
-        ways += [way for way in before if way not in ways]
+        along = {way.key: way for way in own if comes_along(self.automaton, way, transition)}
+        ways = {**along, **before}.values()
         return [way for way in ways if self.of(way) is not None and self._wins(way, before, wait)]
 
-    def _wins(self, way: Transition, before: list[Transition], wait: Fraction) -> bool:
-        own = _held(self.automaton, way)
+    def _wins(self, way: Transition, before: Mapping[str, Transition], wait: Fraction) -> bool:
+        own = self.held(way)
+        if not wait:
+            return not own and way.key in before
         leaves = bool(way.targets) and not way.internal
-        return (leaves and own < wait) or (own == wait and way in before)
+        return (leaves and own < wait) or (own == wait and way.key in before)
 
     def _lasted(self, wait: Fraction) -> tuple[Expr, ...]:
         """Return that the mode has been active for a wait, where its age matters."""
@@ -263,8 +272,10 @@ def _held(automaton: Automaton, transition: Transition) -> Fraction:
 
 
 def _pairs(mode: Mode) -> Iterator[tuple[Transition, Transition]]:
-    for position, later in enumerate(mode.transitions):
-        for earlier in mode.transitions[:position]:
+    """Yield each two transitions of a mode that wait."""
+    waiting = [way for way in mode.transitions if way.wait]
+    for position, later in enumerate(waiting):
+        for earlier in waiting[:position]:
             yield earlier, later
 
 

@@ -14,7 +14,7 @@ from fractions import Fraction
 
 from language.action import place_of
 from language.activity import is_active
-from language.chart import Chart
+from language.chart import Chart, Node
 from language.chart_target import mode_paths
 from language.constants import exact_value
 from language.declaration import Formula
@@ -23,6 +23,7 @@ from language.lower import WHOLE_TYPES, assigned, expression
 from language.memory import ticks_of, type_of
 from language.model import Automaton, Mode, Transition
 from language.number import rounded
+from language.once import once
 from language.operation import Binary, Compare, Expr, Ref, Select, Unary, Value, whole
 from language.parameter import constant_names
 from language.program import mode_variable
@@ -141,10 +142,8 @@ class Moment:
             name = mode_variable("mode", region.name)
             self.story.extents[name] = Extent("whole", numbers=tuple(numbers))
         found: dict[str, Expr] = {}
-        for path, node in mode_paths(chart).items():
-            found[f"in {path}"] = (
-                Value(True) if node.holds(own.index) else is_active(chart, node, "mode")
-            )
+        for path, (node, active) in _active(chart).items():
+            found[f"in {path}"] = Value(True) if node.holds(own.index) else active
         return found
 
     def _define(self, trees: Iterable[Tree]) -> None:
@@ -250,6 +249,13 @@ class Moment:
             return Extent()
         low, high = (Fraction(rounded(bound, self.automaton.numbers)) for bound in thing.range)
         return Extent(low=low, high=high)
+
+
+@once
+def _active(chart: Chart) -> dict[str, tuple[Node, Expr]]:
+    """Return the modes of a chart by their paths, with whether each is active."""
+    paths = mode_paths(chart).items()
+    return {path: (node, is_active(chart, node, "mode")) for path, node in paths}
 
 
 def _time_of(automaton: Automaton, part: Application) -> Fraction:

@@ -47,8 +47,9 @@ def inside_first(automaton: Automaton, mode: Mode) -> Iterator[tuple[Mode, list[
 
 def comes_along(automaton: Automaton, way: Transition, other: Transition) -> bool:
     """Tell whether a transition may be taken in every micro-step in which another may."""
-    awaited = {*other.events} & events_that_come(automaton)
-    return not way.events or (bool(other.events) and awaited <= {*way.events})
+    if not way.events or not other.events:
+        return not way.events
+    return {*other.events} & events_that_come(automaton) <= {*way.events}
 
 
 @once
