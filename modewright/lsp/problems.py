@@ -22,9 +22,16 @@ START = types.Range(types.Position(0, 0), types.Position(0, 0))
 def diagnostics(world: World, path: Path) -> list[types.Diagnostic]:
     """Return the problems of a file without what takes long to prove.
 
-    One that lies in another file is told at the start of this.
+    One that lies in another file is told at the start of this; so is a defect of ours, with which
+    the other files are checked nevertheless.
     """
-    return told(errors_first(str(path), world.root, dict(world.texts)), path, world.encoding)
+    try:
+        found = errors_first(str(path), world.root, dict(world.texts))
+    except Exception as defect:
+        message = f"a defect of modewright: {type(defect).__name__}: {defect}\n"
+        message += f"help: `modewright check {path.stem}` writes a report"
+        return [types.Diagnostic(START, message, SEVERITIES["error"], source=SOURCE)]
+    return told(found, path, world.encoding)
 
 
 def told(found: Checked, path: Path, encoding: str) -> list[types.Diagnostic]:

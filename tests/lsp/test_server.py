@@ -9,6 +9,7 @@ import pytest
 from lsprotocol import types
 
 from language.problem import Source, Span
+from modewright.lsp import problems
 from modewright.lsp.completion import complete
 from modewright.lsp.hover import hover as hover_at
 from modewright.lsp.positions import column_of, range_of
@@ -42,6 +43,15 @@ def test_what_a_help_names_is_written_at_a_key_press(talk: Talk, heater: Path) -
 def test_a_text_that_is_no_yaml_is_told_of(talk: Talk, heater: Path) -> None:
     (told,) = talk.change(heater, HEATER + "regions: {a: [\n")
     assert "this is not YAML" in told["message"]
+
+
+def test_a_defect_of_ours_is_told_in_the_file_that_shows_it(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(problems, "errors_first", lambda *_: 1 // 0)
+    (told,) = problems.diagnostics(World(tmp_path, "utf-16"), tmp_path / "heater.yaml")
+    assert told.message.startswith("a defect of modewright: ZeroDivisionError")
+    assert told.severity == types.DiagnosticSeverity.Error
 
 
 def test_what_has_to_be_proven_follows_and_stays_while_its_line_stays(
