@@ -9,7 +9,6 @@ from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from fractions import Fraction
 
-from language.activity import is_complete
 from language.constants import exact_value
 from language.declaration import Formula
 from language.inquiry import Inquiry
@@ -21,7 +20,6 @@ from language.precedence import (
     events_that_come,
     inside_first,
     means_the_same,
-    node_of,
     winners,
 )
 from language.problem import Problems, Span, SpecError
@@ -136,15 +134,12 @@ class _Guards:
         return self.waits[transition.key]
 
     def _guard(self, transition: Transition) -> Expr | None:
-        automaton, source = self.automaton, self.automaton.source(transition)
-        node = node_of(automaton, source)
-        if transition.completes and automaton.tree and node:
-            return is_complete(automaton.tree, node, "mode")
+        source = self.automaton.source(transition)
         if source.key == self.mode.key:
-            return self.moment.expression(transition.when.tree)
+            return self.moment.guard(transition)
         if not means_the_same(transition):
             return None
-        return self.moment.seen_by(source).expression(transition.when.tree)
+        return self.moment.seen_by(source).guard(transition)
 
     def together_never(self, *conditions: Expr | None) -> bool:
         """Tell whether conditions never hold together, whatever the tunables are."""

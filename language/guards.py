@@ -78,7 +78,7 @@ def _together(
     """Return the question whether two guards can hold together; None where they have no form."""
     moment = Moment(automaton, mode)
     try:
-        guards = [moment.expression(way.when.tree) for way in (earlier, later)]
+        guards = [moment.guard(way) for way in (earlier, later)]
     except (KeyError, SpecError):
         return None
     return inquiry.question(moment.story, guards)

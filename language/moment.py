@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
 from language.action import place_of
-from language.activity import is_active
+from language.activity import is_active, is_complete
 from language.chart import Chart, Node
 from language.chart_target import mode_paths
 from language.constants import exact_value
@@ -26,6 +26,7 @@ from language.number import rounded
 from language.once import once
 from language.operation import Binary, Compare, Expr, Ref, Select, Unary, Value, whole
 from language.parameter import constant_names
+from language.precedence import node_of
 from language.program import mode_variable
 from language.question import Extent, Step
 from language.syntax import EDGES, MEMORY, Application, Tree, memory_key, walk
@@ -73,6 +74,14 @@ class Moment:
         """Return an expression of this moment. Raises KeyError where a name is not known here."""
         self._define([tree])
         return expression(tree, self.known)
+
+    def guard(self, transition: Transition) -> Expr:
+        """Return when a transition is enabled, events aside: where it completes, by the modes."""
+        chart = self.automaton.tree
+        node = node_of(self.automaton, self.automaton.source(transition))
+        if transition.completes and chart and node:
+            return is_complete(chart, node, "mode")
+        return self.expression(transition.when.tree)
 
     def seen_by(self, outer: Mode) -> Moment:
         """Return this moment as a mode around ours has it: it is active for as long, or longer."""

@@ -53,3 +53,31 @@ def test_a_mode_is_not_active_for_longer_than_one_around_it(
     path.write_text(HEAD.format(order=order, outer=outer, inner=inner, back=back))
     found = {problem.kind for problem in mw.check(str(path))}
     assert found - {"unused", "stuck"} == expected
+
+
+ENDING = """language: 1
+automaton: ending
+period: 10 ms
+numbers: float64
+inputs: {{w: {{type: bool}}, v: {{type: bool}}}}
+initial: both
+modes:
+  both:
+    transitions: {{done: {{}}, idle: {{when: {guard}}}}}
+    initial: begin
+    modes: {{begin: {{transitions: {{end: {{when: w}}}}}}, end: {{final: true}}}}
+  done: {{transitions: {{both: {{when: w}}}}}}
+  idle: {{transitions: {{both: {{when: w}}}}}}
+outputs: [mode]
+"""
+
+
+@pytest.mark.parametrize(
+    ("guard", "expected"), [("not in(both.end) and v", set()), ("v", {"priority"})]
+)
+def test_a_completion_is_enabled_in_final_modes_alone(
+    guard: str, expected: set[str], tmp_path: Path
+) -> None:
+    path = tmp_path / "ending.yaml"
+    path.write_text(ENDING.format(guard=guard))
+    assert {problem.kind for problem in mw.check(str(path))} == expected
