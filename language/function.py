@@ -11,6 +11,7 @@ from language.kind import Whole
 from language.problem import nearest
 from language.syntax import MEMORY, Application, Name, Tree, children, is_zero, whole_literal
 from language.units import NUMBER, Dimension, root
+from language.whole import range_of
 
 if TYPE_CHECKING:
     from language.dimension import DimensionCheck
@@ -73,19 +74,7 @@ def _whole(check: DimensionCheck, tree: Application, given: Sequence[Kind | None
     for argument, kind in zip(tree.arguments, given, strict=True):
         value = whole_literal(argument) or 0
         ranges.append(kind if isinstance(kind, Whole) else Whole(value, value))
-    first = ranges[0]
-    match tree.function:
-        case "abs":
-            low = max(first.low, -first.high, 0)
-            return Whole(low, max(abs(first.low), abs(first.high)))
-        case "min":
-            return Whole(min(r.low for r in ranges), min(r.high for r in ranges))
-        case "max":
-            return Whole(max(r.low for r in ranges), max(r.high for r in ranges))
-        case _:
-            _, bottom, top = ranges
-            low = min(max(first.low, bottom.low), top.low)
-            return Whole(low, max(bottom.high, min(first.high, top.high)))
+    return range_of(tree.function, ranges)
 
 
 def _layers(tree: Tree) -> int:

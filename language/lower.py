@@ -50,6 +50,7 @@ from language.syntax import (
     names,
     whole_literal,
 )
+from language.whole import of_wholes
 
 WHOLE_TYPES = ("int", "enum")
 Names = Mapping[str, Expr]
@@ -115,7 +116,7 @@ def _application(tree: Application, known: Names) -> Expr:
         case Application(function, arguments, _):
             wholes = _wholes_of(arguments, known) if function in SAME else None
             if wholes:
-                return _of_wholes(function, wholes)
+                return of_wholes(function, wholes)
             return Call(function, tuple(_real(part, known) for part in arguments))
 
 
@@ -126,23 +127,6 @@ def _wholes_of(arguments: Sequence[Tree], known: Names) -> list[Expr] | None:
         return None
     pairs = zip(arguments, made, strict=True)
     return [expr if whole else Value(whole_literal(tree) or 0) for tree, (expr, whole) in pairs]
-
-
-def _of_wholes(function: str, parts: Sequence[Expr]) -> Expr:
-    """Return `abs`, `min`, `max` or `clip` of whole numbers; the order is that of the reals."""
-    first = parts[0]
-    match function:
-        case "abs":
-            return Select(Compare("<", first, Value(0)), Unary("-", first), first)
-        case "min":
-            return Select(Compare("<", parts[1], first), parts[1], first)
-        case "max":
-            return Select(Compare(">", parts[1], first), parts[1], first)
-        case _:
-            _, low, high = parts
-            return Select(
-                Compare(">", first, low), Select(Compare("<", first, high), first, high), low
-            )
 
 
 def assigned(tree: Tree, known: Names, whole: bool) -> Expr:
