@@ -13,6 +13,7 @@ from diagnosis.layers import DRIFT, Layer
 from diagnosis.level import FIRST_LEVELS, units_of
 from diagnosis.point import point_of
 from diagnosis.prediction import Noises
+from diagnosis.series import Series
 
 SMALL_LEVEL = FIRST_LEVELS[0]
 """What all drifts have while one of them is let free."""
@@ -21,19 +22,20 @@ WIDE_LEVELS = (1.0, 100.0, 1000.0)
 """Levels from which parameters are fitted: a sensor's error is easily a hundred times its noise."""
 NEAR_LEVELS = (3.0, 30.0, 300.0)
 """Levels that are looked at beside, when the parameters are fitted."""
+ALL_LEVELS = tuple(sorted((START_LEVEL, *WIDE_LEVELS, *NEAR_LEVELS)))
 ROUNDS = 3
 """Rounds in which the parameters are fitted to a freedom: what they have to do is little."""
 
 
 def freed(bench: Bench, base: Estimate, layer: Layer | None = None) -> Estimate:
-    """Return the base with one drift free, its parameters fitted anew; with none, all small.
+    """Return a model with one drift free, its parameters fitted anew; with none, all small.
 
-    They start where the base is, and where they are declared: a base that lacks something may
+    They start where the model is, and where they are declared: a base that lacks something may
     have been led far astray.
     """
     known = layer is None or any(layer.id == other.id for other in bench.drifts)
     drifts = bench.drifts if known or layer is None else (*bench.drifts, layer)
-    candidate = bench.candidate((), drifts)
+    candidate = bench.candidate(base.candidate.layers, drifts)
     make = partial(_freed, bench, base, candidate, layer)
     given = [base.values(0), base.noises, layer and layer.id]
     return bench.kept("freed", candidate, given, make)
@@ -49,15 +51,15 @@ def _freed(bench: Bench, base: Estimate, candidate: Candidate, layer: Layer | No
     for start in (base.values(0), {}):
         point = point_of(candidate, len(bench.series), start)
         now = looked_at(candidate, bench.series, noises, point)
-        found.append(_scanned(now, bench, units, name, WIDE_LEVELS))
+        found.append(scanned(now, bench.series, units, name, WIDE_LEVELS))
     now = min(found, key=lambda one: one.cost)
     now = estimated(candidate, bench.series, now.noises, now.point, ROUNDS)
-    return _scanned(now, bench, units, name, NEAR_LEVELS)
+    return scanned(now, bench.series, units, name, NEAR_LEVELS)
 
 
-def _scanned(
+def scanned(
     now: Estimate,
-    bench: Bench,
+    series: Sequence[Series],
     units: Mapping[str, float],
     name: str | None,
     levels: Sequence[float],
@@ -68,7 +70,7 @@ def _scanned(
     best = now
     for level in levels:
         noises = with_levels(now.noises, units, {name: level})
-        tried = looked_at(now.candidate, bench.series, noises, now.point)
+        tried = looked_at(now.candidate, series, noises, now.point)
         best = tried if tried.cost < best.cost else best
     return best
 

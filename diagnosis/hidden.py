@@ -8,19 +8,24 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.bench import Bench
-from diagnosis.estimation import Estimate, estimated, with_normal
-from diagnosis.evidence import evidence, inflation
-from diagnosis.freedom import SMALL_LEVEL, freed, with_levels
+from diagnosis.estimation import Estimate, estimated, looked_at, with_normal
+from diagnosis.evidence import Evidence, evidence, inflation
+from diagnosis.freedom import ALL_LEVELS, SMALL_LEVEL, freed, scanned, with_levels
 from diagnosis.layers import Layer, fitting
 from diagnosis.level import units_of
-from diagnosis.locus import Locus, drifts_of
+from diagnosis.locus import Locus, Unknown, over_time, told
+from diagnosis.noise import MAD
+from diagnosis.point import point_of
 from diagnosis.search import Tell, Tried
 from diagnosis.selection import Selection, counted
+from diagnosis.silence import from_silence
+from diagnosis.threshold import USUAL
 
 Reals = NDArray[np.float64]
 MOST = 0.8
@@ -29,10 +34,25 @@ SHORT = 0.22
 """Part of all samples that these are at most, of what acts in windows."""
 KNOWN = 0.8
 """Correlation with something known from which on an input is not hidden: it follows that."""
+NEAR = 0.9
+"""Part of what the best place gains that another one gains nearly the same with."""
 LITTLE = 0.5
 """Part of what it gains that effects explain less of, if it is to stand for them."""
 ROUNDS = 5
 """Rounds in which what was accepted is fitted without drifts."""
+
+
+@dataclass(frozen=True)
+class _Hidden:
+    """An input that acts in windows at a place: a model in which it is free beside `effects`, and
+    what it `gained` [nats] over these.
+    """
+
+    locus: Locus
+    model: Estimate
+    effects: tuple[Tried, ...]
+    gained: float
+    evidence: Evidence
 
 
 def with_hidden(
@@ -41,35 +61,104 @@ def with_hidden(
     loci: Sequence[Locus],
     needed: float,
     tell: Tell = lambda text: None,
-) -> Selection:
-    """Return a selection in which a hidden input stands for effects that explain less than it.
+) -> tuple[Selection, tuple[Locus, ...]]:
+    """Return a selection with a hidden input, and the places with what it does over time.
 
-    Gains are those over the base without drifts, of which the base as it is may have taken its
-    part. `needed` are the nats that it must gain at least.
+    It stands for effects that explain less than it, and beside those that explain more. Gains are
+    those over a model without drifts, of which the one as it is may have taken its part. `needed`
+    are the nats that it must gain at least.
+    """
+    found = _found(bench, selection, loci, needed)
+    if found is None or counted(found.evidence) < needed:
+        return selection, tuple(loci)
+    layer, quiet = _inputs(bench)[found.locus.path], freed(bench, selection.base)
+    tell(f"accepted {layer.id}: {counted(found.evidence):.0f} nats, silent most of the time")
+    place = _from_silence(bench, found.locus, found.model)
+    assert place.free is not None
+    model = with_normal(place.free, bench.series)
+    others = (one for one in loci if one.path != place.path)
+    hidden = Tried(layer, found.gained, model, found.evidence)
+    selection = dataclasses.replace(
+        selection,
+        base=quiet,
+        model=model,
+        accepted=(hidden, *found.effects),
+        first_round=(hidden, *selection.first_round),
+        rivals=(),
+    )
+    return selection, (place, *others)
+
+
+def _found(
+    bench: Bench, selection: Selection, loci: Sequence[Locus], needed: float
+) -> _Hidden | None:
+    """Return what acts in windows at one of the places that gain much.
+
+    One that is silent most of the time is the simpler of two that gain nearly the same. Where none
+    is, effects may be what is heard there all the time: then beside these.
     """
     shrink = 1.0 / inflation(selection.base, bench.series)
     known = _inputs(bench)
     loud = [one for one in loci if one.path in known and shrink * one.gain > needed]
-    if not loud or any(abs(r) > KNOWN for _, r in loud[0].along):
-        return selection
-    locus, layer = loud[0], known[loud[0].path]
+    near = [one for one in loud if one.gain > NEAR * loud[0].gain]
+    for locus in near:
+        found = over_time(bench, locus)
+        if _is_hidden(found):
+            return _alone(bench, selection, found) or _beside(bench, selection, found)
+    for locus in near if selection.accepted else ():
+        if _is_heard(bench, selection.model, locus.drift, needed):
+            beside = _beside(bench, selection, locus)
+            if _is_hidden(beside.locus):
+                return beside
+    return None
+
+
+def _is_hidden(locus: Locus) -> bool:
+    """Tell whether what is unknown at a place acts in windows, along with nothing known."""
+    follows = any(abs(r) > KNOWN for _, r in locus.along)
+    return not follows and acts_in_windows([one.values for one in locus.unknown])
+
+
+def _is_heard(bench: Bench, model: Estimate, name: str, needed: float) -> bool:
+    """Tell whether a drift may gain enough beside a model, whose parameters stay where they are."""
+    units = units_of(model.candidate, bench.series, model.noises, model.values(0))
+    small = with_levels(model.noises, units, dict.fromkeys(units, SMALL_LEVEL))
+    without = looked_at(model.candidate, bench.series, small, model.point)
+    free = scanned(without, bench.series, units, name, ALL_LEVELS)
+    return (without.cost - free.cost) / inflation(model, bench.series) > needed
+
+
+def _alone(bench: Bench, selection: Selection, locus: Locus) -> _Hidden | None:
+    """Return a hidden input that explains much more than what was accepted."""
     assert locus.free is not None, "a locus with a gain was let free"
-    if not acts_in_windows(drifts_of(bench.series, locus.free, locus.drift)):
-        return selection
     quiet, model = freed(bench, selection.base), with_normal(locus.free, bench.series)
+    gained = quiet.cost - model.cost
     if selection.accepted:
         without = _quieted(bench, selection.model)
-        if quiet.cost - without.cost > LITTLE * (quiet.cost - model.cost):
-            return selection
-    gained = evidence(model, quiet, bench.series)
-    if counted(gained) < needed:
-        return selection
-    tell(f"accepted {layer.id}: {counted(gained):.0f} nats, silent most of the time")
-    found = Tried(layer, quiet.cost - model.cost, model, gained)
-    first = (found, *selection.first_round)
-    return dataclasses.replace(
-        selection, base=quiet, model=model, accepted=(found,), first_round=first, rivals=()
-    )
+        if quiet.cost - without.cost > LITTLE * gained:
+            return None
+    return _Hidden(locus, model, (), gained, evidence(model, quiet, bench.series))
+
+
+def _beside(bench: Bench, selection: Selection, locus: Locus) -> _Hidden:
+    """Return a hidden input beside what was accepted, but for what it makes needless."""
+    drift = next(one for one in bench.drifts if one.place == locus.place)
+    without = _quieted(bench, selection.model)
+    model = freed(bench, selection.model, drift)
+    gained = evidence(model, without, bench.series)
+    effects = selection.accepted
+    for tried in selection.accepted:
+        rest = tuple(one for one in effects if one is not tried)
+        candidate = bench.possible([one.layer for one in rest])
+        if candidate is None:
+            continue
+        start = point_of(candidate, len(bench.series), model.values(0))
+        fewer = freed(bench, looked_at(candidate, bench.series, without.noises, start), drift)
+        if evidence(model, fewer, bench.series).least <= USUAL:
+            effects, model = rest, fewer
+    if not locus.unknown or not _is_hidden(locus):
+        locus = over_time(bench, dataclasses.replace(locus, free=model, unknown=()))
+    return _Hidden(locus, model, effects, without.cost - model.cost, gained)
 
 
 def _quieted(bench: Bench, model: Estimate) -> Estimate:
@@ -79,12 +168,38 @@ def _quieted(bench: Bench, model: Estimate) -> Estimate:
     return estimated(model.candidate, bench.series, noises, model.point, ROUNDS)
 
 
+def _from_silence(bench: Bench, locus: Locus, free: Estimate) -> Locus:
+    """Return a place with a model in which it is `free`, its parameters from where it is silent.
+
+    First from where it is not among what is loudest, then from where it is nothing for sure, if
+    all is foreseen better so. What it shows in silence is its error, and no standard deviation is
+    less than that.
+    """
+    least = _loudest([one.values for one in locus.unknown])
+    silent = [np.abs(one.values) < least for one in locus.unknown]
+    free = from_silence(free, bench.series, [~one for one in silent], locus.drift)
+    locus = over_time(bench, dataclasses.replace(locus, free=free, unknown=()))
+    again = from_silence(free, bench.series, [one.sure for one in locus.unknown], locus.drift)
+    if again.cost < free.cost:
+        locus = over_time(bench, dataclasses.replace(locus, free=again, unknown=()))
+    pairs = zip(locus.unknown, silent, strict=True)
+    ratios = np.concatenate([np.abs(one.values / one.stds)[rows] for one, rows in pairs])
+    scale = max(1.0, MAD * float(np.median(ratios)))
+    wider = (Unknown(one.values, scale * one.stds) for one in locus.unknown)
+    return told(bench, locus, tuple(wider))
+
+
 def acts_in_windows(drifts: Sequence[Reals]) -> bool:
     """Tell whether a drift is silent most of the time."""
-    squares = np.concatenate(drifts) ** 2
-    whole = np.cumsum(np.sort(squares)[::-1])
-    loudest = int(np.searchsorted(whole, MOST * whole[-1])) + 1
-    return loudest < SHORT * len(squares)
+    whole = np.abs(np.concatenate(drifts))
+    return bool(np.mean(whole >= _loudest(drifts)) < SHORT)
+
+
+def _loudest(drifts: Sequence[Reals]) -> float:
+    """Return the amount from which on the samples of a drift have most of its squares."""
+    falling = np.sort(np.abs(np.concatenate(drifts)))[::-1]
+    whole = np.cumsum(falling**2)
+    return float(falling[np.searchsorted(whole, MOST * whole[-1])])
 
 
 def _inputs(bench: Bench) -> dict[str, Layer]:

@@ -65,7 +65,7 @@ def _judged_by_observer(case: Case, raw: Bench, ways: Sequence[Way], tell: Tell)
     units = units_of(base.candidate, bench.series, base.noises, base.values(0))
     loci = located(bench, base)
     tell(place_sentence(loci, bench))
-    selection = with_hidden(bench, selection, loci, UNKNOWN * most, tell)
+    selection, loci = with_hidden(bench, selection, loci, UNKNOWN * most, tell)
     says = _says(selection, loci, bench, most)
     formula = None
     if is_doubtful(says, selection, loci, bench, most, units):

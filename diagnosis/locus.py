@@ -21,8 +21,8 @@ from diagnosis.smoothing import smoothed
 Reals = NDArray[np.float64]
 SURE = 3.0
 """An unknown beyond this many of its standard deviations makes a window."""
-SHORTEST = 0.05
-"""Windows nearer than this [s] are one."""
+SWING = 0.2
+"""Period of a shuffle [s]: windows nearer than this are one, those of less than half of it none."""
 MOST_WINDOWS = 12
 
 
@@ -95,6 +95,12 @@ def over_time(bench: Bench, locus: Locus) -> Locus:
         Unknown(run.states[burnt(one) :, column], run.stds[burnt(one) :, column])
         for one, run in zip(bench.series, smoothed(locus.free, bench.series), strict=True)
     )
+    return told(bench, locus, unknown)
+
+
+def told(bench: Bench, locus: Locus, unknown: tuple[Unknown, ...]) -> Locus:
+    """Return a place with what follows from its unknown over time."""
+    assert locus.free is not None
     values = [one.values for one in unknown]
     pairs = zip(bench.series, unknown, strict=True)
     windows = [window for one, known in pairs for window in _windows(known, one)]
@@ -134,9 +140,13 @@ def _windows(unknown: Unknown, series: Series) -> list[tuple[float, float, str]]
     there = np.flatnonzero(unknown.sure)
     if not len(there):
         return []
-    parts = np.split(there, np.flatnonzero(np.diff(there) * period > SHORTEST) + 1)
+    parts = np.split(there, np.flatnonzero(np.diff(there) * period > SWING) + 1)
     ends = [(float(part[0]), float(part[-1])) for part in parts]
-    return [(start + low * period, start + high * period, series.name) for low, high in ends]
+    return [
+        (start + low * period, start + high * period, series.name)
+        for low, high in ends
+        if (high - low) * period >= 0.5 * SWING
+    ]
 
 
 def _shares(bench: Bench, drifts: Sequence[Reals], free: Estimate) -> dict[str, float]:

@@ -8,7 +8,7 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from tests.diagnosis.spinning import COMMAND, SCHEMA, bench, run
+from tests.diagnosis.spinning import COMMAND, SCHEMA, T_C, bench, run
 
 
 def test_a_model_that_lacks_nothing_is_told_so(tmp_path: Path) -> None:
@@ -39,6 +39,20 @@ def test_a_torque_that_acts_in_windows_is_an_unknown_input(tmp_path: Path) -> No
     jsonschema.validate(verdict, SCHEMA)
     (effect,) = verdict["effects"]
     assert (effect["id"], effect["place"]) == ("unknown_input", "flow.w")
+    loud = [window for window in verdict["location"]["windows"] if window[1] - window[0] > 0.5]
+    assert {(round(start), file) for start, _, file in loud} == {(2, "run_0.csv"), (5, "run_1.csv")}
+    assert run(folder, "check", "found/variant.yaml") == 0
+
+
+def test_a_torque_that_acts_in_windows_is_found_beside_a_friction_that_acts_always(
+    tmp_path: Path,
+) -> None:
+    folder = bench(tmp_path / "both", hit=3.0)
+    assert run(folder, *COMMAND, "--out", "found") == 0
+    verdict = json.loads((folder / "found" / "verdict.json").read_text("utf-8"))
+    found = {effect["id"]: effect["parameters"] for effect in verdict["effects"]}
+    assert found.keys() == {"unknown_input", "coulomb_friction"}
+    assert found["coulomb_friction"]["T_c"]["value"] == pytest.approx(T_C, rel=0.1)
     loud = [window for window in verdict["location"]["windows"] if window[1] - window[0] > 0.5]
     assert {(round(start), file) for start, _, file in loud} == {(2, "run_0.csv"), (5, "run_1.csv")}
     assert run(folder, "check", "found/variant.yaml") == 0
