@@ -124,11 +124,16 @@ def _liveliness(piece: Recording, start: Fraction, end: Fraction) -> float:
 
 def _rate(times: Values, values: Values, grid: Values, spread: float = SMOOTH) -> Values:
     """Return the smoothed rate of change on a grid."""
-    width = math.ceil(4.0 * spread / GRID)
+    width = _kernel_size(spread) // 2
     kernel = np.exp(-0.5 * (np.arange(-width, width + 1) * GRID / spread) ** 2)
     even = np.interp(grid, times, values)
     smooth = np.convolve(even, kernel / kernel.sum(), mode="valid")
     return np.gradient(smooth, GRID)
+
+
+def _kernel_size(spread: float) -> int:
+    """Return how many samples of a grid one smoothed value is made of."""
+    return 2 * math.ceil(4.0 * spread / GRID) + 1
 
 
 def relation_of(
@@ -151,17 +156,22 @@ def relation_of(
     against = min(lags, key=lambda lag: correlations[lag])
     if -correlations[against] > correlations[best] + CLEARLY_AGAINST:
         best = against
-    gains = [_ratio(pairs[best]), _ratio(_slow(compared, grid, best))]
+    gains = [_ratio(pair) for pair in (pairs[best], *_slow(compared, grid, best))]
     gain = math.copysign(min(gains, key=lambda g: abs(math.log(g))), correlations[best])
     return Relation(recording, name, gain, best * GRID, correlations[best], correlations[0])
 
 
-def _slow(compared: Compared, grid: Values, lag: int) -> tuple[Values, Values]:
-    """Return both rates below the resonances; a fast sweep has little there but drift."""
+def _slow(compared: Compared, grid: Values, lag: int) -> list[tuple[Values, Values]]:
+    """Return both rates below the resonances, or nothing where that takes more than there is.
+
+    A fast sweep has little there but drift.
+    """
     shifted = grid + lag * GRID
     kept = (shifted >= grid[0]) & (shifted <= grid[-1])
+    if np.count_nonzero(kept) <= _kernel_size(SMOOTH_GAIN):
+        return []
     y = _rate(compared.times, compared.measured, shifted[kept], SMOOTH_GAIN)
-    return y, _rate(compared.times, compared.simulated, grid[kept], SMOOTH_GAIN)
+    return [(y, _rate(compared.times, compared.simulated, grid[kept], SMOOTH_GAIN))]
 
 
 def _ratio(pair: tuple[Values, Values]) -> float:
