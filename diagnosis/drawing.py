@@ -126,9 +126,11 @@ def _missing(dossier: Dossier, inputs: Mapping[str, str]) -> list[Drawing]:
     section, _, name = acting(bench, best.section, best.place).partition(".")
     unit = unit_of(bench, section, name)
     what = f"missing {PLACES[section]} {name}"
+    is_beside = best.free is not None and bool(best.free.candidate.layers)
+    when = "beside the effects that were found" if is_beside else "before effects are laid"
     caption = (
-        f"What is {what} over time, before effects are laid: the unknown that would explain what "
-        f"is recorded in {names[place]}, give or take three standard deviations."
+        f"What is {what} over time, {when}: the unknown that would explain what is recorded in "
+        f"{names[place]}, give or take three standard deviations."
     )
     series, unknown = bench.series[place], best.unknown[place]
     picture = missing_picture(best, series, unknown, what, unit, inputs)
