@@ -23,9 +23,9 @@ from diagnosis.locus import Locus, Unknown, over_time, told
 from diagnosis.noise import MAD
 from diagnosis.point import point_of
 from diagnosis.search import Tell, Tried
-from diagnosis.selection import Selection, counted
+from diagnosis.selection import PART, Selection, counted, selected
 from diagnosis.silence import from_silence
-from diagnosis.threshold import USUAL
+from diagnosis.threshold import USUAL, Thresholds
 
 Reals = NDArray[np.float64]
 MOST = 0.8
@@ -104,7 +104,8 @@ def _found(
     for locus in near:
         found = over_time(bench, locus)
         if _is_hidden(found):
-            return _alone(bench, selection, found) or _beside(bench, selection, found)
+            alone = _alone(bench, selection, found)
+            return _joined(bench, selection, alone) if alone else _beside(bench, selection, found)
     for locus in near if selection.accepted else ():
         if _is_heard(bench, selection.model, locus.drift, needed):
             beside = _beside(bench, selection, locus)
@@ -138,6 +139,20 @@ def _alone(bench: Bench, selection: Selection, locus: Locus) -> _Hidden | None:
         if quiet.cost - without.cost > LITTLE * gained:
             return None
     return _Hidden(locus, model, (), gained, evidence(model, quiet, bench.series))
+
+
+def _joined(bench: Bench, selection: Selection, alone: _Hidden) -> _Hidden:
+    """Return a hidden input with the effects that are asked for beside it, of those that gained
+    most without it; with none where none was accepted then.
+    """
+    if not selection.accepted:
+        return alone
+    model = alone.model
+    units = units_of(model.candidate, bench.series, model.noises, model.values(0))
+    others = {name: unit for name, unit in units.items() if name != alone.locus.drift}
+    needed = Thresholds(usual=max(USUAL, PART * counted(alone.evidence)))
+    found = selected(bench, model, others, needed, known=selection.first_round)
+    return dataclasses.replace(alone, model=found.model, effects=found.accepted)
 
 
 def _beside(bench: Bench, selection: Selection, locus: Locus) -> _Hidden:
