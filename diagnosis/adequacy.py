@@ -14,7 +14,7 @@ from diagnosis.bench import Bench
 from diagnosis.estimation import looked_at
 from diagnosis.evidence import inflation
 from diagnosis.freedom import SMALL_LEVEL, WIDE_LEVELS, with_levels
-from diagnosis.layers import DRIFT, Layer, has_parameters
+from diagnosis.layers import DRIFT, Layer, has_parameters, walks
 from diagnosis.level import units_of
 from diagnosis.location import places_of_freedom
 from diagnosis.point import extended
@@ -31,13 +31,19 @@ UNLIKELY = 20.0
 def is_inadequate(bench: Bench, selection: Selection, needed: float) -> bool:
     """Tell whether a freedom gains much of what the accepted effects gained, and what is `needed`.
 
-    A hidden input is a freedom itself: it leaves what it leaves.
+    A hidden input is a freedom itself: it leaves what it leaves. So does an effect that may walk
+    along a recording, such as a grade, at its own place.
     """
     known = [tried.evidence.train for tried in selection.accepted if tried.evidence]
     if not known or any(not has_parameters(tried.layer) for tried in selection.accepted):
         return False
     limit = max(needed, LEFT_PART * sum(known)) * inflation(selection.model, bench.series)
-    return any(_gains(bench, selection, layer, limit) for _, layer in places_of_freedom(bench))
+    walking = {tried.layer.place for tried in selection.accepted if walks(tried.layer)}
+    return any(
+        _gains(bench, selection, layer, limit)
+        for section, layer in places_of_freedom(bench)
+        if section != "flow" or layer.place not in walking
+    )
 
 
 def refused(selection: Selection) -> Selection:

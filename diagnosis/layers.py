@@ -16,7 +16,7 @@ from pathlib import Path
 
 from diagnosis.series import shows_inputs
 from language.continuous import step_limits
-from language.document import Document
+from language.document import Document, Scalar, Table
 from language.effect import Effect, Laying, read_effect
 from language.laying import lay_effect
 from language.load import automaton_of, program_of
@@ -29,6 +29,8 @@ from language.project import Project, read_document
 from language.units import parse_unit
 
 DRIFT = "drift"
+WALKS = ("constant_or_random_walk",)
+"""Forms of an effect's parameter that may change along a recording."""
 SECONDS = parse_unit("s").dimension.powers
 KINDS = ("balance", "element", "output")
 LONGEST_STEP = Fraction(5, 1000)
@@ -66,6 +68,14 @@ class Layer:
 def has_parameters(layer: Layer) -> bool:
     """Tell whether an effect has numbers to fit; one that has none follows anything at all."""
     return layer.effect.body.get("parameters") is not None
+
+
+def walks(layer: Layer) -> bool:
+    """Tell whether a number of an effect may change slowly along a recording."""
+    known = layer.effect.body.get("parameters")
+    entries = known if isinstance(known, Table) else ()
+    forms = [one.node.get("form") for one in entries if isinstance(one.node, Table)]
+    return any(isinstance(one, Scalar) and one.text in WALKS for one in forms)
 
 
 def effects_in(folder: Path) -> tuple[Effect, ...]:

@@ -62,7 +62,10 @@ def main() -> None:
 
 
 def brake(recordings: Path, drive: str) -> Figure:
-    """The friction brake of the LEAF, in one drive alone; where it never acts none may be named."""
+    """The friction brake of the LEAF, in one drive alone.
+
+    Where it never acts none may be named, but nothing is met by that.
+    """
     folder = recordings / "nissan_leaf"
     verdict = mw.diagnose("leaf_vehicle", [folder / f"{drive}.csv"]).verdict
     effects = [f"{one.id}@{one.place}" for one in verdict.effects]
@@ -76,7 +79,7 @@ def brake(recordings: Path, drive: str) -> Figure:
         "effects": effects,
         "windows": [[round(end, 2) for end in one] for one in windows] if named else [],
         **found,
-        "met": is_met if found["acts_s"] > 0.0 else not named,
+        "met": is_met if found["acts_s"] > 0.0 or named else None,
         "tuned": "with the recordings of the LEAF in view, not their truth: how near to the best "
         "a silent place has to gain (0.9); with drive_eco, scored twice, how windows are cut: "
         "those of less than 0.1 s are none, those nearer than 0.2 s one",
