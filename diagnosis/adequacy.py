@@ -13,7 +13,7 @@ import numpy as np
 from diagnosis.bench import Bench
 from diagnosis.estimation import looked_at
 from diagnosis.evidence import inflation
-from diagnosis.freedom import SMALL_LEVEL, WIDE_LEVELS, with_levels
+from diagnosis.freedom import WIDE_LEVELS, with_levels
 from diagnosis.layers import DRIFT, Layer, has_parameters, walks
 from diagnosis.level import units_of
 from diagnosis.location import places_of_freedom
@@ -22,7 +22,9 @@ from diagnosis.selection import Selection
 from language.problem import SpecError
 
 LEFT_PART = 0.5
-"""Part of what was gained that a freedom may gain beside it: forms differ, and noise has colour."""
+"""Part of what was gained that a freedom may gain beside it: forms differ, and noise has colour.
+
+An error of an output is none of them: a sensor follows whatever the model gets wrong."""
 
 UNLIKELY = 20.0
 """Nats by which "none of these" then leads the best candidate."""
@@ -42,7 +44,7 @@ def is_inadequate(bench: Bench, selection: Selection, needed: float) -> bool:
     return any(
         _gains(bench, selection, layer, limit)
         for section, layer in places_of_freedom(bench)
-        if section != "flow" or layer.place not in walking
+        if section == "elements" or (section == "flow" and layer.place not in walking)
     )
 
 
@@ -64,11 +66,10 @@ def _gains(bench: Bench, selection: Selection, layer: Layer, limit: float) -> bo
         return False
     units = units_of(candidate, bench.series, model.noises, model.values(0))
     point = extended(candidate, model.candidate, model.point, {})
-    noises = with_levels(model.noises, units, dict.fromkeys(units, SMALL_LEVEL))
-    quiet = looked_at(candidate, bench.series, noises, point)
+    quiet = looked_at(candidate, bench.series, model.noises, point)
     for level in WIDE_LEVELS if np.isfinite(quiet.cost) else ():
-        freer = with_levels(noises, units, {layer.named(DRIFT): level})
-        free = looked_at(candidate, bench.series, freer, point, quiet.outcome)
+        noises = with_levels(model.noises, units, {layer.named(DRIFT): level})
+        free = looked_at(candidate, bench.series, noises, point, quiet.outcome)
         if quiet.cost - free.cost > limit:
             return True
     return False
