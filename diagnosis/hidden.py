@@ -25,6 +25,7 @@ from diagnosis.point import point_of
 from diagnosis.search import Tell, Tried
 from diagnosis.selection import PART, Selection, counted, selected
 from diagnosis.silence import from_silence
+from diagnosis.stirring import stirring
 from diagnosis.threshold import USUAL, Thresholds
 
 Reals = NDArray[np.float64]
@@ -32,8 +33,10 @@ MOST = 0.8
 """Part of the squares of a drift that its loudest samples have."""
 SHORT = 0.22
 """Part of all samples that these are at most, of what acts in windows."""
-KNOWN = 0.8
+KNOWN = 0.5
 """Correlation with something known from which on an input is not hidden: it follows that."""
+STIRRED = 0.3
+"""Correlation of its loudness with the movement of known inputs from which on it is an answer."""
 NEAR = 0.9
 """Part of what the best place gains that another one gains nearly the same with."""
 LITTLE = 0.5
@@ -103,21 +106,24 @@ def _found(
     near = [one for one in loud if one.gain > NEAR * loud[0].gain]
     for locus in near:
         found = over_time(bench, locus)
-        if _is_hidden(found):
+        if _is_hidden(bench, found):
             alone = _alone(bench, selection, found)
             return _joined(bench, selection, alone) if alone else _beside(bench, selection, found)
     for locus in near if selection.accepted else ():
         if _is_heard(bench, selection.model, locus.drift, needed):
             beside = _beside(bench, selection, locus)
-            if _is_hidden(beside.locus):
+            if _is_hidden(bench, beside.locus):
                 return beside
     return None
 
 
-def _is_hidden(locus: Locus) -> bool:
+def _is_hidden(bench: Bench, locus: Locus) -> bool:
     """Tell whether what is unknown at a place acts in windows, along with nothing known."""
+    values = [one.values for one in locus.unknown]
     follows = any(abs(r) > KNOWN for _, r in locus.along)
-    return not follows and acts_in_windows([one.values for one in locus.unknown])
+    if follows or not acts_in_windows(values):
+        return False
+    return stirring(bench.series, values) < STIRRED
 
 
 def _is_heard(bench: Bench, model: Estimate, name: str, needed: float) -> bool:
@@ -171,7 +177,7 @@ def _beside(bench: Bench, selection: Selection, locus: Locus) -> _Hidden:
         fewer = freed(bench, looked_at(candidate, bench.series, without.noises, start), drift)
         if evidence(model, fewer, bench.series).least <= USUAL:
             effects, model = rest, fewer
-    if not locus.unknown or not _is_hidden(locus):
+    if not locus.unknown or not _is_hidden(bench, locus):
         locus = over_time(bench, dataclasses.replace(locus, free=model, unknown=()))
     return _Hidden(locus, model, effects, without.cost - model.cost, gained)
 
