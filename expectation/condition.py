@@ -21,11 +21,12 @@ from expectation.places import (
     unknown_output,
 )
 from language.declaration import Formula
-from language.dimension import DimensionCheck, Scope
+from language.dimension import DimensionCheck
 from language.document import Scalar
 from language.experiment import System
 from language.kind import Enumeration, Kind, Whole
 from language.problem import Problems, nearest
+from language.scope import Scope
 from language.signal_kind import signal_kinds
 from language.syntax import Application, Broken, Name, Not, Number, Relation, Tree
 from language.units import NUMBER, SECOND, fits

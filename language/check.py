@@ -27,7 +27,7 @@ from language.check_writer import (
 )
 from language.declaration import Formula, LookupTable
 from language.declared import declared_names
-from language.dimension import DimensionCheck, Scope
+from language.dimension import DimensionCheck
 from language.guards import report_overlaps
 from language.inquiry import Inquiry
 from language.kind import Enumeration, Kind, Whole
@@ -35,6 +35,7 @@ from language.model import CHART, Automaton, Mode
 from language.order import equation_order, report_circle
 from language.problem import Problems
 from language.region import sources, with_regions
+from language.scope import Scope
 from language.syntax import KEPT, Tree, whole_literal
 from language.units import Dimension, Unit, common, fits, shown_unit
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from language.dimension import DimensionCheck, Scope
+from language.dimension import DimensionCheck
 from language.kind import Kind
 from language.model import Automaton
 from language.problem import Problems, nearest
+from language.scope import Scope
 
 
 def check_laid_on(automaton: Automaton, names: Mapping[str, Kind], problems: Problems) -> None:

@@ -8,11 +8,10 @@ from fractions import Fraction
 
 from language.constants import exact_value
 from language.declaration import Formula
-from language.lower import closure
 from language.memory import MAX_REWIND
 from language.model import Automaton, Mode, Rewind, Run, Transition
 from language.problem import Problems
-from language.region import sources
+from language.region import closure, sources
 from language.syntax import MEMORY, Application, Tree, walk
 
 

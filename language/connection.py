@@ -8,12 +8,13 @@ from fractions import Fraction
 
 from language.declaration import Formula
 from language.declared import declared_kind
-from language.dimension import DimensionCheck, Scope
+from language.dimension import DimensionCheck
 from language.document import Entry, Node, Scalar, Table
 from language.experiment import Connection, Instance, SystemInput
 from language.kind import Kind, Whole
 from language.problem import Problems, Span, nearest
 from language.reader import Reader
+from language.scope import Scope
 from language.signal import Line, Sensor
 from language.syntax import Application, Broken, Name, Number, Tree, Truth, children, names, walk
 from language.units import NUMBER, SECOND, Dimension, Unit, fits

@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
-from dataclasses import dataclass, field
 
-from language.declaration import LookupTable
 from language.function import function_kind
 from language.kind import (
     LARGEST_WHOLE,
@@ -22,6 +19,7 @@ from language.kind import (
     wholes_of,
 )
 from language.problem import Problems, Span, nearest
+from language.scope import Scope
 from language.syntax import (
     Application,
     Arithmetic,
@@ -42,7 +40,6 @@ from language.syntax import (
 from language.units import (
     NO_UNIT,
     Dimension,
-    Unit,
     angle_hint,
     common,
     fits,
@@ -50,28 +47,6 @@ from language.units import (
     product,
     units_hint,
 )
-
-
-@dataclass(frozen=True)
-class Scope:
-    """What names mean at one place: their dimensions, and the modes that `in(...)` may name.
-
-    `angles` are the units of the parameters that are declared in a unit of angle, `memory` the
-    functions with memory that may be used, `tables` what `lookup` reads,
-    `mode` the mode that reads, `owners` a mode for each equation that any mode has, `events` those
-    of a chart, which are no values.
-    """
-
-    names: Mapping[str, Kind | None]
-    modes: frozenset[str] = frozenset()
-    place: str = "here"
-    angles: Mapping[str, Unit] = field(default_factory=dict)
-    memory: frozenset[str] = frozenset()
-    tables: Mapping[str, LookupTable] = field(default_factory=dict)
-    mode: str = ""
-    owners: Mapping[str, str] = field(default_factory=dict)
-    events: frozenset[str] = frozenset()
-
 
 MOST_HINTS = 200
 """Problems after which no nearest name is looked for: all names are compared with it."""

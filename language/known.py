@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from language.dimension import DimensionCheck, Scope
+from language.dimension import DimensionCheck
 from language.document import Items, Scalar, Table
 from language.kind import Enumeration, Kind, Whole
 from language.parse import parse_balance, parse_expression
 from language.problem import Problems, SpecError
 from language.rewrite import reads
+from language.scope import Scope
 from language.syntax import Application, Arithmetic, Broken, Tree
 from language.units import SECOND, Dimension, UnitError, parse_unit, product
 

@@ -30,7 +30,7 @@ from language.operation import (
 )
 from language.order import equation_order
 from language.problem import SpecError
-from language.region import region_of_equation, sources
+from language.region import closure, region_of_equation, sources
 from language.syntax import (
     MEMORY,
     Application,
@@ -268,19 +268,6 @@ def variable_names(automaton: Automaton, inputs: str) -> dict[str, Expr]:
     for name, variable in automaton.discrete.items():
         found[name] = Ref(f"discrete.{name}", variable.type in WHOLE_TYPES)
     return found
-
-
-def closure(mode: Mode, wanted: Iterable[str]) -> set[str]:
-    """Return the equations of a mode that the wanted names need."""
-    needed: set[str] = set()
-    known = sources(mode)
-    stack = [name for name in wanted if name in known]
-    while stack:
-        name = stack.pop()
-        if name not in needed:
-            needed.add(name)
-            stack += [r for formula in known[name] for r in formula.reads if r in known]
-    return needed
 
 
 def reads_of(trees: Iterable[Tree]) -> list[str]:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from language.constants import exact_value
 from language.declaration import Formula
-from language.dimension import DimensionCheck, Scope
+from language.dimension import DimensionCheck
 from language.kind import Enumeration, Whole
 from language.lower import Names, expression
 from language.model import Automaton, Mode
@@ -36,6 +36,7 @@ from language.operation import (
 )
 from language.problem import Problems
 from language.program import ValueType, Variable
+from language.scope import Scope
 from language.syntax import (
     KEPT,
     MEMORY,

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from language.constants import exact_value
-from language.lower import closure, variable_names
+from language.lower import variable_names
 from language.model import Automaton, Mode, Rewind, Transition
 from language.once import once
 from language.operation import (
@@ -35,7 +35,7 @@ from language.operation import (
     whole,
 )
 from language.program import Variable, value_type
-from language.region import sources
+from language.region import closure, sources
 from language.wiring import any_fired
 
 KEPT = Ref("timer.past", whole=True)

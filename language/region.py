@@ -7,7 +7,7 @@ of the chart is active, those of the regions beside it are chosen by the region'
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 from language.activity import is_active
 from language.chart_target import mode_paths
@@ -131,3 +131,16 @@ def one_configuration(automaton: Automaton, transition: Transition) -> Mode:
 def with_regions(modes: Mapping[str, Mode], regions: tuple[Region, ...]) -> dict[str, Mode]:
     """Return the modes of the chart with the regions that run beside them."""
     return {name: dataclasses.replace(mode, beside=regions) for name, mode in modes.items()}
+
+
+def closure(mode: Mode, wanted: Iterable[str]) -> set[str]:
+    """Return the equations of a mode that the wanted names need."""
+    needed: set[str] = set()
+    known = sources(mode)
+    stack = [name for name in wanted if name in known]
+    while stack:
+        name = stack.pop()
+        if name not in needed:
+            needed.add(name)
+            stack += [r for formula in known[name] for r in formula.reads if r in known]
+    return needed

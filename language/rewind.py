@@ -10,7 +10,7 @@ back as is kept, or is false now, nothing is taken back and a fault bit is set.
 from __future__ import annotations
 
 from language.limit import stored
-from language.lower import Names, closure, equations, expression
+from language.lower import Names, equations, expression
 from language.model import Automaton, Mode
 from language.motion import RUN_HALVINGS
 from language.operation import (
@@ -50,7 +50,7 @@ from language.past import (
     taken_back,
 )
 from language.program import Variable
-from language.region import sources
+from language.region import closure, sources
 from language.run import run_block
 from language.wiring import equation_variables
 

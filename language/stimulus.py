@@ -8,11 +8,12 @@ from collections.abc import Collection, Sequence
 from fractions import Fraction
 
 from language.declaration import Formula
-from language.dimension import DimensionCheck, Scope
+from language.dimension import DimensionCheck
 from language.document import Entry, Node, Scalar, Table
 from language.experiment import SystemInput
 from language.problem import Span
 from language.reader import Reader
+from language.scope import Scope
 from language.signal import Piece, Stimulus
 from language.syntax import (
     Application,

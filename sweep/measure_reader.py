@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from fractions import Fraction
 
 from language.declaration import Formula
-from language.dimension import DimensionCheck, Scope
+from language.dimension import DimensionCheck
 from language.document import Entry, Node, Scalar, Table
 from language.event_name import EventName, read_event
 from language.experiment import System
@@ -15,6 +15,7 @@ from language.kind import Kind, Whole
 from language.problem import Problems, Span, nearest
 from language.reader import Reader
 from language.rewrite import reads, renamed
+from language.scope import Scope
 from language.signal_kind import signal_kinds
 from language.syntax import Name
 from language.units import NUMBER, SECOND, Dimension, Unit, fits, product

@@ -6,13 +6,14 @@ import math
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
-from language.dimension import DimensionCheck, Scope
+from language.dimension import DimensionCheck
 from language.document import Entry, Items, Node, Scalar
 from language.experiment import System
 from language.kind import Kind
 from language.names import check_name
 from language.problem import Problems, Span, nearest
 from language.reader import Reader
+from language.scope import Scope
 from language.units import NO_UNIT, Unit
 from sweep.study import Axis, Distribution, Sampling, Setting, Shape, Target, Varied
 from sweep.target import Place

@@ -8,7 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from diagnosis.consistency import relation_of
 from diagnosis.finding import told
+from diagnosis.free_run import Compared
 from diagnosis.needs import EFFECTS, NEEDS
 from diagnosis.recording_check import check_recordings
 from language.project import Project
@@ -206,3 +208,11 @@ def test_without_a_model_two_speeds_of_one_motion_tell_clocks_and_signs(
     assert seen(check_recordings([one], bench())) == expected
     surer = {("error", kind, channel) for _, kind, channel in expected}
     assert seen(check_recordings([one, two], bench())) == surer
+
+
+def test_a_piece_of_any_length_is_compared() -> None:
+    for count in range(200, 700):
+        times = np.arange(count) * 0.01
+        speed = np.sin(3.0 * times) + 0.01 * np.cumsum(np.sin(times))
+        found = relation_of("short", "w", Compared("w", times, np.roll(speed, 30), speed))
+        assert found is None or 0.2 < found.gain < 5.0

@@ -93,7 +93,7 @@ class TestAMap:
             ),
             (
                 "  a: {to: a, unit: V}\n",
-                "spec/bench.yaml:5:3: error: column `a` is in `m^2*kg/s^3/A`\n"
+                "spec/bench.yaml:5:3: error: column `a` is in `V`\n"
                 "    a: {to: a, unit: V}\n"
                 "    ^\n"
                 "help: input `a` is in `A`",

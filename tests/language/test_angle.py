@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from language.dimension import DimensionCheck, Scope
+from language.dimension import DimensionCheck
 from language.evaluate import evaluate
 from language.lower import expression
 from language.problem import Problems
+from language.scope import Scope
 from language.syntax import Number
 from language.units import Dimension
 from tests.language.making import automaton, dimension, labels, told, tree

@@ -7,12 +7,13 @@ import math
 import pytest
 from hypothesis import assume, given, strategies as st
 
-from language.dimension import DimensionCheck, Scope
+from language.dimension import DimensionCheck
 from language.evaluate import evaluate
 from language.kind import Kind
 from language.lower import expression
 from language.operation import Expr, Value
 from language.problem import Problems
+from language.scope import Scope
 from language.syntax import Application, Arithmetic, Choice, Name, Negative, Power, Relation, Tree
 from language.units import Dimension
 from tests.language.making import NOWHERE, automaton, dimension, told, tree

@@ -7,12 +7,13 @@ from collections.abc import Callable
 
 import pytest
 
-from language.dimension import DimensionCheck, Scope
+from language.dimension import DimensionCheck
 from language.evaluate import evaluate
 from language.kind import Whole
 from language.lower import expression
 from language.operation import Ref
 from language.problem import Problems
+from language.scope import Scope
 from language.units import NUMBER
 from tests.language.making import tree
 

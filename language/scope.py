@@ -1,0 +1,31 @@
+"""Scope: what names mean at one place of a document."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from language.declaration import LookupTable
+from language.kind import Kind
+from language.units import Unit
+
+
+@dataclass(frozen=True)
+class Scope:
+    """What names mean at one place: their dimensions, and the modes that `in(...)` may name.
+
+    `angles` are the units of the parameters that are declared in a unit of angle, `memory` the
+    functions with memory that may be used, `tables` what `lookup` reads,
+    `mode` the mode that reads, `owners` a mode for each equation that any mode has, `events` those
+    of a chart, which are no values.
+    """
+
+    names: Mapping[str, Kind | None]
+    modes: frozenset[str] = frozenset()
+    place: str = "here"
+    angles: Mapping[str, Unit] = field(default_factory=dict)
+    memory: frozenset[str] = frozenset()
+    tables: Mapping[str, LookupTable] = field(default_factory=dict)
+    mode: str = ""
+    owners: Mapping[str, str] = field(default_factory=dict)
+    events: frozenset[str] = frozenset()
