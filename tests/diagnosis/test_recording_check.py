@@ -212,7 +212,8 @@ def test_without_a_model_two_speeds_of_one_motion_tell_clocks_and_signs(
 
 def test_a_piece_of_any_length_is_compared() -> None:
     for count in range(200, 700):
-        times = np.arange(count) * 0.01
-        speed = np.sin(3.0 * times) + 0.01 * np.cumsum(np.sin(times))
-        found = relation_of("short", "w", Compared("w", times, np.roll(speed, 30), speed))
+        times: Values = np.asarray(np.arange(count) * 0.01, dtype=np.float64)
+        speed: Values = np.sin(3.0 * times) + 0.01 * np.cumsum(np.sin(times))
+        late = np.roll(speed, 30)
+        found = relation_of("short", "w", Compared("w", times, late, speed))
         assert found is None or 0.2 < found.gain < 5.0
