@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import shutil
 import subprocess
 import sys
 from collections.abc import Mapping
@@ -44,7 +45,7 @@ def made(plan: Plan, seed: int, generator: str = GENERATOR) -> Cases:
     folder = ROOT / "build" / "proof" / "recordings" / name
     labels = ROOT / "build" / "proof" / "labels" / f"{name}.json"
     if not labels.exists():
-        subprocess.run(["rm", "-rf", str(folder)], check=True)
+        shutil.rmtree(folder, ignore_errors=True)
         asked = {
             "--out": folder,
             "--labels": labels,

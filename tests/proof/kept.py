@@ -37,7 +37,7 @@ MEASURES = (
 def answers(plan: Plan, seed: int, jobs: int, most: int | None, generator: str) -> list[Answer]:
     """Return what a diagnosis says of each case of a plan; what is missing is diagnosed now."""
     cases = made(plan, seed, generator)
-    known = cases.known(_fewest(plan.most, most))
+    known = cases.known(most)
     folder = _folder(plan, cases)
     with locked(folder):
         store = open_store(folder, _manifest(plan, seed, cases))
@@ -53,10 +53,6 @@ def _answer(row: Mapping[str, Any], plan: Plan, label: Label) -> Answer:
 
 def _folder(plan: Plan, cases: Cases) -> Path:
     return ROOT / "build" / "proof" / _digest()[:16] / cases.folder.name / plan.name
-
-
-def _fewest(*counts: int | None) -> int | None:
-    return min((count for count in counts if count is not None), default=None)
 
 
 def _verdict(text: str) -> dict[str, object]:

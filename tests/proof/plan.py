@@ -18,7 +18,7 @@ PAIRS = 48
 
 @dataclass(frozen=True)
 class Plan:
-    """Cases of one kind. `effects` is in the generator's words; of `most` only so many are used.
+    """Cases of one kind; `effects` is in the generator's words.
 
     `without_own` takes the true effect out of the library before a case is diagnosed.
     """
@@ -27,7 +27,6 @@ class Plan:
     effects: str
     strength: float = 1.0
     without_own: bool = False
-    most: int | None = None
 
 
 def plans(pairs: Sequence[tuple[str, str]], seed: int, share: float = 1.0) -> tuple[Plan, ...]:

@@ -1,0 +1,75 @@
+"""What explains too little is refused; what answers to known inputs is no hidden one."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from diagnosis.adequacy import is_inadequate, refused
+from diagnosis.bench import Bench
+from diagnosis.evidence import evidence
+from diagnosis.layers import fitting
+from diagnosis.level import settled, units_of
+from diagnosis.prediction import burnt
+from diagnosis.search import Tried
+from diagnosis.selection import Selection
+from diagnosis.series import Series
+from diagnosis.stirring import stirring
+from tests.diagnosis.test_estimation import bench
+from tests.diagnosis.test_location import based, with_effect
+
+__all__ = ["bench"]
+NEEDED = 50.0
+"""Nats that a freedom has to gain at least."""
+STRONG = {"T_c_w_em": 10.0}
+
+
+@pytest.fixture(scope="module")
+def rubbing(bench: Bench) -> Bench:
+    """Return recordings of a driveline with dry friction at the motor."""
+    return with_effect(bench, "coulomb_friction@w_em", STRONG)
+
+
+def accepting(bench: Bench, rubbing: Bench, effect: str) -> Selection:
+    """Return a selection that has accepted an effect for what is recorded."""
+    layers = {layer.id: layer for e in bench.effects for layer in fitting(bench.document, e)}
+    base = based(rubbing)
+    units = units_of(base.candidate, rubbing.series, base.noises, base.values(0))
+    candidate = rubbing.candidate((layers[effect],))
+    model = settled(candidate, rubbing.series, base.noises, base.values(0), units)
+    known = evidence(model, base, rubbing.series)
+    tried = Tried(layers[effect], known.train, model, known)
+    return Selection(base, model, (tried,), (tried,), ())
+
+
+@pytest.mark.parametrize(
+    ("effect", "inadequate"), [("coulomb_friction@w_em", False), ("sensor_lag@w_em", True)]
+)
+def test_what_explains_less_than_it_leaves_is_inadequate(
+    bench: Bench, rubbing: Bench, effect: str, inadequate: bool
+) -> None:
+    selection = accepting(bench, rubbing, effect)
+    assert is_inadequate(rubbing, selection, NEEDED) is inadequate
+
+
+def test_what_was_refused_is_not_likely(bench: Bench, rubbing: Bench) -> None:
+    selection = accepting(bench, rubbing, "coulomb_friction@w_em")
+    assert selection.probabilities()["coulomb_friction@w_em"] > 0.9
+    left = refused(selection)
+    assert left.model is selection.base
+    assert left.accepted == ()
+    assert left.probabilities()["other"] > 0.9
+
+
+def test_an_unknown_that_comes_when_inputs_move_answers_to_them() -> None:
+    time = np.arange(0.0, 10.0, 0.01)
+    torque = np.where((time > 3.0) & (time < 6.0), 100.0, 0.0)
+    series = Series("a", Fraction(1, 100), Fraction(0), torque[:, None], torque[:, None])
+    answer = np.exp(-np.abs(time - 3.05) / 0.1) - np.exp(-np.abs(time - 6.05) / 0.1)
+    other = np.exp(-np.abs(time - 1.5) / 0.1) + np.exp(-np.abs(time - 8.0) / 0.1)
+    start = burnt(series)
+    assert stirring([series], [answer[start:]]) > 0.8
+    assert stirring([series], [other[start:]]) < 0.1
+    assert stirring([series], [0.0 * answer[start:]]) == 0.0
