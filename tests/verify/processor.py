@@ -8,10 +8,10 @@ from collections.abc import Callable
 ATTEMPTS = 3
 
 
-def seconds_of(run: Callable[[], object], bar: float = 0.0) -> float:
+def seconds_of(run: Callable[[], object], bar: float = 0.0, attempts: int = ATTEMPTS) -> float:
     """Return the least processor time [s] of runs of child processes: one within `bar` will do."""
     least = float("inf")
-    for _ in range(ATTEMPTS):
+    for _ in range(attempts):
         before = _so_far()
         run()
         least = min(least, _so_far() - before)
