@@ -26,7 +26,7 @@ from diagnosis.locus import Locus
 from diagnosis.naming import named, place_path, quantities_of, verdict_id
 from diagnosis.place_sentence import place_sentence
 from diagnosis.plan import Plan, planned
-from diagnosis.search import Tell, Tried
+from diagnosis.search import Tell
 from diagnosis.selection import Selection
 from diagnosis.series import Series, compared, paced
 from diagnosis.shuffle import Shuffle, shuffle_of
@@ -145,27 +145,15 @@ def _verdict(
     automaton: Automaton,
     fit: dict[str, dict[str, Misfit]],
 ) -> Verdict:
-    probabilities = selection.probabilities()
-    ranked = tuple(
-        Ranked(
-            verdict_id(tried.layer, automaton),
-            place_path(tried.layer),
-            probabilities[tried.layer.id],
-            tried.evidence.train,
-            float(np.std(tried.evidence.each) * np.sqrt(len(tried.evidence.each))),
-        )
-        for tried in selection.first_round
-        if tried.evidence
-    )
     effects = tuple(named(tried.layer, selection.model, automaton) for tried in selection.accepted)
-    rivals = tuple(_named_alone(tried, automaton) for tried in selection.rivals)
+    rivals = _rivals(selection, automaton)
     before, after = quantities_of(selection.base), quantities_of(selection.model)
     base = {name: (before[name], after.get(name, before[name])) for name in before}
     return Verdict(
         says,
         effects if says == "effect" else (),
-        ranked,
-        probabilities["other"],
+        _ranked(selection, automaton),
+        selection.probabilities()["other"],
         rivals if says == "effect" else (*effects, *rivals) if says == "ambiguous" else (),
         tuple(loci),
         fit,
@@ -175,9 +163,34 @@ def _verdict(
     )
 
 
-def _named_alone(tried: Tried, automaton: Automaton) -> Named:
-    assert tried.estimate is not None
-    return named(tried.layer, tried.estimate, automaton)
+def _ranked(selection: Selection, automaton: Automaton) -> tuple[Ranked, ...]:
+    """Return the fitted candidates, best first: forms of one name at one place are one."""
+    probabilities = selection.probabilities()
+    found: dict[tuple[str, str], Ranked] = {}
+    for tried in selection.first_round:
+        if tried.evidence is None:
+            continue
+        name, each = (verdict_id(tried.layer, automaton), place_path(tried.layer)), tried.evidence
+        std = float(np.std(each.each) * np.sqrt(len(each.each)))
+        new = Ranked(*name, probabilities[tried.layer.id], each.train, std)
+        old = found.setdefault(name, new)
+        if old is not new:
+            both = old.probability + new.probability
+            found[name] = dataclasses.replace(old, probability=both)
+    return tuple(found.values())
+
+
+def _rivals(selection: Selection, automaton: Automaton) -> tuple[Named, ...]:
+    """Return the rivals as verdicts name them, but for other forms of what is named already."""
+    taken = [
+        (verdict_id(one.layer, automaton), place_path(one.layer)) for one in selection.accepted
+    ]
+    found: dict[tuple[str, str], Named] = {}
+    for tried in selection.rivals:
+        name = (verdict_id(tried.layer, automaton), place_path(tried.layer))
+        if name not in taken and tried.estimate is not None:
+            found.setdefault(name, named(tried.layer, tried.estimate, automaton))
+    return tuple(found.values())
 
 
 def _confirmed(verdict: Verdict, selection: Selection, held: tuple[Series, ...]) -> Verdict:

@@ -11,7 +11,7 @@ from diagnosis.candidate import Candidate
 from diagnosis.estimation import Estimate, estimated, looked_at
 from diagnosis.layers import DRIFT, Layer
 from diagnosis.level import FIRST_LEVELS, units_of
-from diagnosis.point import point_of
+from diagnosis.point import extended, point_of
 from diagnosis.prediction import Noises
 from diagnosis.series import Series
 
@@ -37,7 +37,7 @@ def freed(bench: Bench, base: Estimate, layer: Layer | None = None) -> Estimate:
     drifts = bench.drifts if known or layer is None else (*bench.drifts, layer)
     candidate = bench.candidate(base.candidate.layers, drifts)
     make = partial(_freed, bench, base, candidate, layer)
-    given = [base.values(0), base.noises, layer and layer.id]
+    given = [base.point, base.noises, layer and layer.id]
     return bench.kept("freed", candidate, given, make)
 
 
@@ -48,8 +48,8 @@ def _freed(bench: Bench, base: Estimate, candidate: Candidate, layer: Layer | No
     levels = dict.fromkeys(units, SMALL_LEVEL) | ({name: START_LEVEL} if name else {})
     noises = with_levels(base.noises, units, levels)
     found = []
-    for start in (base.values(0), {}):
-        point = point_of(candidate, len(bench.series), start)
+    near = extended(candidate, base.candidate, base.point, {})
+    for point in (near, point_of(candidate, len(bench.series), {})):
         now = looked_at(candidate, bench.series, noises, point)
         found.append(scanned(now, bench.series, units, name, WIDE_LEVELS))
     now = min(found, key=lambda one: one.cost)

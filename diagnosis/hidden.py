@@ -21,7 +21,7 @@ from diagnosis.layers import Layer, fitting
 from diagnosis.level import units_of
 from diagnosis.locus import Locus, Unknown, over_time, told
 from diagnosis.noise import MAD
-from diagnosis.point import point_of
+from diagnosis.point import extended
 from diagnosis.search import Tell, Tried
 from diagnosis.selection import PART, Selection, counted, selected
 from diagnosis.silence import from_silence
@@ -165,7 +165,7 @@ def _beside(bench: Bench, selection: Selection, locus: Locus) -> _Hidden:
     """Return a hidden input beside what was accepted, but for what it makes needless."""
     drift = next(one for one in bench.drifts if one.place == locus.place)
     without = _quieted(bench, selection.model)
-    model = freed(bench, selection.model, drift)
+    model = with_normal(freed(bench, selection.model, drift), bench.series)
     gained = evidence(model, without, bench.series)
     effects = selection.accepted
     for tried in selection.accepted:
@@ -173,8 +173,9 @@ def _beside(bench: Bench, selection: Selection, locus: Locus) -> _Hidden:
         candidate = bench.possible([one.layer for one in rest])
         if candidate is None:
             continue
-        start = point_of(candidate, len(bench.series), model.values(0))
+        start = extended(candidate, model.candidate, model.point, {})
         fewer = freed(bench, looked_at(candidate, bench.series, without.noises, start), drift)
+        fewer = with_normal(fewer, bench.series)
         if evidence(model, fewer, bench.series).least <= USUAL:
             effects, model = rest, fewer
     if not locus.unknown or not _is_hidden(bench, locus):

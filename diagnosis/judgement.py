@@ -19,6 +19,7 @@ from diagnosis.hidden import with_hidden
 from diagnosis.level import units_of
 from diagnosis.location import located
 from diagnosis.locus import Locus
+from diagnosis.naming import verdict_id
 from diagnosis.place_sentence import place_sentence
 from diagnosis.search import Tell
 from diagnosis.selection import Selection, selected
@@ -28,7 +29,7 @@ from diagnosis.verdict import Says
 from diagnosis.ways import Way, better_way, chosen
 
 CLEAR = 3.0
-"""A rival within this of the best [nats] makes the verdict ambiguous."""
+"""A rival of another name within this of the best [nats] makes the verdict ambiguous."""
 UNKNOWN = 6.0
 """Times the threshold that a free drift must gain where no effect was accepted."""
 
@@ -129,8 +130,8 @@ def _says(selection: Selection, loci: Sequence[Locus], bench: Bench, needed: flo
         shrink = 1.0 / inflation(selection.base, bench.series)
         unexplained = max((locus.gain for locus in loci), default=0.0) * shrink
         return "unknown" if unexplained > UNKNOWN * needed else "nothing_missing"
-    best = selection.accepted[0].evidence
-    rivals = [tried.evidence for tried in selection.rivals if tried.evidence]
-    if best and any(rival.total > best.total - CLEAR for rival in rivals):
-        return "ambiguous"
-    return "effect"
+    best, automaton = selection.accepted[0], bench.automaton
+    name = verdict_id(best.layer, automaton)
+    others = (one for one in selection.rivals if verdict_id(one.layer, automaton) != name)
+    is_open = any(one.score > best.score - CLEAR for one in others)
+    return "ambiguous" if is_open else "effect"

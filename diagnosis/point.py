@@ -49,12 +49,15 @@ def point_of(candidate: Candidate, recordings: int, start: Mapping[str, float]) 
     return Point(z, np.tile(z, (recordings, 1)))
 
 
-def extended(candidate: Candidate, base: Candidate, at: Point, start: Mapping[str, float]) -> Point:
+def extended(
+    candidate: Candidate, base: Candidate, at: Point, start: Mapping[str, float] | Point
+) -> Point:
     """Return the point of a candidate that stands where a base does `at` a point of its own.
 
-    What the base does not have is at `start` [SI].
+    What the base does not have is at `start`: values [SI], or a point of the candidate.
     """
-    point = point_of(candidate, len(at.own), start)
+    point = start if isinstance(start, Point) else point_of(candidate, len(at.own), start)
+    point = Point(point.shared.copy(), point.own.copy())
     names = candidate.names
     for k, name in enumerate(base.names):
         if name in names:

@@ -16,6 +16,7 @@ from diagnosis.evidence import Evidence, evidence, inflation
 from diagnosis.layers import Layer
 from diagnosis.level import fitted
 from diagnosis.point import extended, point_of
+from language.effect import own_names
 
 FULL_FITS = 7
 """Candidates that are fitted to the end, best foreseen first."""
@@ -25,6 +26,8 @@ STARTS = 2
 """Starts of a candidate from which steps are made, the best ones."""
 HOPELESS = 0.05
 """A candidate that promises less than this part of what another has gained is not fitted."""
+PLAIN = 5.0
+"""Nats that each number of an effect has to gain beyond its price."""
 WORTH = 10.0
 """A candidate that promises less [nats] is not fitted."""
 Tell = Callable[[str], None]
@@ -41,8 +44,15 @@ class Tried:
 
     @property
     def score(self) -> float:
-        """What candidates are ranked by."""
-        return self.evidence.total if self.evidence else self.promised - 1e6
+        """What candidates are ranked by: what they gain, less for each number that they bring.
+
+        One that brings more also takes up what the form of a plainer one gets wrong.
+        """
+        if self.evidence is None or self.estimate is None:
+            return self.promised - 1e6
+        names = [self.layer.named(name) for name in own_names(self.layer.effect.body)]
+        brought = set(names) & set(self.estimate.candidate.names)
+        return self.evidence.total - PLAIN * len(brought)
 
 
 def searched(

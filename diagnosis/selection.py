@@ -14,6 +14,7 @@ from diagnosis.estimation import Estimate
 from diagnosis.evidence import Evidence, evidence
 from diagnosis.layers import Layer
 from diagnosis.level import settled
+from diagnosis.point import extended
 from diagnosis.search import Tell, Tried, searched
 from diagnosis.swap import swapped
 from diagnosis.threshold import EVERYWHERE, USUAL, Thresholds
@@ -40,7 +41,7 @@ BETTER = 10.0
 """Nats by which a model must fit better for its candidates to be looked at again."""
 MOST_EFFECTS = 3
 CLOSE = 20.0
-"""Candidates whose totals differ by less [nats] cannot be told apart by these recordings."""
+"""Candidates whose scores differ by less [nats] cannot be told apart by these recordings."""
 OTHER = 5.0
 """Nats by which "none of these" trails the threshold in the probabilities."""
 
@@ -62,7 +63,7 @@ class Selection:
 
     def probabilities(self) -> dict[str, float]:
         """Return the probability of each fitted candidate of the first round, and of `other`."""
-        totals = {t.layer.id: t.evidence.total for t in self.first_round if t.evidence}
+        totals = {t.layer.id: t.score for t in self.first_round if t.evidence}
         totals["other"] = self.other
         most = max(totals.values())
         weights = {name: float(np.exp(0.5 * (total - most))) for name, total in totals.items()}
@@ -183,7 +184,7 @@ def _better_base(
     best = next(iter(tried), None)
     if best is None or best.estimate is None:
         return None
-    start = best.estimate.values(0)
+    start = extended(model.candidate, best.estimate.candidate, best.estimate.point, {})
     given = (best.estimate.noises, start, units, 2)
     make = partial(settled, model.candidate, bench.series, *given)
     again = bench.kept("settled", model.candidate, given, make)
@@ -235,7 +236,8 @@ def _still_needed(
         candidate = bench.possible(rest)
         if candidate is None:
             continue
-        given = (base.noises, model.values(0), units, 1)
+        start = extended(candidate, model.candidate, model.point, {})
+        given = (base.noises, start, units, 1)
         make = partial(settled, candidate, bench.series, *given)
         without = bench.kept("settled", candidate, given, make)
         if evidence(model, without, bench.series).least <= thresholds.of(tried.layer):
@@ -248,10 +250,10 @@ def _still_needed(
 def _rivals(first: tuple[Tried, ...], kept: tuple[Tried, ...]) -> tuple[Tried, ...]:
     if not kept or kept[0].evidence is None:
         return ()
-    best = kept[0].evidence.total
+    best = kept[0].score
     ids = {tried.layer.id for tried in kept}
     return tuple(
         tried
         for tried in first
-        if tried.evidence and tried.layer.id not in ids and tried.evidence.total > best - CLOSE
+        if tried.evidence and tried.layer.id not in ids and tried.score > best - CLOSE
     )

@@ -12,6 +12,7 @@ from diagnosis.bench import Bench
 from diagnosis.estimation import Estimate
 from diagnosis.evidence import evidence
 from diagnosis.level import fitted
+from diagnosis.point import extended
 from diagnosis.search import Tell, Tried
 
 CLEARLY = 3.0
@@ -42,7 +43,8 @@ def swapped(
             candidate = bench.possible(layers)
             if candidate is None:
                 continue
-            start = {**rival.estimate.values(0), **model.values(0)}
+            start = extended(candidate, rival.estimate.candidate, rival.estimate.point, {})
+            start = extended(candidate, model.candidate, model.point, start)
             tried = fitted(candidate, bench.series, model.noises, start, units)
             if _gain(tried, model, bench) > CLEARLY:
                 tell(f"{rival.layer.id} goes better with the others than {kept[k].layer.id}")

@@ -69,6 +69,11 @@ RISE: list[tuple[str, str, Callable[[Array], Array]]] = [
         lambda t: 6 / J * (t - 0.2 * (t - 2 * (1 - np.exp(-t / 2)))),
     ),
     (
+        "{torque_drift@T: {values: {drop: 0.2, tau_d: 2 s, load: 1, u_r: 3, warm_0: 1}}}",
+        "6 N*m",  # heats four times as much as time alone would, from where time alone ends
+        lambda t: 6 / J * (t - 0.2 * (4 * t - 3 * 2 * (1 - np.exp(-t / 2)))),
+    ),
+    (
         "{torque_derating@T: {values: {P_max: 1 kW}}}",  # at 10 rad/s: 100 N*m
         "150 N*m",
         lambda t: 100 / J * t,
@@ -116,6 +121,20 @@ def test_a_lag_follows_a_step_exponentially(tmp_path: Path) -> None:
     assert np.max(np.abs(speed(found) - wanted)) < 1e-7
 
 
+def test_three_lags_in_a_row_follow_a_step_with_a_delay(tmp_path: Path) -> None:
+    found = ran(
+        tmp_path,
+        "rotor",
+        "{actuator_lag@T: {values: {tau: 50 ms, part: 1}}}",
+        {"T": "{start: 0 N*m, steps: {0.1 s: 6 N*m}}"},
+    )
+    t = np.maximum(found.times - 0.1, 0)
+    x = t / 0.05
+    # The integral of 1 - exp(-x) (1 + x + x^2 / 2), an Erlang distribution of three stages.
+    wanted = 6 / J * 0.05 * (x - 3 + np.exp(-x) * (3 + 2 * x + x**2 / 2))
+    assert np.max(np.abs(speed(found) - wanted)) < 1e-7
+
+
 def test_a_dead_time_shifts_what_is_delivered(tmp_path: Path) -> None:
     given = {"T": "{start: 0 N*m, steps: {0.1 s: 6 N*m}}"}
     found = ran(tmp_path, "rotor", "{actuator_delay@T: {values: {T_d: 50 ms}}}", given)
@@ -126,7 +145,7 @@ def test_a_dead_time_shifts_what_is_delivered(tmp_path: Path) -> None:
 
 
 def test_a_rate_limit_makes_a_ramp_of_a_step(tmp_path: Path) -> None:
-    limit = "{torque_rate_limit@T: {values: {r_max: 100}}}"
+    limit = "{torque_rate_limit@T: {values: {r_max: 100, tau_f: 1 ms}}}"
     found = ran(tmp_path, "rotor", limit, {"T": "{start: 0 N*m, steps: {0.1 s: 30 N*m}}"})
     t = np.clip(found.times - 0.1, 0, 0.3)
     after = np.maximum(found.times - 0.4, 0)

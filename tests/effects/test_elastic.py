@@ -14,6 +14,7 @@ EXACT = 1e-9
 """RK4 with a step of 1 ms on polynomials and slow exponentials; absolute, SI."""
 J = 2.0  # kg*m^2, of the rotor
 Array = np.ndarray
+SHOWN = ("T_hs", "theta_d", "theta_b", "x_2_half_shaft", "T_2_half_shaft")
 
 
 def speed(found: mw.Trajectory) -> Array:
@@ -113,14 +114,13 @@ def test_rubber_beside_a_spring_transmits_nothing_while_the_gap_is_open(tmp_path
     assert np.max(np.abs(np.asarray(found.signals["plant.T_r_half_shaft"])[is_open])) > 1.0
 
 
-@pytest.mark.parametrize("q", [3, -3])
-def test_a_spring_that_hardens_or_softens(tmp_path: Path, q: int) -> None:
-    effects = f"{{stiffness_nonlinear@spring: {{values: {{q: {q}}}}}}}"
+@pytest.mark.parametrize("q", [3, -0.8])
+def test_a_spring_that_hardens_or_softens(tmp_path: Path, q: float) -> None:
+    effects = f"{{stiffness_nonlinear@spring: {{values: {{q: {q}, x_r: 0.05 rad}}}}}}"
     found = ran(tmp_path, "shaft", effects, {"v": "0.1 rad/s"})
     x = 0.1 * found.times
-    root = np.sqrt(1 + 3 * (x / 0.1) ** 2)
-    wanted = 400 * x * (root if q > 0 else 1 / root) + 2
-    assert np.max(np.abs(torque(found) - wanted)) < EXACT
+    part = x**2 / (0.05**2 + x**2)  # half at x_r
+    assert np.max(np.abs(torque(found) - (400 * x * (1 + q * part) + 2))) < EXACT
     assert np.all(np.diff(torque(found)) > 0)
 
 
@@ -130,6 +130,17 @@ def test_a_stiffness_that_varies_over_a_turn(tmp_path: Path) -> None:
     t = found.times
     wanted = 40 * t * (1 + 0.2 * np.sin(30 * t + 1)) + 2
     assert np.max(np.abs(torque(found) - wanted)) < 1e-8
+
+
+def test_a_stiffness_that_varies_over_a_turn_in_harmonics(tmp_path: Path) -> None:
+    values = "{a: 0.2, ord: 2, ph: 1 rad, s_2: 0.1, c_2: -0.05, s_3: 0.03, c_3: 0.07}"
+    effects = f"{{position_dependent_stiffness@spring: {{values: {values}}}}}"
+    found = ran(tmp_path, "shaft", effects, {"v": "0.1 rad/s"})
+    t = found.times
+    angle = 20 * t + 1
+    wave = 0.2 * np.sin(angle) + 0.1 * np.sin(2 * angle) - 0.05 * np.cos(2 * angle)
+    wave += 0.03 * np.sin(3 * angle) + 0.07 * np.cos(3 * angle)
+    assert np.max(np.abs(torque(found) - (40 * t * (1 + wave) + 2))) < 1e-8
 
 
 def test_a_mount_gives_way_as_a_spring_in_series(tmp_path: Path) -> None:
@@ -193,3 +204,20 @@ def test_a_second_gap_in_series_is_as_one_that_is_wider(tmp_path: Path) -> None:
     for name in ("plant.T_hs", "plant.w_em", "plant.w_w"):
         a, b = np.asarray(both.signals[name]), np.asarray(wide.signals[name])
         assert np.max(np.abs(a - b)) < 1e-4 * np.max(np.abs(b)), name
+
+
+def test_a_second_gap_with_a_body_in_between_gives_way_by_all_of_its_parts(tmp_path: Path) -> None:
+    """At rest the twist is that of both springs and both gaps, and both ends see one torque."""
+    values = "{J_m: 0.5 kg*m^2, k_2: 20 kN*m/rad, c_2: 200 N*m*s/rad, a_2: 0.03 rad}"
+    found = ran(
+        tmp_path,
+        "driveline",
+        f"{{second_gap@half_shaft: {{values: {values}}}}}",
+        {"T_em": "30 N*m"},
+        horizon="4 s",
+        more="outputs: [w_em, w_w, T_hs, theta_d, theta_b, x_2_half_shaft, T_2_half_shaft]",
+    )
+    last = {name: float(np.asarray(found.signals[f"plant.{name}"])[-1]) for name in SHOWN}
+    assert last["T_2_half_shaft"] == pytest.approx(last["T_hs"], rel=5e-3)
+    assert last["x_2_half_shaft"] == pytest.approx(0.03 + last["T_2_half_shaft"] / 20e3, rel=1e-3)
+    assert last["theta_d"] > last["theta_b"] + last["x_2_half_shaft"] > 0.03

@@ -33,9 +33,11 @@ states:
   w_w: {initial: 38 rad/s, range: [-50, 300]}
   T_l: {initial: 5 N*m, range: [-2000, 2000]}
   th_T_em: {initial: 0 rad, range: [-100000, 100000]}
-  u_a_T_em: {initial: T_em, range: [-400, 400]}
+  u_1_T_em: {initial: T_em, range: [-400, 400]}
+  u_2_T_em: {initial: T_em, range: [-400, 400]}
+  u_3_T_em: {initial: T_em, range: [-400, 400]}
 modes: {run: {runs: {of: worn.drive_contact, method: rk4, substeps: 4, events: 8}}}
-outputs: [w_em, w_w, theta_d, theta_b, T_l, u_a_T_em]
+outputs: [w_em, w_w, theta_d, theta_b, T_l, u_1_T_em]
 """
 RIG = """language: 1
 system: rig

@@ -18,8 +18,8 @@ from tests.verify.store import ROOT
 
 LONGEST = 900.0
 """Time after which a diagnosis is given up [s]."""
-FILES = {"added_inertia": "compliance", "second_gap": "backlash"}
-"""Effects of the library whose verdict has another name where they are laid."""
+FILES = {"added_inertia": ("compliance",), "second_gap": ("backlash", "second_gap")}
+"""The files of the library that hold an effect, where they are not one of its name."""
 ALONE = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": str(ROOT)}
 
 
@@ -70,5 +70,6 @@ def _library(folder: Path, without: tuple[str, ...]) -> Path:
     with_all = Path(str(files("spec"))) / "effects"
     shutil.copytree(with_all, folder)
     for name in without:
-        (folder / f"{FILES.get(name, name)}.yaml").unlink()
+        for file in FILES.get(name, (name,)):
+            (folder / f"{file}.yaml").unlink()
     return folder
