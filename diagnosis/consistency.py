@@ -45,7 +45,8 @@ MOST_SIMULATED = Fraction(24)
 class Relation:
     """How a measured output goes with the simulated one: measured = gain * simulated(t - lag).
 
-    Of the gain of fast and of slow motion that is taken which is nearer to 1.
+    Of the gain of fast and of slow motion that is taken which is nearer to 1. `level` is how large
+    it is against the simulated one once both have found to each other.
     """
 
     recording: str
@@ -54,6 +55,7 @@ class Relation:
     lag: float
     correlation: float
     correlation_without_lag: float
+    level: float = 1.0
 
     @property
     def is_clear(self) -> bool:
@@ -158,7 +160,10 @@ def relation_of(
         best = against
     gains = [_ratio(pair) for pair in (pairs[best], *_slow(compared, grid, best))]
     gain = math.copysign(min(gains, key=lambda g: abs(math.log(g))), correlations[best])
-    return Relation(recording, name, gain, best * GRID, correlations[best], correlations[0])
+    late = compared.times > 0.5 * (start + end)
+    level = _size(compared.measured[late]) / max(_size(compared.simulated[late]), 1e-12)
+    both = correlations[best], correlations[0]
+    return Relation(recording, name, gain, best * GRID, *both, level)
 
 
 def _slow(compared: Compared, grid: Values, lag: int) -> list[tuple[Values, Values]]:
@@ -177,6 +182,10 @@ def _slow(compared: Compared, grid: Values, lag: int) -> list[tuple[Values, Valu
 def _ratio(pair: tuple[Values, Values]) -> float:
     """Return the ratio of the spreads, held within what any mistake of units makes."""
     return min(max(float(np.std(pair[0])) / max(float(np.std(pair[1])), 1e-12), 1e-6), 1e6)
+
+
+def _size(values: Values) -> float:
+    return float(np.sqrt(np.mean(values**2)))
 
 
 def _overlap(measured: Values, simulated: Values, lag: int) -> tuple[Values, Values]:

@@ -81,6 +81,23 @@ def disagreements(
     return [*shared, *[_weaker(f) for f in rest if f.kind != "clock_offset" or f.recording in sure]]
 
 
+def go_together(finding: Finding, relations: Sequence[Relation]) -> bool:
+    """Tell whether an output is as large as others say that go with the model.
+
+    What the model lacks may shake one output many times as much as it does the simulated one; in
+    another unit it would be as far from all others.
+    """
+    if finding.kind not in ("unit", "scale"):
+        return False
+    here = [r for r in relations if finding.recording in ("", r.recording)]
+    own = [r.level for r in here if r.channel == finding.channel]
+    right = [r for r in here if r.is_clear and 1.0 / ODD_SCALE < r.gain < ODD_SCALE]
+    others = [r.level for r in right if r.channel != finding.channel]
+    if not own or not others or not min(*own, *others) > 0.0:
+        return False
+    return abs(math.log(median(own) / median(others))) < math.log(1.0 + NEAR_FACTOR)
+
+
 def _is_shared(
     finding: Finding, own: Mapping[str, Sequence[Finding]], relations: Sequence[Relation]
 ) -> bool:

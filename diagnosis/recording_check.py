@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from diagnosis.alike import alike
 from diagnosis.channel_check import ChannelCheck, check_channel, findings_of
 from diagnosis.consistency import Relation, relations
-from diagnosis.disagreement import disagreements
+from diagnosis.disagreement import disagreements, go_together
 from diagnosis.excitation import Excitation, excitation
 from diagnosis.finding import Finding, by_severity
 from diagnosis.outlier import outliers, pauses, without_huge
@@ -84,6 +84,7 @@ def check_recordings(
         found = relations(whole, reference)
         odd = disagreements(found, reference.automaton, mapping, whole)
         odd = cured(odd, remedies(found, whole, reference, odd))
+        odd = [finding for finding in odd if not go_together(finding, found)]
         findings += _compared(odd, whole, mistakes)
     return RecordingCheck(tuple(channels), by_severity(findings), excited, tuple(found))
 

@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from diagnosis.consistency import relation_of
-from diagnosis.finding import told
+from diagnosis.consistency import Relation, relation_of
+from diagnosis.disagreement import go_together
+from diagnosis.finding import Finding, told
 from diagnosis.free_run import Compared
 from diagnosis.needs import EFFECTS, NEEDS
 from diagnosis.recording_check import check_recordings
@@ -217,3 +218,17 @@ def test_a_piece_of_any_length_is_compared() -> None:
         late = np.roll(speed, 30)
         found = relation_of("short", "w", Compared("w", times, late, speed))
         assert found is None or 0.2 < found.gain < 5.0
+
+
+@pytest.mark.parametrize(
+    ("level", "gain", "is_refuted"),
+    [(1.05, 1.2, True), (0.11, 1.2, False), (1.05, 9.0, False)],
+    ids=["as large as the other", "as far from it as a unit", "the other is odd too"],
+)
+def test_a_unit_is_not_blamed_where_outputs_go_together(
+    level: float, gain: float, is_refuted: bool
+) -> None:
+    shaken = Relation("run", "wheel", 9.0, 0.0, 0.9, 0.9, level)
+    other = Relation("run", "motor", gain, 0.0, 0.9, 0.9, 1.0)
+    finding = Finding("unit", "run", "wheel", "rpm taken for rad/s?", "error")
+    assert go_together(finding, [shaken, other]) is is_refuted
