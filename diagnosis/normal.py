@@ -76,10 +76,11 @@ def normal_of(candidate: Candidate, outcome: Outcome, columns: Columns) -> Norma
     a = np.zeros((len(blocks), count, count))
     g = np.zeros((len(blocks), count))
     for place, block in enumerate(blocks):
-        changes = jacobian[:, block.part].reshape(count, -1)
+        error = missed[block.part].reshape(-1)
+        changes = jacobian[:, block.part].reshape(count, len(error))
         weighted = changes * weight[block.part].reshape(-1)
         a[place] = weighted @ changes.T
-        g[place] = weighted @ missed[block.part].reshape(-1)
+        g[place] = weighted @ error
     of, fold = [np.array([getattr(b, name) for b in blocks]) for name in ("recording", "fold")]
     return Normal(a, g, is_own(candidate), of, fold)
 
