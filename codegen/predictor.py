@@ -8,6 +8,7 @@ import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from codegen.source import c_files
 from language.program import Program, short
 
 Reals = NDArray[np.float64]
+Wholes = NDArray[np.int64]
 MOST_SAMPLES = 5000
 """Samples after which a gain that still changes is taken for the steady one."""
 CLOSE = 1e-6
@@ -60,6 +62,50 @@ class Prediction:
     states: Reals
     modes: NDArray[np.int16]
     done: int
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """Recordings one after the other in C-contiguous arrays: `inputs` (samples, inputs), and
+    `measured` (samples, seen) with NaN where nothing is known.
+
+    Recording r has the samples from `starts[r]` to `starts[r + 1]`, of which the first `skips[r]`
+    do not count; its inputs are held, or run straight in between where `linear[r]`.
+    """
+
+    inputs: Reals
+    measured: Reals
+    starts: Wholes
+    skips: Wholes
+    linear: Wholes
+
+
+@dataclass(frozen=True)
+class Runs:
+    """What the runs of several recordings gave, one after the other as in a Prediction.
+
+    `squares` and `counts` (recordings, seen) are the sums of the squares that count, and how many.
+    """
+
+    whole: Prediction
+    starts: Wholes
+    done: Wholes
+    squares: Reals
+    counts: Reals
+
+    def each(self) -> tuple[Prediction, ...]:
+        """Return the run of each recording, views of what is here."""
+        whole, edges = self.whole, pairwise(self.starts.tolist())
+        return tuple(
+            Prediction(
+                whole.innovations[low:high],
+                whole.seen[low:high],
+                whole.states[low:high],
+                whole.modes[low:high],
+                done,
+            )
+            for (low, high), done in zip(edges, self.done.tolist(), strict=True)
+        )
 
 
 def columns_of(program: Program, seen: Sequence[str]) -> Columns:
@@ -179,8 +225,43 @@ class Predictor:
         )
         return Prediction(innovations, seen, states, modes, int(done))
 
+    def predict_all(
+        self,
+        pages: Reals,
+        recorded: Recorded,
+        first_gains: Reals,
+        gains: Reals,
+        substeps: int,
+        limits: Reals,
+    ) -> Runs:
+        """Follow several recordings, each with its row of `pages` (recordings, tunables).
 
-def _at(values: Reals) -> int:
+        Innovations beyond `limits` (seen,) count in proportion. The other arrays are those of
+        `predict`.
+        """
+        starts, samples = recorded.starts, len(recorded.inputs)
+        whole = Prediction(
+            np.full((samples, len(self.seen)), np.nan),
+            np.full((samples, len(self.seen)), np.nan),
+            np.empty((samples, len(self.states))),
+            np.zeros(samples, dtype=np.int16),
+            samples,
+        )
+        done, count = np.empty(len(pages), dtype=np.int64), len(pages)
+        squares, counts = np.empty((count, len(self.seen))), np.empty((count, len(self.seen)))
+        self._library.modewright_predict_all(
+            *(_at(a) for a in (pages, recorded.inputs, recorded.measured, first_gains)),
+            *(len(first_gains), _at(gains), count, _at(starts), _at(recorded.linear), substeps),
+            *(_at(a) for a in (whole.innovations, whole.seen, whole.states, whole.modes, done)),
+        )
+        self._library.modewright_squares(
+            *(_at(whole.innovations), count, _at(starts), _at(recorded.skips)),
+            *(_at(np.ascontiguousarray(limits)), _at(squares), _at(counts)),
+        )
+        return Runs(whole, starts, done, squares, counts)
+
+
+def _at(values: NDArray[Any]) -> int:
     return int(values.ctypes.data)
 
 
@@ -227,6 +308,17 @@ def _loaded(path: Path) -> Any:
         *(whole, whole, ctypes.c_int, pointer, pointer, pointer, pointer, pointer),
     ]
     library.modewright_predict.restype = whole
+    library.modewright_predict_all.argtypes = [
+        *(pointer, pointer, pointer, pointer, whole, pointer),
+        *(whole, pointer, pointer, whole),
+        *(pointer, pointer, pointer, pointer, pointer),
+    ]
+    library.modewright_predict_all.restype = None
+    library.modewright_squares.argtypes = [
+        *(pointer, whole, pointer, pointer),
+        *(pointer, pointer, pointer),
+    ]
+    library.modewright_squares.restype = None
     return library
 
 

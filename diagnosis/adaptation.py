@@ -62,7 +62,7 @@ def turned(estimate: Estimate, series: Sequence[Series]) -> Estimate:
             trial = best.copy()
             trial[:, k] = uncertain[k].coordinate(start)
             outcome = outcome_at(estimate, series, Point(estimate.point.shared, trial))
-            each = np.array([np.nansum(one / variances) for one in outcome.squares])
+            each = np.sum(outcome.runs.squares / variances, axis=1)
             better = each < lowest
             best[better, k], lowest[better] = trial[better, k], each[better]
     point = Point(estimate.point.shared, best)

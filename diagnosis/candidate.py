@@ -6,6 +6,7 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,13 +59,33 @@ class Candidate:
 
     def page(self, values: Mapping[str, float], series: Series) -> Reals:
         """Return the calibration for one recording: values, and where its states start."""
-        known = {**self.predictor.page, **values}
-        for column, name in enumerate(self.predictor.seen):
-            fresh = START.format(name)
-            if fresh in known:
-                first = float(series.first[column])
-                known[fresh] = first if np.isfinite(first) else known[fresh]
-        return np.array([known[name] for name in self.predictor.page])
+        return np.asarray(self.pages([values], series.first[np.newaxis])[0], dtype=np.float64)
+
+    def pages(self, values: Sequence[Mapping[str, float]], first: Reals) -> Reals:
+        """Return the calibration for each recording (recordings, tunables) from its values.
+
+        `first` (recordings, seen) are the values that its signals start with, NaN if unknown.
+        """
+        alike = all(own is values[0] for own in values)
+        rows = [list({**self._known, **own}.values()) for own in (values[:1] if alike else values)]
+        width = len(self._known)
+        found = np.array([row[:width] for row in rows])
+        found = np.repeat(found, len(values), axis=0) if alike else found
+        for column, place in self._starts:
+            begun = first[:, column]
+            found[:, place] = np.where(np.isfinite(begun), begun, found[:, place])
+        return found
+
+    @cached_property
+    def _known(self) -> dict[str, float]:
+        return dict(self.predictor.page)
+
+    @cached_property
+    def _starts(self) -> list[tuple[int, int]]:
+        """The columns of compared signals, and of the page where each one's state starts."""
+        places = {name: place for place, name in enumerate(self.predictor.page)}
+        fresh = [(k, START.format(name)) for k, name in enumerate(self.predictor.seen)]
+        return [(k, places[name]) for k, name in fresh if name in places]
 
 
 def candidate(

@@ -29,7 +29,8 @@ Bootstrap = Literal["never", "kept", "made"]
 class Case:
     """What is diagnosed: an expanded automaton, a map, and recordings.
 
-    `names` are those of files whose bare name is not theirs alone, `read` what was read already.
+    `names` are those of files whose bare name is not theirs alone, `read` what was read already,
+    `opened` what is read on the way.
     In the folder `stages` it is kept what was found, so that a diagnosis that was ended goes on
     from there. `before` is called before each fit: it may raise what ends the diagnosis.
     """
@@ -44,6 +45,7 @@ class Case:
     bootstrap: Bootstrap = "never"
     names: Mapping[Path, str] = field(default_factory=dict)
     read: Mapping[Path, Recording] = field(default_factory=dict, repr=False)
+    opened: dict[Path, Recording] = field(default_factory=dict, repr=False)
     stages: Path | None = None
     before: Callable[[], None] = lambda: None
 
@@ -66,7 +68,7 @@ def read_series(
     ]
     recording = case.read.get(path)
     if recording is None or not recording.channels.keys() >= set(used):
-        recording = read_recording(path, case.mapping, used)
+        recording = case.opened[path] = read_recording(path, case.mapping, used)
     named = dataclasses.replace(recording, name=case.name_of(path))
     return pieces_of(named, case.mapping, automaton, seen)
 

@@ -16,7 +16,7 @@ import numpy as np
 from diagnosis.candidate import Candidate
 from diagnosis.gains import gains_of
 from diagnosis.normal import Columns, Normal, columns_of, normal_of, stepped
-from diagnosis.point import Point, point_of, values_at
+from diagnosis.point import Point, all_values_at, point_of, values_at
 from diagnosis.prediction import Gains, Noises, Outcome, predicted
 from diagnosis.series import Series
 
@@ -155,7 +155,7 @@ def improved(
 def _run(
     candidate: Candidate, series: Sequence[Series], point: Point, gains: Gains, noises: Noises
 ) -> Outcome:
-    values = [values_at(candidate, point, k) for k in range(len(series))]
+    values = all_values_at(candidate, point)[: len(series)]
     return predicted(candidate, series, values, gains, noises.limits)
 
 

@@ -154,8 +154,8 @@ def _kept_cost(model: Estimate, outcome: Outcome, point: Point, fold: int, scale
 def _squares(outcome: Outcome, fold: int, others: bool) -> Reals:
     """Return the sums of squares (recordings, seen) of a fold, or of all others."""
     squares = outcome.squares
-    found = np.zeros((len(squares), squares[0].shape[1]))
+    found = np.zeros((len(outcome.parts), squares.shape[1]))
     for block in outcome.blocks:
         if (block.fold != fold) == others:
-            found[block.recording] += np.nansum(squares[block.recording][block.part], axis=0)
+            found[block.recording] += np.nansum(squares[block.part], axis=0)
     return found

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.candidate import Candidate
+from diagnosis.joined import burnt
 from diagnosis.linear import Linear, linearised
-from diagnosis.prediction import Gains, Noises, Outcome, burnt
+from diagnosis.prediction import Gains, Noises, Outcome
 from diagnosis.series import Series
 
 Reals = NDArray[np.float64]

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from diagnosis.bench import Bench
 from diagnosis.companion import along
 from diagnosis.estimation import Estimate
+from diagnosis.joined import burnt
 from diagnosis.layers import DRIFT, Layer
-from diagnosis.prediction import burnt
 from diagnosis.scale import scale_of
 from diagnosis.series import Series
 from diagnosis.smoothing import smoothed

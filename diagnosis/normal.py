@@ -13,8 +13,8 @@ from diagnosis.point import Point, bounds_of, is_own
 from diagnosis.prediction import Outcome
 
 Reals = NDArray[np.float64]
-Columns = Mapping[str, tuple[Reals, ...]]
-"""How the innovations of each recording (samples, seen) change with the coordinate of a name."""
+Columns = Mapping[str, Reals]
+"""How the joined innovations (n, seen) of all recordings change with the coordinate of a name."""
 MOST = 1e100
 """Bound of a change: a run that leaves all bounds tells no more than its sign."""
 STEP = 2e-3
@@ -54,8 +54,7 @@ def columns_of(
         k = candidate.names.index(name)
         ahead = point.moved(candidate, k, STEP)
         size = float(ahead.shared[k] - point.shared[k])
-        pairs = zip(run(ahead).innovations, outcome.innovations, strict=True)
-        found[name] = tuple(_known((a - b) / size) for a, b in pairs)
+        found[name] = _known((run(ahead).joined - outcome.joined) / size)
     return found
 
 
@@ -66,23 +65,22 @@ def _known(changes: Reals) -> Reals:
 
 def normal_of(candidate: Candidate, outcome: Outcome, columns: Columns) -> Normal:
     """Return the normal equations of an outcome, of all coordinates of a candidate."""
-    count, blocks = len(candidate.uncertain), outcome.blocks
-    scale = 1.0 / outcome.variances
-    each = []
-    for r, innovation in enumerate(outcome.innovations):
-        known = np.isfinite(innovation)
-        far = np.maximum(np.abs(innovation) / outcome.limits, 1.0)
-        changes = np.array([columns[name][r] for name in candidate.names])
-        jacobian = changes.reshape(count, *innovation.shape) * known
-        each.append((jacobian, np.where(known, scale / far, 0.0), np.where(known, innovation, 0.0)))
+    blocks, innovation = outcome.blocks, outcome.joined
+    known = np.isfinite(innovation)
+    far = np.maximum(np.abs(innovation) / outcome.limits, 1.0)
+    weight = np.where(known, 1.0 / outcome.variances / far, 0.0)
+    missed = np.where(known, innovation, 0.0)
+    jacobian = np.array([columns[name] for name in candidate.names])
+    count = len(jacobian)
+    jacobian = jacobian.reshape(count, *innovation.shape)
     a = np.zeros((len(blocks), count, count))
     g = np.zeros((len(blocks), count))
     for place, block in enumerate(blocks):
-        jacobian, weight, innovation = (one[..., block.part, :] for one in each[block.recording])
-        changes = jacobian.reshape(count, innovation.size)
-        weighted = changes * weight.reshape(-1)
+        error = missed[block.part].reshape(-1)
+        changes = jacobian[:, block.part].reshape(count, len(error))
+        weighted = changes * weight[block.part].reshape(-1)
         a[place] = weighted @ changes.T
-        g[place] = weighted @ innovation.reshape(-1)
+        g[place] = weighted @ error
     of, fold = [np.array([getattr(b, name) for b in blocks]) for name in ("recording", "fold")]
     return Normal(a, g, is_own(candidate), of, fold)
 

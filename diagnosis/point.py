@@ -76,6 +76,18 @@ def values_at(candidate: Candidate, point: Point, recording: int) -> dict[str, f
     }
 
 
+def all_values_at(candidate: Candidate, point: Point) -> list[dict[str, float]]:
+    """Return the parameters [SI] of every recording; one that all share is made once."""
+    shared, recordings = values_at(candidate, point, 0), range(len(point.own))
+    own = [(k, one) for k, one in enumerate(candidate.uncertain) if one.per_recording]
+    if not own:
+        return [shared for _ in recordings]
+    return [
+        {**shared, **{one.name: one.value(float(point.own[r, k])) for k, one in own}}
+        for r in recordings
+    ]
+
+
 def is_own(candidate: Candidate) -> NDArray[np.bool_]:
     """Return which parameters each recording has of its own (parameters,)."""
     return np.array([one.per_recording for one in candidate.uncertain], dtype=bool)

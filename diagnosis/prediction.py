@@ -14,14 +14,13 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.predictor import Prediction
+from codegen.predictor import Prediction, Runs
 from diagnosis.candidate import Candidate
+from diagnosis.joined import joined
 from diagnosis.noise import MAD
 from diagnosis.series import Series
 
 Reals = NDArray[np.float64]
-BURN_IN = 0.5
-"""Seconds at the start of a recording that do not count: the states are being found."""
 FOLDS = 5
 """Parts of the recordings that are left out in turn: every fifth block in time of each."""
 
@@ -52,7 +51,7 @@ class Gains:
 
 @dataclass(frozen=True)
 class Block:
-    """A part of the innovations of a `recording`, left out with the others of its `fold`."""
+    """A `part` of the joined innovations, of a `recording`; left out with others of its `fold`."""
 
     recording: int
     fold: int
@@ -61,23 +60,48 @@ class Block:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Innovations of all recordings behind their burn-in, (samples, seen) each.
+    """How recordings were foreseen: their `runs`, of which the samples `skips` do not count.
 
-    Those beyond `limits` (seen,) count in proportion.
+    Innovations beyond `limits` (seen,) count in proportion. `is_whole` where no run left all
+    bounds.
     """
 
-    innovations: tuple[Reals, ...]
-    predictions: tuple[Prediction, ...] = field(repr=False)
+    runs: Runs = field(repr=False)
+    skips: NDArray[np.int64] = field(repr=False)
     limits: Reals = field(repr=False)
     is_whole: bool = True
+
+    @cached_property
+    def predictions(self) -> tuple[Prediction, ...]:
+        """The run of each recording."""
+        return self.runs.each()
+
+    @cached_property
+    def joined(self) -> Reals:
+        """The innovations of all recordings behind their burn-in, one after the other (n, seen)."""
+        starts = self.runs.starts
+        edges = zip((starts[:-1] + self.skips).tolist(), starts[1:].tolist(), strict=True)
+        return np.concatenate([self.runs.whole.innovations[low:high] for low, high in edges])
+
+    @cached_property
+    def parts(self) -> list[slice]:
+        """Where the innovations of each recording are among the joined ones."""
+        lengths = np.maximum(np.diff(self.runs.starts) - self.skips, 0)
+        edges = [0, *np.cumsum(lengths).tolist()]
+        return [slice(low, high) for low, high in pairwise(edges)]
+
+    @property
+    def innovations(self) -> tuple[Reals, ...]:
+        """The innovations of each recording behind its burn-in, (samples, seen) each."""
+        return tuple(self.joined[part] for part in self.parts)
 
     @cached_property
     def blocks(self) -> list[Block]:
         """The recordings, each cut into `FOLDS` blocks."""
         found = []
-        for r, innovation in enumerate(self.innovations):
-            edges = np.linspace(0, len(innovation), FOLDS + 1).astype(int).tolist()
-            parts = [slice(low, high) for low, high in pairwise(edges)]
+        for r, whole in enumerate(self.parts):
+            edges = np.linspace(0, whole.stop - whole.start, FOLDS + 1).astype(int) + whole.start
+            parts = [slice(low, high) for low, high in pairwise(edges.tolist())]
             found += [Block(r, (r + k) % FOLDS, part) for k, part in enumerate(parts)]
         return found
 
@@ -88,28 +112,25 @@ class Outcome:
         return float(np.sum(0.5 * self.counts * np.log(self.variances)))
 
     @cached_property
-    def squares(self) -> list[Reals]:
-        """The squares that count (Huber 1964), (samples, seen) for each recording."""
-        found = []
-        for e in self.innovations:
-            near = np.minimum(np.abs(e), self.limits)
-            found.append(near * (2.0 * np.abs(e) - near))
-        return found
+    def squares(self) -> Reals:
+        """The joined squares that count (Huber 1964), (n, seen)."""
+        size = np.abs(self.joined)
+        near = np.minimum(size, self.limits)
+        return np.asarray(near * (2.0 * size - near), dtype=np.float64)
 
     def robust(self) -> Reals:
         """Return the standard deviation of the innovations by their median (seen,)."""
-        return MAD * np.nanmedian(np.abs(np.concatenate(self.innovations)), axis=0)
+        return MAD * np.nanmedian(np.abs(self.joined), axis=0)
 
     @cached_property
     def counts(self) -> Reals:
         """How many innovations each channel has (seen,)."""
-        found: Reals = np.sum([np.sum(np.isfinite(e), axis=0) for e in self.innovations], axis=0)
-        return found
+        return np.asarray(self.runs.counts.sum(axis=0), dtype=np.float64)
 
     @cached_property
     def variances(self) -> Reals:
         """The mean square innovation of each channel (seen,)."""
-        squares = np.sum([np.nansum(one, axis=0) for one in self.squares], axis=0)
+        squares = self.runs.squares.sum(axis=0)
         found: Reals = np.maximum(squares / np.maximum(self.counts, 1.0), 1e-300)
         return found
 
@@ -122,11 +143,6 @@ def noises_of(series: Sequence[Series], drifts: Mapping[str, float]) -> Noises:
     return Noises(known, np.median(inputs, axis=0), drifts, np.full(len(known), np.inf))
 
 
-def burnt(series: Series) -> int:
-    """Return how many samples at the start of a recording do not count."""
-    return max(1, round(BURN_IN / float(series.period)))
-
-
 def predicted(
     candidate: Candidate,
     series: Sequence[Series],
@@ -135,20 +151,15 @@ def predicted(
     limits: Reals,
 ) -> Outcome:
     """Return the innovations of recordings, each with values of its own (per recording)."""
-    found = []
-    for one, own in zip(series, values, strict=True):
-        page = candidate.page(own, one)
-        found.append(
-            candidate.predictor.predict(
-                page,
-                one.inputs,
-                one.measured,
-                gains.first,
-                gains.steady,
-                candidate.recipe.substeps,
-                one.is_linear,
-            )
-        )
-    innovations = tuple(p.innovations[burnt(one) :] for p, one in zip(found, series, strict=True))
-    whole = all(p.done == one.count for p, one in zip(found, series, strict=True))
-    return Outcome(innovations, tuple(found), limits, whole)
+    together = joined(series)
+    recorded = together.recorded
+    runs = candidate.predictor.predict_all(
+        candidate.pages(values, together.first),
+        recorded,
+        gains.first,
+        gains.steady,
+        candidate.recipe.substeps,
+        limits,
+    )
+    whole = bool(np.array_equal(runs.done, np.diff(recorded.starts)))
+    return Outcome(runs, recorded.skips, limits, whole)

@@ -17,8 +17,8 @@ from codegen.predictor import Prediction
 from diagnosis.bench import Bench
 from diagnosis.candidate import Candidate, candidate
 from diagnosis.estimation import Estimate
+from diagnosis.joined import burnt
 from diagnosis.layers import DRIFT, Layer, drift
-from diagnosis.prediction import burnt
 from diagnosis.scale import KINDS
 from diagnosis.series import Series
 from language.document import Document, Entry, Scalar, Table

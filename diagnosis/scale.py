@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from diagnosis.bench import Bench
 from diagnosis.estimation import Estimate
+from diagnosis.joined import burnt
 from diagnosis.layers import drift
-from diagnosis.prediction import burnt
 from language.place import Misfit, place_of
 
 Reals = NDArray[np.float64]

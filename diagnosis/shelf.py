@@ -121,8 +121,7 @@ def _arrays(one: Estimate) -> Arrays:
     }
     if one.normal is not None:
         found |= {f"normal_{name}": getattr(one.normal, name) for name in NORMAL}
-    for name, parts in one.columns.items():
-        found |= {f"column_{name}_{k}": part for k, part in enumerate(parts)}
+    found |= {f"column_{name}": changes for name, changes in one.columns.items()}
     return found
 
 
@@ -138,10 +137,7 @@ def _estimate(candidate: Candidate, series: Sequence[Series], of: Arrays) -> Est
     normal = None
     if "normal_a" in of:
         normal = Normal(**{name: of[f"normal_{name}"] for name in NORMAL})
-    columns = {
-        str(name): tuple(of[f"column_{name}_{k}"] for k in range(len(series)))
-        for name in of["columns"]
-    }
+    columns = {str(name): of[f"column_{name}"] for name in of["columns"]}
     blank: Any = None
     found = Estimate(candidate, point, float(of["cost"]), blank, gains, noises, normal, columns)
     outcome = outcome_at(found, series, point)

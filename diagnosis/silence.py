@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from diagnosis.estimation import Estimate, looked_at
 from diagnosis.freedom import ALL_LEVELS, SMALL_LEVEL, scanned, with_levels
+from diagnosis.joined import burnt
 from diagnosis.level import FIRST_LEVELS, settled, units_of
 from diagnosis.point import Point
-from diagnosis.prediction import burnt
 from diagnosis.series import Series
 
 Truths = NDArray[np.bool_]

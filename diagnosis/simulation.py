@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.estimation import Estimate
-from diagnosis.prediction import burnt, predicted
+from diagnosis.joined import burnt
+from diagnosis.prediction import predicted
 from diagnosis.series import Series
 from diagnosis.verdict import Misfit
 

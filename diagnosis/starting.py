@@ -43,7 +43,7 @@ def started(model: Estimate, series: Sequence[Series]) -> tuple[Series, ...]:
         trials = [one, *_others(one, model.noises.inputs)]
         for trial in trials:
             outcome = outcome_at(model, [trial], alone)
-            squares = np.nansum(outcome.squares[0], axis=0)
+            squares = outcome.runs.squares[0]
             costs.append(0.5 * float(np.sum(squares / variances)) if outcome.is_whole else np.inf)
         best = int(np.argmin(costs))
         found.append(trials[best] if costs[best] < costs[0] - CLEARLY else one)

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.prediction import burnt
+from diagnosis.joined import burnt
 from diagnosis.series import Series
 
 Reals = NDArray[np.float64]

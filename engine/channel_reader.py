@@ -6,6 +6,7 @@ import itertools
 import math
 from collections.abc import Sequence
 from fractions import Fraction
+from functools import cached_property
 
 from engine.recorded_csv import DECIMAL
 from engine.recorded_file import MAX_PROBLEMS, RecordedFile, Samples
@@ -51,6 +52,12 @@ class ChannelReader:
         self.mapping = mapping
         self.problems = problems
         self.clock = [] if file.is_stamped else self.times(mapping.time)
+
+    @cached_property
+    def whole(self) -> tuple[Fraction, ...]:
+        """The time stamps that the rows share; empty where one is blank."""
+        known = tuple(time for time in self.clock if time is not None)
+        return known if len(known) == len(self.clock) else ()
 
     @property
     def is_full(self) -> bool:
@@ -114,6 +121,10 @@ class ChannelReader:
         kept: list[float] = []
         scale = float(column.scale[0]) * column.sign
         means = cells[0] if len(cells) == 1 else _means(cells)
+        if stamps is self.clock and self.whole and not column.delay and None not in means:
+            values = tuple(mean * scale for mean in means if mean is not None)
+            if len(values) == len(self.whole) and all(map(math.isfinite, values)):
+                return self.whole, values
         for k, (stamp, mean) in enumerate(zip(stamps, means, strict=False)):
             if mean is None:
                 continue
@@ -136,6 +147,10 @@ class ChannelReader:
     def _values(self, name: str, samples: Samples, column: Column) -> list[float | None]:
         factor, offset = float(column.unit.factor), float(column.unit.offset)
         self._check_unit(name, samples.unit, column)
+        if None not in samples.values and not self.is_full:
+            plain = [value for value in samples.values if value is not None]
+            if all(map(math.isfinite, plain)):
+                return [value * factor + offset for value in plain]
         found: list[float | None] = []
         for k, value in enumerate(samples.values):
             if self.is_full:

@@ -17,6 +17,11 @@ from language.project import shown
 DECIMAL = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,3})?", re.ASCII)
 """A number: longer ones, and words such as `nan`, are none."""
 
+PLAIN = re.compile(rf"(?:{DECIMAL.pattern}\n)*+{DECIMAL.pattern}", re.ASCII)
+"""Numbers alone, one a line: most columns are such."""
+LONGEST_PLAIN = 100_000
+"""A line that is shorter has no cell that is too long for a CSV reader."""
+
 
 def read_csv(path: Path, problems: Problems) -> RecordedFile:
     """Read a CSV file; rows that do not fit the head line are reported. Raises SpecError."""
@@ -81,6 +86,8 @@ class _Rows:
                 break
 
     def _cells_of(self, number: int, line: str, problems: Problems) -> list[str]:
+        if '"' not in line and len(line) < LONGEST_PLAIN:
+            return line.split(",")
         try:
             return next(csv.reader([line], strict=True))
         except csv.Error as error:
@@ -101,8 +108,14 @@ class _Rows:
             width = len(row[position]) if position < len(row) else 1
             return Span(self.source, line, column, max(1, width))
 
-        texts = (text(k) for k in range(len(self.rows)))
-        return Samples([_number(cell) for cell in texts], text, place)
+        return Samples(_numbers([text(k) for k in range(len(self.rows))]), text, place)
+
+
+def _numbers(texts: list[str]) -> list[float | None]:
+    """Return the number of each cell, None for an empty one, NaN for what is none."""
+    if PLAIN.fullmatch("\n".join(texts)):
+        return [float(text) for text in texts]
+    return [_number(text) for text in texts]
 
 
 def _number(text: str) -> float | None:

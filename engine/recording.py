@@ -33,12 +33,18 @@ class Channel:
     @cached_property
     def seconds(self) -> NDArray[np.float64]:
         """Time stamps [s] (n_samples,), rounded."""
-        return np.array([float(time) for time in self.times])
+        return np.array([time.numerator / time.denominator for time in self.times])
 
     @cached_property
     def array(self) -> NDArray[np.float64]:
         """Values in SI (n_samples,)."""
         return np.array(self.values)
+
+    def part(self, cut: slice) -> Channel:
+        """Return a stretch of the samples."""
+        found = Channel(self.column, self.times[cut], self.values[cut])
+        vars(found).update(seconds=self.seconds[cut], array=self.array[cut])
+        return found
 
 
 @dataclass(frozen=True)
@@ -71,8 +77,7 @@ def cut(recording: Recording, window: Window) -> Recording:
         first = bisect_left(channel.times, window[0])
         last = bisect_right(channel.times, window[1])
         if first < last:
-            cut = slice(first, last)
-            channels[name] = Channel(channel.column, channel.times[cut], channel.values[cut])
+            channels[name] = channel.part(slice(first, last))
     start, end = max(window[0], recording.start), min(window[1], recording.end)
     return Recording(recording.name, channels, end, start, (window,))
 
@@ -99,10 +104,10 @@ def read_recording(path: Path, mapping: RecordingMap, used: Sequence[str]) -> Re
     reader = ChannelReader(file, mapping, problems)
     channels = {column.name: Channel(column, *reader.samples(column)) for column in columns}
     problems.stop_if_any()
-    stamps = reader.clock
+    ends = [*reader.clock[:1], *reader.clock[-1:]]
     if file.is_stamped:
-        stamps = [t for c in channels.values() for t in (c.times[0], c.times[-1])]
-    known = [time for time in stamps if time is not None]
+        ends = [t for c in channels.values() for t in (c.times[0], c.times[-1])]
+    known = [time for time in ends if time is not None]
     windows = windows_of(path, mapping, problems)
     problems.stop_if_any()
     return within(Recording(path.name, channels, max(known), min(known), windows), mapping)

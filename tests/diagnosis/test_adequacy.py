@@ -10,9 +10,9 @@ import pytest
 from diagnosis.adequacy import is_inadequate, refused
 from diagnosis.bench import Bench
 from diagnosis.evidence import evidence
+from diagnosis.joined import burnt
 from diagnosis.layers import fitting
 from diagnosis.level import settled, units_of
-from diagnosis.prediction import burnt
 from diagnosis.search import Tried
 from diagnosis.selection import Selection
 from diagnosis.series import Series

@@ -7,12 +7,13 @@ import pytest
 from diagnosis.bench import Bench
 from diagnosis.estimation import Estimate
 from diagnosis.freedom import freed
+from diagnosis.joined import BURN_IN
 from diagnosis.layers import drift, fitting
 from diagnosis.level import first_fit, recalibrated, units_of
 from diagnosis.location import acting, led_by
 from diagnosis.locus import Locus, locus_of
 from diagnosis.place_sentence import NOTHING, place_sentence
-from diagnosis.prediction import BURN_IN, noises_of
+from diagnosis.prediction import noises_of
 from diagnosis.series import Series
 from tests.diagnosis.test_estimation import FRICTION, TRUTH, bench, recorded
 

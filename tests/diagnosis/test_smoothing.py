@@ -9,9 +9,10 @@ from filterpy.kalman import KalmanFilter, rts_smoother
 
 from diagnosis.bench import Bench
 from diagnosis.estimation import looked_at
+from diagnosis.joined import burnt
 from diagnosis.level import units_of
 from diagnosis.point import point_of
-from diagnosis.prediction import burnt, noises_of
+from diagnosis.prediction import noises_of
 from diagnosis.smoothing import Steps, deviations, smoothed
 from tests.diagnosis.test_estimation import TRUTH, bench, recorded
 
