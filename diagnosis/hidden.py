@@ -25,7 +25,7 @@ from diagnosis.point import extended
 from diagnosis.search import Tell, Tried
 from diagnosis.selection import PART, Selection, counted, selected
 from diagnosis.silence import from_silence
-from diagnosis.stirring import stirring
+from diagnosis.stirring import resting, stirring
 from diagnosis.threshold import USUAL, Thresholds
 
 Reals = NDArray[np.float64]
@@ -37,6 +37,8 @@ KNOWN = 0.5
 """Correlation with something known from which on an input is not hidden: it follows that."""
 STIRRED = 0.3
 """Correlation of its loudness with the movement of known inputs from which on it is an answer."""
+RESTING = 0.7
+"""Correlation of its loudness with rest from which on it is what a friction lacks."""
 NEAR = 0.9
 """Part of what the best place gains that another one gains nearly the same with."""
 LITTLE = 0.5
@@ -81,11 +83,12 @@ def with_hidden(
     model = with_normal(place.free, bench.series)
     others = (one for one in loci if one.path != place.path)
     hidden = Tried(layer, found.gained, model, found.evidence)
+    accepted = sorted((hidden, *found.effects), key=lambda one: -one.score)
     selection = dataclasses.replace(
         selection,
         base=quiet,
         model=model,
-        accepted=(hidden, *found.effects),
+        accepted=tuple(accepted),
         first_round=(hidden, *selection.first_round),
         rivals=(),
     )
@@ -123,7 +126,7 @@ def _is_hidden(bench: Bench, locus: Locus) -> bool:
     follows = any(abs(r) > KNOWN for _, r in locus.along)
     if follows or not acts_in_windows(values):
         return False
-    return stirring(bench.series, values) < STIRRED
+    return stirring(bench.series, values) < STIRRED and resting(bench.series, values) < RESTING
 
 
 def _is_heard(bench: Bench, model: Estimate, name: str, needed: float) -> bool:

@@ -1,7 +1,8 @@
-"""Stirring: whether what is unknown is loud when known inputs move.
+"""Stirring: whether what is unknown is loud when known inputs move, or near rest.
 
 A hidden input comes when it likes. What a model gets wrong of its actuator, shaft or tyre is heard
-whenever the known inputs change: it is no input, whatever its sign.
+whenever the known inputs change, what it gets wrong of a friction near rest: it is no input,
+whatever its sign.
 """
 
 from __future__ import annotations
@@ -19,6 +20,8 @@ WITHIN = 0.3
 """Seconds in which an answer to a moved input is heard."""
 SMOOTH = 0.05
 """Seconds over which an input is averaged before its rate is taken: it has noise."""
+REST = 0.1
+"""Standard deviations of a signal within which it is near rest."""
 
 
 def stirring(series: Sequence[Series], unknown: Sequence[Reals]) -> float:
@@ -26,16 +29,41 @@ def stirring(series: Sequence[Series], unknown: Sequence[Reals]) -> float:
 
     `unknown` (samples,) in each recording is known from where its states were found.
     """
-    loud = [_around(np.abs(u), one, WITHIN) for u, one in zip(unknown, series, strict=True)]
-    whole = np.concatenate(loud)
+    pairs = list(zip(series, unknown, strict=True))
+    columns = range(series[0].inputs.shape[1])
+    moved = ([_movement(one, column, len(u)) for one, u in pairs] for column in columns)
+    return max((_with_loudness(series, unknown, one) for one in moved), default=0.0)
+
+
+def resting(series: Sequence[Series], unknown: Sequence[Reals]) -> float:
+    """Return how loudness goes with a compared signal being near rest, at most: a correlation."""
     most = 0.0
-    for column in range(series[0].inputs.shape[1]):
-        moved = np.concatenate(
-            [_movement(one, column, len(u)) for u, one in zip(unknown, series, strict=True)]
-        )
-        if np.std(moved) > 0.0 and np.std(whole) > 0.0:
-            most = max(most, float(np.corrcoef(whole, moved)[0, 1]))
+    for column in range(series[0].measured.shape[1]):
+        spread = np.nanstd(np.concatenate([one.measured[:, column] for one in series]))
+        near = [
+            _around(_nearness(one, column, len(u), REST * float(spread)), one, WITHIN)
+            for one, u in zip(series, unknown, strict=True)
+        ]
+        most = max(most, _with_loudness(series, unknown, near))
     return most
+
+
+def _with_loudness(
+    series: Sequence[Series], unknown: Sequence[Reals], other: Sequence[Reals]
+) -> float:
+    """Return the correlation of loudness with something else, 0 where one of both is still."""
+    loud = [_around(np.abs(u), one, WITHIN) for u, one in zip(unknown, series, strict=True)]
+    whole, along = np.concatenate(loud), np.concatenate(list(other))
+    if np.std(along) > 0.0 and np.std(whole) > 0.0:
+        return float(np.corrcoef(whole, along)[0, 1])
+    return 0.0
+
+
+def _nearness(series: Series, column: int, count: int, width: float) -> Reals:
+    """Return 1 where a compared signal is at rest, 0 far from it (count,)."""
+    values = series.measured[burnt(series) : burnt(series) + count, column]
+    near = np.exp(-((np.nan_to_num(values, nan=np.inf) / max(width, 1e-300)) ** 2))
+    return np.asarray(near, dtype=np.float64)
 
 
 def _movement(series: Series, column: int, count: int) -> Reals:

@@ -16,7 +16,7 @@ from diagnosis.level import settled, units_of
 from diagnosis.search import Tried
 from diagnosis.selection import Selection
 from diagnosis.series import Series
-from diagnosis.stirring import stirring
+from diagnosis.stirring import resting, stirring
 from tests.diagnosis.test_estimation import bench
 from tests.diagnosis.test_location import based, with_effect
 
@@ -73,3 +73,14 @@ def test_an_unknown_that_comes_when_inputs_move_answers_to_them() -> None:
     assert stirring([series], [answer[start:]]) > 0.8
     assert stirring([series], [other[start:]]) < 0.1
     assert stirring([series], [0.0 * answer[start:]]) == 0.0
+
+
+def test_an_unknown_that_is_heard_near_rest_is_what_a_friction_lacks() -> None:
+    time = np.arange(0.0, 10.0, 0.01)
+    speed = 50.0 * np.cos(0.3 * np.pi * time)
+    series = Series("a", Fraction(1, 100), Fraction(0), speed[:, None], speed[:, None])
+    start = burnt(series)
+    rubs = np.exp(-((speed / 4.0) ** 2)) * np.sign(np.gradient(speed))
+    hit = np.exp(-np.abs(time - 3.3) / 0.1)
+    assert resting([series], [rubs[start:]]) > 0.9
+    assert resting([series], [hit[start:]]) < 0.3
