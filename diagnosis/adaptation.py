@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
@@ -13,6 +12,7 @@ from diagnosis.estimation import (
     improved,
     looked_at,
     outcome_at,
+    seen_at,
     with_normal,
 )
 from diagnosis.point import Point
@@ -29,10 +29,10 @@ def adapted(model: Estimate, series: Sequence[Series]) -> Estimate:
     best of its starts.
     """
     shared = model.point.shared
-    now = _at(model, series, Point(shared, np.tile(shared, (len(series), 1))))
+    now = seen_at(model, series, Point(shared, np.tile(shared, (len(series), 1))))
     if not any(one.per_recording for one in model.candidate.uncertain):
         return now
-    now = min(now, _at(model, series, turned(now, series).point), key=lambda one: one.cost)
+    now = min(now, seen_at(model, series, turned(now, series).point), key=lambda one: one.cost)
     damping = FIRST_DAMPING
     for _ in range(ROUNDS if np.isfinite(now.cost) else 0):
         better, damping = improved(with_normal(now, series), series, damping, own_only=True)
@@ -40,13 +40,6 @@ def adapted(model: Estimate, series: Sequence[Series]) -> Estimate:
             break
         now = better
     return now
-
-
-def _at(model: Estimate, series: Sequence[Series], point: Point) -> Estimate:
-    """Return a model with its gains at a point for some recordings."""
-    outcome = outcome_at(model, series, point)
-    cost = outcome.cost() + point.prior(model.candidate)
-    return dataclasses.replace(model, point=point, cost=cost, outcome=outcome, normal=None)
 
 
 def turned(estimate: Estimate, series: Sequence[Series]) -> Estimate:

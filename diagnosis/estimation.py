@@ -162,3 +162,12 @@ def _run(
 def outcome_at(estimate: Estimate, series: Sequence[Series], point: Point) -> Outcome:
     """Return how a model foresees some recordings at a point, with the gains of the estimate."""
     return _run(estimate.candidate, series, point, estimate.gains, estimate.noises)
+
+
+def seen_at(estimate: Estimate, series: Sequence[Series], point: Point) -> Estimate:
+    """Return an estimate at a point for some recordings, with the gains that it has."""
+    outcome = outcome_at(estimate, series, point)
+    cost = outcome.cost() + point.prior(estimate.candidate)
+    return dataclasses.replace(
+        estimate, point=point, cost=cost, outcome=outcome, normal=None, columns={}
+    )

@@ -11,17 +11,19 @@ import numpy as np
 from diagnosis.adaptation import turned
 from diagnosis.bench import Bench
 from diagnosis.candidate import Candidate
-from diagnosis.estimation import Estimate, looked_at, reached
+from diagnosis.estimation import Estimate, looked_at, reached, seen_at
 from diagnosis.evidence import Evidence, evidence, inflation
 from diagnosis.layers import Layer
 from diagnosis.level import fitted
-from diagnosis.point import extended, point_of
+from diagnosis.point import Point, extended, point_of
 from language.effect import own_names
 
 FULL_FITS = 7
 """Candidates that are fitted to the end, best foreseen first."""
 POOR = 2.0
 """Innovations that count as one, from which on a fit is no good."""
+MOST_SCREENED = 5
+"""Recordings that candidates are screened on, spread over all; they are fitted to all."""
 STARTS = 2
 """Starts of a candidate from which steps are made, the best ones."""
 HOPELESS = 0.05
@@ -111,16 +113,31 @@ def _fitted(bench: Bench, base: Estimate, start: Estimate, units: Mapping[str, f
 def screened(bench: Bench, candidate: Candidate, base: Estimate) -> Estimate:
     """Return a candidate some steps from the best of its starts, seen from there.
 
-    How the base's parameters act is taken from the base.
+    How the base's parameters act is taken from the base. The steps are made on some recordings,
+    the candidate is then seen on all.
     """
+    rows = _screened_on(candidate, len(bench.series))
+    series = [bench.series[row] for row in rows]
+    parts = [base.outcome.parts[row] for row in rows]
+    columns = {name: np.concatenate([c[p] for p in parts]) for name, c in base.columns.items()}
     found = []
     for start in starts_of(candidate, base.values(0)):
-        point = extended(candidate, base.candidate, base.point, start)
-        here = looked_at(candidate, bench.series, base.noises, point)
-        found.append(turned(here, bench.series))
-    found.sort(key=lambda one: one.cost)
-    reach = [reached(here, bench.series, base.columns) for here in found[:STARTS]]
-    return min(reach, key=lambda one: one.cost)
+        whole = extended(candidate, base.candidate, base.point, start)
+        point = Point(whole.shared, whole.own[rows])
+        here = looked_at(candidate, series, base.noises, point)
+        found.append((turned(here, series), whole))
+    found.sort(key=lambda one: one[0].cost)
+    reach = [(reached(here, series, columns), whole) for here, whole in found[:STARTS]]
+    best, whole = min(reach, key=lambda one: one[0].cost)
+    whole.own[rows] = best.point.own
+    return seen_at(best, bench.series, Point(best.point.shared, whole.own))
+
+
+def _screened_on(candidate: Candidate, count: int) -> list[int]:
+    """Return the recordings that a candidate is screened on: all where each has its own numbers."""
+    if count <= MOST_SCREENED or any(one.per_recording for one in candidate.uncertain):
+        return list(range(count))
+    return [round(k * (count - 1) / (MOST_SCREENED - 1)) for k in range(MOST_SCREENED)]
 
 
 def starts_of(candidate: Candidate, base: Mapping[str, float]) -> list[dict[str, float]]:
