@@ -69,7 +69,7 @@ def with_hidden(
 ) -> tuple[Selection, tuple[Locus, ...]]:
     """Return a selection with a hidden input, and the places with what it does over time.
 
-    It stands for effects that explain less than it, and beside those that explain more. Gains are
+    It stands for effects that explain less than it, and behind those that explain more. Gains are
     those over a model without drifts, of which the one as it is may have taken its part. `needed`
     are the nats that it must gain at least.
     """
@@ -83,12 +83,12 @@ def with_hidden(
     model = with_normal(place.free, bench.series)
     others = (one for one in loci if one.path != place.path)
     hidden = Tried(layer, found.gained, model, found.evidence)
-    accepted = sorted((hidden, *found.effects), key=lambda one: -one.score)
+    is_less = quiet.cost - found.model.cost - found.gained > found.gained
     selection = dataclasses.replace(
         selection,
         base=quiet,
         model=model,
-        accepted=tuple(accepted),
+        accepted=(*found.effects, hidden) if is_less else (hidden, *found.effects),
         first_round=(hidden, *selection.first_round),
         rivals=(),
     )
