@@ -21,7 +21,7 @@ from diagnosis.case import Case, case_bench, read_series
 from diagnosis.description import Description
 from diagnosis.estimation import Estimate
 from diagnosis.judgement import judged
-from diagnosis.location import led_by
+from diagnosis.location import led_by, likely
 from diagnosis.locus import Locus
 from diagnosis.naming import named, place_path, quantities_of, verdict_id
 from diagnosis.place_sentence import place_sentence
@@ -82,6 +82,10 @@ def diagnose(case: Case, tell: Tell = lambda text: None) -> Diagnosis:
     if plan is not None:
         tell(plan.sentence())
     loci = led_by(loci, [place_path(tried.layer) for tried in selection.accepted], bench)
+    if found.says == "unknown":
+        tried = [one for one in selection.first_round if one.evidence]
+        tried.sort(key=lambda one: -one.score)
+        loci = likely(loci, [place_path(one.layer) for one in tried], bench)
     fit = {"train": misfits(found.base, selection.model, bench.series)}
     verdict = _verdict(found.says, selection, loci, automaton, fit)
     hashes = {case.name_of(path): _digest(path) for path in case.train}

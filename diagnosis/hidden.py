@@ -100,6 +100,7 @@ def _found(
 ) -> _Hidden | None:
     """Return what acts in windows at one of the places that gain much.
 
+    Alone it has to gain nearly as much as any other place does, such as the inside of a shaft.
     One that is silent most of the time is the simpler of two that gain nearly the same. Where none
     is, effects may be what is heard there all the time: then beside these.
     """
@@ -107,11 +108,16 @@ def _found(
     known = _inputs(bench)
     loud = [one for one in loci if one.path in known and shrink * one.gain > needed]
     near = [one for one in loud if one.gain > NEAR * loud[0].gain]
+    most = max((one.gain for one in loci), default=0.0)
     for locus in near:
         found = over_time(bench, locus)
-        if _is_hidden(bench, found):
-            alone = _alone(bench, selection, found)
-            return _joined(bench, selection, alone) if alone else _beside(bench, selection, found)
+        if not _is_hidden(bench, found):
+            continue
+        alone = _alone(bench, selection, found)
+        if alone is None:
+            return _beside(bench, selection, found)
+        if locus.gain > NEAR * most:
+            return _joined(bench, selection, alone)
     for locus in near if selection.accepted else ():
         if _is_heard(bench, selection.model, locus.drift, needed):
             beside = _beside(bench, selection, locus)

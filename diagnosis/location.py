@@ -8,7 +8,7 @@ places lead.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -65,6 +65,20 @@ def led_by(loci: Sequence[Locus], paths: Sequence[str], bench: Bench) -> tuple[L
         found = found if first else over_time(bench, found)
         first.append(dataclasses.replace(found, section=section, place=place, named=True))
     return (*first, *(locus for locus in loci if locus.path not in paths))
+
+
+def likely(loci: Sequence[Locus], nearest: Iterable[str], bench: Bench) -> tuple[Locus, ...]:
+    """Return places of something unknown, led by an input or a body that acts at the first one.
+
+    A drift in a balance is as well one of the input that drives it. `nearest` are the paths of what
+    comes nearest to what is missing, best first: they tell which of both is more likely.
+    """
+    for path in nearest:
+        section, _, place = path.partition(".")
+        if loci and acting(bench, section, place) == loci[0].path:
+            first = dataclasses.replace(loci[0], section=section, place=place)
+            return tuple(loci) if path == loci[0].path else (first, *loci)
+    return tuple(loci)
 
 
 def acting(bench: Bench, section: str, place: str) -> str:

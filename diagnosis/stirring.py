@@ -25,14 +25,18 @@ REST = 0.1
 
 
 def stirring(series: Sequence[Series], unknown: Sequence[Reals]) -> float:
-    """Return how loudness goes with the movement of an input, at most: a correlation.
+    """Return how loudness goes with the movement or the amount of an input: a correlation.
 
     `unknown` (samples,) in each recording is known from where its states were found.
     """
     pairs = list(zip(series, unknown, strict=True))
     columns = range(series[0].inputs.shape[1])
-    moved = ([_movement(one, column, len(u)) for one, u in pairs] for column in columns)
-    return max((_with_loudness(series, unknown, one) for one in moved), default=0.0)
+    heard = [
+        [found(one, column, len(u)) for one, u in pairs]
+        for column in columns
+        for found in (_movement, _amount)
+    ]
+    return max((_with_loudness(series, unknown, one) for one in heard), default=0.0)
 
 
 def resting(series: Sequence[Series], unknown: Sequence[Reals]) -> float:
@@ -71,6 +75,12 @@ def _movement(series: Series, column: int, count: int) -> Reals:
     values = series.inputs[burnt(series) : burnt(series) + count, column]
     even = _around(values, series, SMOOTH)
     return _around(np.abs(np.diff(even, prepend=even[:1])), series, WITHIN)
+
+
+def _amount(series: Series, column: int, count: int) -> Reals:
+    """Return how large an input is around each sample (count,)."""
+    values = series.inputs[burnt(series) : burnt(series) + count, column]
+    return _around(np.abs(values), series, WITHIN)
 
 
 def _around(values: Reals, series: Series, seconds: float) -> Reals:
