@@ -83,13 +83,14 @@ def with_hidden(
     model = with_normal(place.free, bench.series)
     others = (one for one in loci if one.path != place.path)
     hidden = Tried(layer, found.gained, model, found.evidence)
+    known = selection.first_round
     is_less = quiet.cost - found.model.cost - found.gained > found.gained
     selection = dataclasses.replace(
         selection,
         base=quiet,
         model=model,
         accepted=(*found.effects, hidden) if is_less else (hidden, *found.effects),
-        first_round=(hidden, *selection.first_round),
+        first_round=known if is_less else (hidden, *known),
         rivals=(),
     )
     return selection, (place, *others)
