@@ -77,6 +77,7 @@ verify-part: setup ## measure a fixed part of the figures, as CI does
 	$(BIN)/python tests/verify/command_line.py
 	$(BIN)/python tests/verify/editor.py
 	$(BIN)/python tests/verify/static_checks.py
+	$(BIN)/python -m tests.proof.part
 
 prove-diagnosis: setup ## diagnose the sealed cases blind, write docs/proof.md (hours; resumable)
 	$(BIN)/python -m tests.proof $(ARGS)

@@ -26,6 +26,11 @@ def method_digest() -> str:
     return code_digest(METHOD)[:16]
 
 
+def is_of_this_method(text: str) -> bool:
+    """Tell whether a page was written with the method as it is now."""
+    return f"{MARK}{method_digest()}`" in text
+
+
 def published(
     every: Sequence[Answer], found: Sequence[Bar], seals: Mapping[str, Any], beside: Sequence[str]
 ) -> None:
