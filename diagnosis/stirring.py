@@ -16,8 +16,8 @@ from diagnosis.joined import burnt
 from diagnosis.series import Series
 
 Reals = NDArray[np.float64]
-WITHIN = 0.3
-"""Seconds in which an answer to a moved input is heard."""
+WITHIN = (0.3, 1.0)
+"""Seconds in which an answer to a moved input is heard: at once, or as long as a limit acts."""
 SMOOTH = 0.05
 """Seconds over which an input is averaged before its rate is taken: it has noise."""
 REST = 0.1
@@ -31,12 +31,15 @@ def stirring(series: Sequence[Series], unknown: Sequence[Reals]) -> float:
     """
     pairs = list(zip(series, unknown, strict=True))
     columns = range(series[0].inputs.shape[1])
-    heard = [
-        [found(one, column, len(u)) for one, u in pairs]
-        for column in columns
-        for found in (_movement, _amount)
-    ]
-    return max((_with_loudness(series, unknown, one) for one in heard), default=0.0)
+    return max(
+        (
+            _with_loudness(series, unknown, [found(one, k, len(u)) for one, u in pairs], within)
+            for k in columns
+            for found in (_movement, _amount)
+            for within in WITHIN
+        ),
+        default=0.0,
+    )
 
 
 def resting(series: Sequence[Series], unknown: Sequence[Reals]) -> float:
@@ -45,19 +48,23 @@ def resting(series: Sequence[Series], unknown: Sequence[Reals]) -> float:
     for column in range(series[0].measured.shape[1]):
         spread = np.nanstd(np.concatenate([one.measured[:, column] for one in series]))
         near = [
-            _around(_nearness(one, column, len(u), REST * float(spread)), one, WITHIN)
+            _nearness(one, column, len(u), REST * float(spread))
             for one, u in zip(series, unknown, strict=True)
         ]
-        most = max(most, _with_loudness(series, unknown, near))
+        most = max(most, _with_loudness(series, unknown, near, WITHIN[0]))
     return most
 
 
 def _with_loudness(
-    series: Sequence[Series], unknown: Sequence[Reals], other: Sequence[Reals]
+    series: Sequence[Series], unknown: Sequence[Reals], other: Sequence[Reals], within: float
 ) -> float:
-    """Return the correlation of loudness with something else, 0 where one of both is still."""
-    loud = [_around(np.abs(u), one, WITHIN) for u, one in zip(unknown, series, strict=True)]
-    whole, along = np.concatenate(loud), np.concatenate(list(other))
+    """Return the correlation of loudness with something else, 0 where one of both is still.
+
+    Both are averaged over some seconds around each sample.
+    """
+    loud = [_around(np.abs(u), one, within) for u, one in zip(unknown, series, strict=True)]
+    near = [_around(values, one, within) for values, one in zip(other, series, strict=True)]
+    whole, along = np.concatenate(loud), np.concatenate(near)
     if np.std(along) > 0.0 and np.std(whole) > 0.0:
         return float(np.corrcoef(whole, along)[0, 1])
     return 0.0
@@ -71,16 +78,16 @@ def _nearness(series: Series, column: int, count: int, width: float) -> Reals:
 
 
 def _movement(series: Series, column: int, count: int) -> Reals:
-    """Return how much an input moves around each sample (count,)."""
+    """Return how much an input moves at each sample (count,)."""
     values = series.inputs[burnt(series) : burnt(series) + count, column]
     even = _around(values, series, SMOOTH)
-    return _around(np.abs(np.diff(even, prepend=even[:1])), series, WITHIN)
+    return np.asarray(np.abs(np.diff(even, prepend=even[:1])), dtype=np.float64)
 
 
 def _amount(series: Series, column: int, count: int) -> Reals:
-    """Return how large an input is around each sample (count,)."""
+    """Return how large an input is at each sample (count,)."""
     values = series.inputs[burnt(series) : burnt(series) + count, column]
-    return _around(np.abs(values), series, WITHIN)
+    return np.asarray(np.abs(values), dtype=np.float64)
 
 
 def _around(values: Reals, series: Series, seconds: float) -> Reals:
