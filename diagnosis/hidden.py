@@ -43,6 +43,8 @@ NEAR = 0.9
 """Part of what the best place gains that another one gains nearly the same with."""
 LITTLE = 0.5
 """Part of what it gains that effects explain less of, if it is to stand for them."""
+MUCH_MORE = 3.0
+"""Times what a hidden input gains that effects explain which are named before it."""
 ROUNDS = 5
 """Rounds in which what was accepted is fitted without drifts."""
 
@@ -50,7 +52,7 @@ ROUNDS = 5
 @dataclass(frozen=True)
 class _Hidden:
     """An input that acts in windows at a place: a model in which it is free beside `effects`, and
-    what it `gained` [nats] over these.
+    what it `gained` [nats] over these. `explained` is what they had gained before it was found.
     """
 
     locus: Locus
@@ -58,6 +60,7 @@ class _Hidden:
     effects: tuple[Tried, ...]
     gained: float
     evidence: Evidence
+    explained: float = 0.0
 
 
 def with_hidden(
@@ -84,7 +87,7 @@ def with_hidden(
     others = (one for one in loci if one.path != place.path)
     hidden = Tried(layer, found.gained, model, found.evidence)
     known = selection.first_round
-    is_less = quiet.cost - found.model.cost - found.gained > found.gained
+    is_less = found.explained > MUCH_MORE * found.gained
     selection = dataclasses.replace(
         selection,
         base=quiet,
@@ -190,7 +193,8 @@ def _beside(bench: Bench, selection: Selection, locus: Locus) -> _Hidden:
             effects, model = rest, fewer
     if not locus.unknown or not _is_hidden(bench, locus):
         locus = over_time(bench, dataclasses.replace(locus, free=model, unknown=()))
-    return _Hidden(locus, model, effects, without.cost - model.cost, gained)
+    explained = freed(bench, selection.base).cost - without.cost
+    return _Hidden(locus, model, effects, without.cost - model.cost, gained, explained)
 
 
 def _quieted(bench: Bench, model: Estimate) -> Estimate:

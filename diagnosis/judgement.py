@@ -30,7 +30,7 @@ from diagnosis.ways import Way, better_way, chosen
 
 CLEAR = 3.0
 """A rival of another name within this of the best [nats] makes the verdict ambiguous."""
-UNKNOWN = 6.0
+UNKNOWN = 8.0
 """Times the threshold that a free drift must gain where no effect was accepted."""
 
 

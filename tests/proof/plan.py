@@ -43,6 +43,6 @@ def plans(pairs: Sequence[tuple[str, str]], seed: int, share: float = 1.0) -> tu
         Plan("full", f"all:{of(12)}"),
         Plan("clean", f"all:{of(12)}", strength=0.0),
         Plan("weak", f"all:{of(4)}", strength=0.3),
-        Plan("pairs", ",".join("+".join(pair) for pair in drawn)),
+        Plan("pairs", ",".join("+".join(pair) + ":1" for pair in drawn)),
         Plan("removed", f"all:{of(2)}", without_own=True),
     )
