@@ -19,7 +19,7 @@ from diagnosis.search import Tell, Tried, searched
 from diagnosis.swap import swapped
 from diagnosis.threshold import EVERYWHERE, USUAL, Thresholds
 
-PART = 0.05
+PART = 0.02
 """A further effect gains at least this part of what the one before it gained: a strong effect is
 never described so well that nothing small is left beside it."""
 HOPE = 0.25
