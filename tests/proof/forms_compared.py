@@ -45,8 +45,9 @@ def torque_derating(p: Physics) -> Compared:
     speed, torque = (one.ravel() for one in np.mgrid[20:700:40j, 20:240:20j])
     found = walked(p, MS, {"W_EM": speed, "demand": torque})
     return Compared(
-        found["motor"], torque, lambda f: library.derating(torque, speed, f[0]), (40e3,), [(0.8,)]
-    )
+        found["motor"], torque, lambda f: library.derating(torque, speed, *f), (40e3, 1.0),
+        [(0.8, 1), (0.8, 0.7)],
+    )  # fmt: skip
 
 
 def torque_drift(p: Physics) -> Compared:

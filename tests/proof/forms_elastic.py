@@ -38,11 +38,10 @@ def unequal_half_shafts(p: Physics) -> Compared:
     return Compared(found, clean, law, (p.share_left, *gaps, p.k), starts)
 
 
-def second_gap(p: Physics, *, pulls: bool = True) -> Compared:
+def second_gap(p: Physics) -> Compared:
     """The contact of the second gap alone while the driveline is shaken by steps and a sweep.
 
-    The generator moves all of it; clean is the same contact without a gap. Without `pulls` the
-    library's contact would not pull as it opens.
+    The generator moves all of it; clean is the same contact without a gap.
     """
     free = dict.fromkeys(("TWIST_0", "TWIST_1", "GAP_0", "GAP_1"), 0.0)
     speeds = {"W_EM": 30 * p.ratio, "W_MID": 30.0, "W_W": 30.0, "W_V": 30.0}
@@ -50,13 +49,10 @@ def second_gap(p: Physics, *, pulls: bool = True) -> Compared:
     x, found = moved["TWIST_1"], moved["gear"]
     rate = moved["W_EM"] / p.ratio - moved["W_MID"]
 
-    def law(f: Array) -> Array:
-        torque = library.second_gap(x, rate, *f)
-        return torque if pulls else np.where(torque * x > 0, torque, 0.0)
-
     starts = [(0.9, 0.5, 1), (1.1, 0.2, 1.1), (1, 1, 0.9)]
     typical = (p.mid_k, p.mid_c, p.mid_alpha)
-    return Compared(found, p.mid_k * x + p.mid_c * rate, law, typical, starts)
+    clean = p.mid_k * x + p.mid_c * rate
+    return Compared(found, clean, lambda f: library.second_gap(x, rate, *f), typical, starts)
 
 
 def stiffness_nonlinear(p: Physics) -> Compared:

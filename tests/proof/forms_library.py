@@ -53,10 +53,10 @@ def rate_limit(u: Array, step: float, r_max: float, tau_f: float) -> Array:
     return np.array(found)
 
 
-def derating(u: Array, speed: Array, p_max: float) -> Array:
+def derating(u: Array, speed: Array, p_max: float, share: float = 1.0) -> Array:
     """torque_derating."""
     limit = p_max / np.maximum(np.abs(speed), 1.0)
-    return np.clip(u, -limit, limit)
+    return np.asarray(u - share * (u - np.clip(u, -limit, limit)))
 
 
 def drift(u: Array, step: float, drop: float, tau_d: float, load: float, warm_0: float) -> Array:
@@ -110,9 +110,9 @@ def with_gap(x: Array, rate: Array, step: float, k: float, c: float, alpha: floa
 
 
 def second_gap(x: Array, rate: Array, k_2: float, c_2: float, a_2: float) -> Array:
-    """second_gap: its contact."""
-    beyond = np.abs(x) > a_2
-    return np.asarray(k_2 * (x - np.clip(x, -a_2, a_2)) + np.where(beyond, c_2 * rate, 0.0))
+    """second_gap: its contact, damped as it is pressed in by 3 mrad."""
+    push = x - np.clip(x, -a_2, a_2)
+    return np.asarray(k_2 * push + c_2 * np.minimum(np.abs(push) / 3e-3, 1.0) * rate)
 
 
 def nonlinear(x: Array, k: float, q: float, x_r: float) -> Array:

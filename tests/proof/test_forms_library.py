@@ -32,14 +32,14 @@ WRITTEN_OUT: dict[str, str] = {
     "load_dependent_loss": "loss w_s",
     "mount_compliance": "J_h k_m c_m",
     "position_dependent_stiffness": "a ord ph s_2 c_2 s_3 c_3",
-    "second_gap": "J_m k_2 c_2 a_2",
+    "second_gap": "J_m k_2 c_2 x_c a_2",
     "sensor_delay": "T_d",
     "sensor_eccentricity": "ecc ph",
     "sensor_lag": "tau part",
     "stiffness_hysteresis": "k_r F_r",
     "stiffness_nonlinear": "q x_r",
     "stribeck_friction": "T_c rise w_k w_s",
-    "torque_derating": "P_max w_lo",
+    "torque_derating": "P_max share w_lo",
     "torque_drift": "drop tau_d load warm_0 u_r",
     "torque_rate_limit": "r_max tau_f",
     "torque_ripple": "a ord ph",
@@ -134,9 +134,10 @@ def test_of_an_input_or_output(
 
 def test_of_a_limit_of_power(tmp_path: Path) -> None:
     """At 10 rad/s."""
-    effect = "{torque_derating@T: {values: {P_max: 1.75 kW}}}"
+    effect = "{torque_derating@T: {values: {P_max: 1.75 kW, share: 0.7}}}"
     found = ran(tmp_path, "rotor", effect, {"T": course("N*m", 5.0)}, more="outputs: [u_p_T]")
-    near(found.signals["plant.u_p_T"], library.derating(5 * COURSE, np.full(1001, 10.0), 1750.0))
+    wanted = library.derating(5 * COURSE, np.full(1001, 10.0), 1750.0, 0.7)
+    near(found.signals["plant.u_p_T"], wanted)
 
 
 LOSSES: list[tuple[str, Callable[[Array, Array], Array]]] = [
