@@ -35,7 +35,7 @@ SHORT = 0.22
 """Part of all samples that these are at most, of what acts in windows."""
 KNOWN = 0.5
 """Correlation with something known from which on an input is not hidden: it follows that."""
-STIRRED = 0.35
+STIRRED = 0.4
 """Correlation of its loudness with the movement of known inputs from which on it is an answer."""
 RESTING = 0.7
 """Correlation of its loudness with rest from which on it is what a friction lacks."""

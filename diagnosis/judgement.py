@@ -30,6 +30,8 @@ from diagnosis.ways import Way, better_way, chosen
 
 CLEAR = 3.0
 """A rival of another name within this of the best [nats] makes the verdict ambiguous."""
+HIDDEN = 6.0
+"""Times the threshold that an input must gain that acts in windows."""
 UNKNOWN = 8.0
 """Times the threshold that a free drift must gain where no effect was accepted."""
 
@@ -66,7 +68,7 @@ def _judged_by_observer(case: Case, raw: Bench, ways: Sequence[Way], tell: Tell)
     units = units_of(base.candidate, bench.series, base.noises, base.values(0))
     loci = located(bench, base)
     tell(place_sentence(loci, bench))
-    selection, loci = with_hidden(bench, selection, loci, UNKNOWN * most, tell)
+    selection, loci = with_hidden(bench, selection, loci, HIDDEN * most, tell)
     says = _says(selection, loci, bench, most)
     formula = None
     if is_doubtful(says, selection, loci, bench, most, units):
