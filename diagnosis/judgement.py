@@ -28,7 +28,7 @@ from diagnosis.threshold import EVERYWHERE, USUAL, Thresholds
 from diagnosis.verdict import Says
 from diagnosis.ways import Way, better_way, chosen
 
-CLEAR = 3.0
+CLEAR = 1.0
 """A rival of another name within this of the best [nats] makes the verdict ambiguous."""
 HIDDEN = 6.0
 """Times the threshold that an input must gain that acts in windows."""

@@ -23,12 +23,14 @@ FULL_FITS = 7
 POOR = 2.0
 """Innovations that count as one, from which on a fit is no good."""
 MOST_SCREENED = 5
-"""Recordings that candidates are screened on, spread over all; they are fitted to all."""
+"""Recordings that candidates are screened on first, spread over all."""
+HINT = 2.0
+"""Nats that a candidate gains there, if it is to be screened on all."""
 STARTS = 2
 """Starts of a candidate from which steps are made, the best ones."""
 HOPELESS = 0.05
 """A candidate that promises less than this part of what another has gained is not fitted."""
-PLAIN = 5.0
+PLAIN = 2.5
 """Nats that each number of an effect has to gain beyond its price."""
 WORTH = 10.0
 """A candidate that promises less [nats] is not fitted."""
@@ -113,10 +115,28 @@ def _fitted(bench: Bench, base: Estimate, start: Estimate, units: Mapping[str, f
 def screened(bench: Bench, candidate: Candidate, base: Estimate) -> Estimate:
     """Return a candidate some steps from the best of its starts, seen from there.
 
-    How the base's parameters act is taken from the base. The steps are made on some recordings,
-    the candidate is then seen on all.
+    Where there are many recordings, first on some: one that gains nothing there is not looked at
+    on all.
     """
     rows = _screened_on(candidate, len(bench.series))
+    every = list(range(len(bench.series)))
+    found = _reached(bench, candidate, base, rows)
+    if rows == every:
+        return found
+    whole = extended(candidate, base.candidate, base.point, {})
+    whole.own[rows] = found.point.own
+    series = [bench.series[row] for row in rows]
+    part = seen_at(base, series, Point(base.point.shared, base.point.own[rows]))
+    if part.cost - found.cost < HINT:
+        return seen_at(found, bench.series, Point(found.point.shared, whole.own))
+    return _reached(bench, candidate, base, every)
+
+
+def _reached(bench: Bench, candidate: Candidate, base: Estimate, rows: list[int]) -> Estimate:
+    """Return a candidate some steps from the best of its starts, on some recordings.
+
+    How the base's parameters act is taken from the base.
+    """
     series = [bench.series[row] for row in rows]
     parts = [base.outcome.parts[row] for row in rows]
     columns = {name: np.concatenate([c[p] for p in parts]) for name, c in base.columns.items()}
@@ -125,16 +145,14 @@ def screened(bench: Bench, candidate: Candidate, base: Estimate) -> Estimate:
         whole = extended(candidate, base.candidate, base.point, start)
         point = Point(whole.shared, whole.own[rows])
         here = looked_at(candidate, series, base.noises, point)
-        found.append((turned(here, series), whole))
-    found.sort(key=lambda one: one[0].cost)
-    reach = [(reached(here, series, columns), whole) for here, whole in found[:STARTS]]
-    best, whole = min(reach, key=lambda one: one[0].cost)
-    whole.own[rows] = best.point.own
-    return seen_at(best, bench.series, Point(best.point.shared, whole.own))
+        found.append(turned(here, series))
+    found.sort(key=lambda one: one.cost)
+    reach = [reached(here, series, columns) for here in found[:STARTS]]
+    return min(reach, key=lambda one: one.cost)
 
 
 def _screened_on(candidate: Candidate, count: int) -> list[int]:
-    """Return the recordings that a candidate is screened on: all where each has its own numbers."""
+    """Return the recordings to begin with: all where each has numbers of its own."""
     if count <= MOST_SCREENED or any(one.per_recording for one in candidate.uncertain):
         return list(range(count))
     return [round(k * (count - 1) / (MOST_SCREENED - 1)) for k in range(MOST_SCREENED)]
