@@ -36,7 +36,7 @@ def torque_rate_limit(p: Physics) -> Compared:
     u = steps(2, MS)
 
     def law(f: Array) -> Array:
-        return library.rate_limit(u, MS, abs(f[0]), np.clip(f[1], 0.0006, 0.015))
+        return library.rate_limit(u, MS, abs(f[0]), np.clip(f[1], 0.002, 0.015))
 
     return Compared(limited(p, MS, u), u, law, (500.0, 0.005), [(1.3, 2), (0.7, 1)])
 
