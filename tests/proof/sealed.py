@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import resource
 import sys
 import time
@@ -21,7 +22,8 @@ GENERATORS = ("tests/concealed", "tests/open_generator")
 LOOKS = ("open", "os.listdir", "os.scandir", "glob.glob", "os.link", "os.symlink", "os.rename")
 STARTS = ("os.system", "os.exec", "os.spawn", "os.posix_spawn", "os.startfile", "pty.spawn")
 COMPILERS = ("cc", "gcc", "clang")
-CODE = (".py", ".pyc")
+CODE = re.compile(r"\.pyc?(\.\d+)?$")
+"""Ends of code, also of what Python writes before it renames it."""
 SPEC = "blind_driveline"
 WHO = (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
 
@@ -67,7 +69,8 @@ def is_concealed(place: str | bytes | os.PathLike[Any]) -> bool:
     path = Path(os.path.realpath(os.fsdecode(place)))
     if any(generator in path.as_posix() for generator in GENERATORS):
         return True
-    return path.suffix not in CODE and any(word in path.as_posix().lower() for word in CONCEALED)
+    is_code = CODE.search(path.name) is not None
+    return not is_code and any(word in path.as_posix().lower() for word in CONCEALED)
 
 
 def _compiles(args: tuple[Any, ...]) -> bool:

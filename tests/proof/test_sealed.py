@@ -18,6 +18,7 @@ from tests.verify.store import ROOT
         "/data/truth/brake.csv",
         "/data/cases_labels.json",
         "/data/LABELS/a.json",
+        "/data/labels.pyc.json",
         ROOT / "tests" / "concealed" / "library.py",
         ROOT / "tests" / "open_generator" / "__pycache__" / "label.pyc",
     ],
@@ -27,7 +28,13 @@ def test_what_is_concealed_is_seen(path: Path | str) -> None:
 
 
 @pytest.mark.parametrize(
-    "path", [ROOT / "modewright" / "label.py", "/data/runs/rec_00.csv", ROOT / "spec" / "effects"]
+    "path",
+    [
+        ROOT / "modewright" / "label.py",
+        "/venv/sklearn/__pycache__/_label.cpython-311.pyc.140383164160784",
+        "/data/runs/rec_00.csv",
+        ROOT / "spec" / "effects",
+    ],
 )
 def test_what_the_product_reads_is_not(path: Path | str) -> None:
     assert not is_concealed(path)
