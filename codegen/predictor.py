@@ -8,7 +8,6 @@ import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -20,11 +19,11 @@ from codegen.cache import key_of, stored
 from codegen.lean import lean
 from codegen.names import c_member, c_type
 from codegen.rendering import render
+from codegen.runs import Prediction, Recorded, Runs
 from codegen.source import c_files
 from language.program import Program, short
 
 Reals = NDArray[np.float64]
-Wholes = NDArray[np.int64]
 MOST_SAMPLES = 5000
 """Samples after which a gain that still changes is taken for the steady one."""
 CLOSE = 1e-6
@@ -49,63 +48,6 @@ class Columns:
     seen: tuple[str, ...]
     modes: tuple[int, ...]
     page: Mapping[str, float]
-
-
-@dataclass(frozen=True)
-class Prediction:
-    """What a run gave: `innovations` and what the model showed, `seen` (samples, seen); `states`
-    (samples, states), `modes` (samples,); `done` samples before a value left all bounds.
-    """
-
-    innovations: Reals
-    seen: Reals
-    states: Reals
-    modes: NDArray[np.int16]
-    done: int
-
-
-@dataclass(frozen=True)
-class Recorded:
-    """Recordings one after the other in C-contiguous arrays: `inputs` (samples, inputs), and
-    `measured` (samples, seen) with NaN where nothing is known.
-
-    Recording r has the samples from `starts[r]` to `starts[r + 1]`, of which the first `skips[r]`
-    do not count; its inputs are held, or run straight in between where `linear[r]`.
-    """
-
-    inputs: Reals
-    measured: Reals
-    starts: Wholes
-    skips: Wholes
-    linear: Wholes
-
-
-@dataclass(frozen=True)
-class Runs:
-    """What the runs of several recordings gave, one after the other as in a Prediction.
-
-    `squares` and `counts` (recordings, seen) are the sums of the squares that count, and how many.
-    """
-
-    whole: Prediction
-    starts: Wholes
-    done: Wholes
-    squares: Reals
-    counts: Reals
-
-    def each(self) -> tuple[Prediction, ...]:
-        """Return the run of each recording, views of what is here."""
-        whole, edges = self.whole, pairwise(self.starts.tolist())
-        return tuple(
-            Prediction(
-                whole.innovations[low:high],
-                whole.seen[low:high],
-                whole.states[low:high],
-                whole.modes[low:high],
-                done,
-            )
-            for (low, high), done in zip(edges, self.done.tolist(), strict=True)
-        )
 
 
 def columns_of(program: Program, seen: Sequence[str]) -> Columns:

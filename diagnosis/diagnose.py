@@ -21,6 +21,7 @@ from diagnosis.case import Case, case_bench, read_series
 from diagnosis.description import Description
 from diagnosis.estimation import Estimate
 from diagnosis.judgement import judged
+from diagnosis.layers import Layer
 from diagnosis.location import led_by, likely
 from diagnosis.locus import Locus
 from diagnosis.naming import named, place_path, quantities_of, verdict_id
@@ -136,7 +137,7 @@ def _told_apart(selection: Selection, automaton: Automaton) -> list[tuple[str, E
     """Return the first accepted effect and its rivals, by name."""
     some = (*selection.accepted[:1], *selection.rivals)
     return [
-        (f"{verdict_id(tried.layer, automaton)}@{place_path(tried.layer)}", tried.estimate)
+        ("@".join(_name(tried.layer, automaton)), tried.estimate)
         for tried in some
         if tried.estimate is not None and tried.estimate.normal is not None
     ]
@@ -167,6 +168,11 @@ def _verdict(
     )
 
 
+def _name(layer: Layer, automaton: Automaton) -> tuple[str, str]:
+    """Return how verdicts name an effect, and its place."""
+    return verdict_id(layer, automaton), place_path(layer)
+
+
 def _ranked(selection: Selection, automaton: Automaton) -> tuple[Ranked, ...]:
     """Return the fitted candidates, best first: forms of one name at one place are one."""
     probabilities = selection.probabilities()
@@ -174,7 +180,7 @@ def _ranked(selection: Selection, automaton: Automaton) -> tuple[Ranked, ...]:
     for tried in selection.first_round:
         if tried.evidence is None:
             continue
-        name, each = (verdict_id(tried.layer, automaton), place_path(tried.layer)), tried.evidence
+        name, each = _name(tried.layer, automaton), tried.evidence
         std = float(np.std(each.each) * np.sqrt(len(each.each)))
         new = Ranked(*name, probabilities[tried.layer.id], each.train, std)
         old = found.setdefault(name, new)
@@ -186,12 +192,10 @@ def _ranked(selection: Selection, automaton: Automaton) -> tuple[Ranked, ...]:
 
 def _rivals(selection: Selection, automaton: Automaton) -> tuple[Named, ...]:
     """Return the rivals as verdicts name them, but for other forms of what is named already."""
-    taken = [
-        (verdict_id(one.layer, automaton), place_path(one.layer)) for one in selection.accepted
-    ]
+    taken = [_name(one.layer, automaton) for one in selection.accepted]
     found: dict[tuple[str, str], Named] = {}
     for tried in selection.rivals:
-        name = (verdict_id(tried.layer, automaton), place_path(tried.layer))
+        name = _name(tried.layer, automaton)
         if name not in taken and tried.estimate is not None:
             found.setdefault(name, named(tried.layer, tried.estimate, automaton))
     return tuple(found.values())

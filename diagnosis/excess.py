@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.predictor import Prediction
+from codegen.runs import Prediction
 from diagnosis.bench import Bench
 from diagnosis.companion import turning
 from diagnosis.estimation import Estimate, outcome_at

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.predictor import Recorded
+from codegen.runs import Recorded
 from diagnosis.series import Series
 
 Reals = NDArray[np.float64]

@@ -14,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.predictor import Prediction, Runs
+from codegen.runs import Prediction, Runs
 from diagnosis.candidate import Candidate
 from diagnosis.joined import joined
 from diagnosis.noise import MAD

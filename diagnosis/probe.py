@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.predictor import Prediction
+from codegen.runs import Prediction
 from diagnosis.bench import Bench
 from diagnosis.candidate import Candidate, candidate
 from diagnosis.estimation import Estimate

@@ -109,30 +109,23 @@ def test_speed_under_a_steady_torque(
     assert np.max(np.abs(speed(found) - wanted(found.times))) < 2e-8
 
 
-def test_a_lag_follows_a_step_exponentially(tmp_path: Path) -> None:
-    found = ran(
-        tmp_path,
-        "rotor",
-        "{actuator_lag@T: {values: {tau: 50 ms}}}",
-        {"T": "{start: 0 N*m, steps: {0.1 s: 6 N*m}}"},
-    )
-    t = np.maximum(found.times - 0.1, 0)
-    wanted = 6 / J * (t - 0.05 * (1 - np.exp(-t / 0.05)))
-    assert np.max(np.abs(speed(found) - wanted)) < 1e-7
+def erlang(x: Array) -> Array:
+    """The integral of the step response of three equal lags: 1 - exp(-x) (1 + x + x^2 / 2)."""
+    return np.asarray(x - 3 + np.exp(-x) * (3 + 2 * x + x**2 / 2))
 
 
-def test_three_lags_in_a_row_follow_a_step_with_a_delay(tmp_path: Path) -> None:
-    found = ran(
-        tmp_path,
-        "rotor",
-        "{actuator_lag@T: {values: {tau: 50 ms, part: 1}}}",
-        {"T": "{start: 0 N*m, steps: {0.1 s: 6 N*m}}"},
-    )
-    t = np.maximum(found.times - 0.1, 0)
-    x = t / 0.05
-    # The integral of 1 - exp(-x) (1 + x + x^2 / 2), an Erlang distribution of three stages.
-    wanted = 6 / J * 0.05 * (x - 3 + np.exp(-x) * (3 + 2 * x + x**2 / 2))
-    assert np.max(np.abs(speed(found) - wanted)) < 1e-7
+@pytest.mark.parametrize(
+    ("part", "integral"),
+    [(0, lambda x: x - (1 - np.exp(-x))), (1, erlang)],
+    ids=["one", "three in a row"],
+)
+def test_a_lag_follows_a_step(
+    tmp_path: Path, part: float, integral: Callable[[Array], Array]
+) -> None:
+    effect = f"{{actuator_lag@T: {{values: {{tau: 50 ms, part: {part}}}}}}}"
+    found = ran(tmp_path, "rotor", effect, {"T": "{start: 0 N*m, steps: {0.1 s: 6 N*m}}"})
+    x = np.maximum(found.times - 0.1, 0) / 0.05
+    assert np.max(np.abs(speed(found) - 6 / J * 0.05 * integral(x))) < 1e-7
 
 
 def test_a_dead_time_shifts_what_is_delivered(tmp_path: Path) -> None:
