@@ -43,13 +43,17 @@ def adapted(model: Estimate, series: Sequence[Series]) -> Estimate:
 
 
 def turned(estimate: Estimate, series: Sequence[Series]) -> Estimate:
-    """Return an estimate with what each recording has of its own at the best of its starts."""
+    """Return an estimate with what each recording has of its own where it is, or at a better start.
+
+    A phase that was turned while others were unknown may have come to rest at a wrong one.
+    """
     uncertain = estimate.candidate.uncertain
     own = [k for k, one in enumerate(uncertain) if one.per_recording and len(one.starts) > 1]
     if not own or not np.isfinite(estimate.cost):
         return estimate
     variances = estimate.outcome.variances
-    best, lowest = estimate.point.own.copy(), np.full(len(series), np.inf)
+    best = estimate.point.own.copy()
+    lowest = np.sum(estimate.outcome.runs.squares / variances, axis=1)
     for k in own:
         for start in uncertain[k].starts:
             trial = best.copy()

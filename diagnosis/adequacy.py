@@ -1,7 +1,8 @@
 """Adequacy: whether effects that were accepted leave more unexplained than they explain.
 
 The nearest effect of a library that lacks the true one gains a great deal; but with the parameters
-held, a drift that is let free at some place still finds much to do beside it.
+held, a drift that is let free at some place still finds much to do beside it, and innovations of
+the model remember, which noise does not.
 """
 
 from __future__ import annotations
@@ -14,9 +15,10 @@ from diagnosis.bench import Bench
 from diagnosis.estimation import looked_at
 from diagnosis.evidence import inflation
 from diagnosis.freedom import WIDE_LEVELS, with_levels
-from diagnosis.layers import DRIFT, Layer, has_parameters, walks
+from diagnosis.layers import DRIFT, Layer, walks
 from diagnosis.level import units_of
 from diagnosis.location import places_of_freedom
+from diagnosis.naming import place_path
 from diagnosis.point import extended
 from diagnosis.selection import Selection
 from language.problem import SpecError
@@ -26,6 +28,15 @@ LEFT_PART = 0.5
 
 An error of an output is none of them: a sensor follows whatever the model gets wrong."""
 
+MEMORY = 1.2
+"""Innovations that count as one from which on those of a model remember."""
+MEMORY_PART = 0.2
+"""Part of what the base's innovations remembered that those of an adequate model may: noise has no
+memory, and a form that is not quite right leaves little of it."""
+
+PILED = 0.5
+"""Part of what an effect gained that a further one gains at the same place, where neither is it."""
+
 UNLIKELY = 20.0
 """Nats by which "none of these" then leads the best candidate."""
 
@@ -33,12 +44,9 @@ UNLIKELY = 20.0
 def is_inadequate(bench: Bench, selection: Selection, needed: float) -> bool:
     """Tell whether a freedom gains much of what the accepted effects gained, and what is `needed`.
 
-    A hidden input is a freedom itself: it leaves what it leaves. So does an effect that may walk
-    along a recording, such as a grade, at its own place.
+    An effect that may walk along a recording, such as a grade, leaves what it leaves at its place.
     """
     known = [tried.evidence.train for tried in selection.accepted if tried.evidence]
-    if not known or any(not has_parameters(tried.layer) for tried in selection.accepted):
-        return False
     limit = max(needed, LEFT_PART * sum(known)) * inflation(selection.model, bench.series)
     walking = {tried.layer.place for tried in selection.accepted if walks(tried.layer)}
     return any(
@@ -46,6 +54,25 @@ def is_inadequate(bench: Bench, selection: Selection, needed: float) -> bool:
         for section, layer in places_of_freedom(bench)
         if section == "elements" or (section == "flow" and layer.place not in walking)
     )
+
+
+def remembers(bench: Bench, selection: Selection) -> bool:
+    """Tell whether innovations remember much of what they did before effects were accepted."""
+    before, after = (inflation(one, bench.series) for one in (selection.base, selection.model))
+    return after > MEMORY and after - 1.0 > MEMORY_PART * (before - 1.0)
+
+
+def piles_up(selection: Selection) -> bool:
+    """Tell whether an effect needed another one at its place, which gains much of what it gained:
+    together they imitate what is neither.
+    """
+    gains: dict[str, float] = {}
+    for tried in selection.accepted:
+        gained = tried.evidence.train if tried.evidence else 0.0
+        first = gains.setdefault(place_path(tried.layer), gained)
+        if first is not gained and gained > PILED * first:
+            return True
+    return False
 
 
 def refused(selection: Selection) -> Selection:

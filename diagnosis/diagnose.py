@@ -84,9 +84,11 @@ def diagnose(case: Case, tell: Tell = lambda text: None) -> Diagnosis:
         tell(plan.sentence())
     loci = led_by(loci, [place_path(tried.layer) for tried in selection.accepted], bench)
     if found.says == "unknown":
-        tried = [one for one in selection.first_round if one.evidence]
-        tried.sort(key=lambda one: -one.score)
-        loci = likely(loci, [place_path(one.layer) for one in tried], bench)
+        least = found.thresholds.usual
+        rounds = selection.first_round
+        near = [one for one in rounds if one.evidence and one.evidence.train > least]
+        near.sort(key=lambda one: -one.score)
+        loci = likely(loci, [place_path(one.layer) for one in near], bench)
     fit = {"train": misfits(found.base, selection.model, bench.series)}
     verdict = _verdict(found.says, selection, loci, automaton, fit)
     hashes = {case.name_of(path): _digest(path) for path in case.train}

@@ -12,10 +12,8 @@ from collections.abc import Mapping, Sequence
 from diagnosis.bench import Bench
 from diagnosis.description import Description
 from diagnosis.estimation import Estimate
-from diagnosis.evidence import inflation
 from diagnosis.excess import excess_at
 from diagnosis.location import acting
-from diagnosis.locus import Locus
 from diagnosis.naming import place_path
 from diagnosis.regression import ranking
 from diagnosis.search import Tried
@@ -38,18 +36,19 @@ MORE = 1.5
 def is_doubtful(
     says: Says,
     selection: Selection,
-    loci: Sequence[Locus],
+    left: float,
     bench: Bench,
     threshold: float,
     units: Mapping[str, float],
 ) -> bool:
-    """Tell whether a formula might say more than the verdict does; `units` are those of drifts."""
+    """Tell whether a formula might say more than the verdict does.
+
+    `left` is what the base leaves unexplained [nats], `units` are those of drifts.
+    """
     if says in ("unknown", "ambiguous"):
         return True
     if says == "nothing_missing":
-        shrink = 1.0 / inflation(selection.base, bench.series)
-        unexplained = max((locus.gain for locus in loci), default=0.0) * shrink
-        return unexplained > UNEXPLAINED * threshold
+        return left > UNEXPLAINED * threshold
     if is_still(selection, units):
         return False
     gained = sum(tried.evidence.train for tried in selection.accepted if tried.evidence)

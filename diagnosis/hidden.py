@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.adequacy import remembers
 from diagnosis.bench import Bench
 from diagnosis.estimation import Estimate, estimated, looked_at, with_normal
 from diagnosis.evidence import Evidence, evidence, inflation
@@ -80,14 +81,16 @@ def with_hidden(
     if found is None or counted(found.evidence) < needed:
         return selection, tuple(loci)
     layer, quiet = _inputs(bench)[found.locus.path], freed(bench, selection.base)
-    tell(f"accepted {layer.id}: {counted(found.evidence):.0f} nats, silent most of the time")
+    gained = f"accepted {layer.id}: {counted(found.evidence):.0f} nats"
+    beside = f", beside what gained {found.explained:.0f}" if found.effects else ""
+    tell(f"{gained}, silent most of the time{beside}")
     place = _from_silence(bench, found.locus, found.model)
     assert place.free is not None
     model = with_normal(place.free, bench.series)
     others = (one for one in loci if one.path != place.path)
     hidden = Tried(layer, found.gained, model, found.evidence)
     known = selection.first_round
-    is_less = found.explained > MUCH_MORE * found.gained
+    is_less = _is_less(found)
     selection = dataclasses.replace(
         selection,
         base=quiet,
@@ -99,6 +102,14 @@ def with_hidden(
     return selection, (place, *others)
 
 
+def _is_less(found: _Hidden) -> bool:
+    """Tell whether effects are named before a hidden input: they gain more beside the drifts of
+    the base, or explain much more than it where nothing drifts.
+    """
+    gained = sum(one.evidence.train for one in found.effects if one.evidence)
+    return gained > counted(found.evidence) or found.explained > MUCH_MORE * found.gained
+
+
 def _found(
     bench: Bench, selection: Selection, loci: Sequence[Locus], needed: float
 ) -> _Hidden | None:
@@ -106,8 +117,10 @@ def _found(
 
     Alone it has to gain nearly as much as any other place does, such as the inside of a shaft.
     One that is silent most of the time is the simpler of two that gain nearly the same. Where none
-    is, effects may be what is heard there all the time: then beside these.
+    is, effects may be what is heard there all the time: then beside these, unless they are
+    something else themselves.
     """
+    may_join = not remembers(bench, selection)
     shrink = 1.0 / inflation(selection.base, bench.series)
     known = _inputs(bench)
     loud = [one for one in loci if one.path in known and shrink * one.gain > needed]
@@ -119,10 +132,10 @@ def _found(
             continue
         alone = _alone(bench, selection, found)
         if alone is None:
-            return _beside(bench, selection, found)
+            return _beside(bench, selection, found) if may_join else None
         if locus.gain > NEAR * most:
             return _joined(bench, selection, alone)
-    for locus in near if selection.accepted else ():
+    for locus in near if selection.accepted and may_join else ():
         if _is_heard(bench, selection.model, locus.drift, needed):
             beside = _beside(bench, selection, locus)
             if _is_hidden(bench, beside.locus):

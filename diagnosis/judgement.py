@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from diagnosis.adequacy import is_inadequate, refused
+from diagnosis.adequacy import is_inadequate, piles_up, refused, remembers
 from diagnosis.alone import LEFT_OUT, SIMULATED, alone, forgets
 from diagnosis.bench import Bench
 from diagnosis.bootstrap import bootstrapped, kept_thresholds
@@ -14,10 +14,10 @@ from diagnosis.case import Case
 from diagnosis.description import Description, described
 from diagnosis.doubt import explains_more, is_doubtful, is_still, selected_formula
 from diagnosis.estimation import Estimate
-from diagnosis.evidence import inflation
 from diagnosis.hidden import with_hidden
+from diagnosis.layers import has_parameters
 from diagnosis.level import units_of
-from diagnosis.location import located
+from diagnosis.location import located, unexplained
 from diagnosis.locus import Locus
 from diagnosis.naming import verdict_id
 from diagnosis.place_sentence import place_sentence
@@ -69,25 +69,34 @@ def _judged_by_observer(case: Case, raw: Bench, ways: Sequence[Way], tell: Tell)
     loci = located(bench, base)
     tell(place_sentence(loci, bench))
     selection, loci = with_hidden(bench, selection, loci, HIDDEN * most, tell)
-    says = _says(selection, loci, bench, most)
+    left = unexplained(bench, selection.base, loci)
+    says = _says(selection, left, bench, most)
     formula = None
-    if is_doubtful(says, selection, loci, bench, most, units):
+    if is_doubtful(says, selection, left, bench, most, units):
         formula = described(bench, selection.base, loci, units, most, tell)
     if formula is not None and explains_more(formula, selection):
         says, selection = "unknown", selected_formula(selection, formula)
     else:
         formula = None
-        if says == "effect" and not is_still(selection, units):
-            says, selection = _adequate(bench, selection, UNKNOWN * most, tell)
+        says, selection = _adequate(bench, selection, says, UNKNOWN * most, units, tell)
     return Judgement(bench, base, selection, loci, says, thresholds, formula)
 
 
 def _adequate(
-    bench: Bench, selection: Selection, needed: float, tell: Tell
+    bench: Bench,
+    selection: Selection,
+    says: Says,
+    needed: float,
+    units: Mapping[str, float],
+    tell: Tell,
 ) -> tuple[Says, Selection]:
-    """Return a selection, or one without effects that leave more unexplained than they explain."""
-    if not is_inadequate(bench, selection, needed):
-        return "effect", selection
+    """Return a verdict, or `unknown` without effects that leave much of it unexplained."""
+    if not selection.accepted or any(not has_parameters(t.layer) for t in selection.accepted):
+        return says, selection
+    is_heard = says == "effect" and not is_still(selection, units)
+    is_other = remembers(bench, selection) or piles_up(selection)
+    if not is_other and not (is_heard and is_inadequate(bench, selection, needed)):
+        return says, selection
     names = ", ".join(tried.layer.id for tried in selection.accepted)
     tell(f"much is left unexplained beside {names}: it is something else")
     return "unknown", refused(selection)
@@ -99,11 +108,12 @@ def _judged_by_simulation(
     """Judge models by simulations of whole recordings, in which nothing is fed back."""
     loci = located(bench, base)
     tell(place_sentence(loci, bench))
+    left = unexplained(bench, base, loci)
     tell("what happened long ago does not matter here: whole simulations are judged")
     thresholds = SIMULATED if case.thresholds == EVERYWHERE else case.thresholds
     found = alone(raw, base)
     selection = selected(found.bench, found.base, {}, thresholds, tell, LEFT_OUT)
-    says = _says(selection, loci, found.bench, max(USUAL, thresholds.most))
+    says = _says(selection, left, found.bench, max(USUAL, thresholds.most))
     bench = dataclasses.replace(bench, series=found.bench.series)
     return Judgement(bench, found.base, selection, loci, says, thresholds)
 
@@ -127,11 +137,10 @@ def _thresholds(
     return found
 
 
-def _says(selection: Selection, loci: Sequence[Locus], bench: Bench, needed: float) -> Says:
+def _says(selection: Selection, left: float, bench: Bench, needed: float) -> Says:
+    """Return the verdict of a selection; `left` is what the base leaves unexplained [nats]."""
     if not selection.accepted:
-        shrink = 1.0 / inflation(selection.base, bench.series)
-        unexplained = max((locus.gain for locus in loci), default=0.0) * shrink
-        return "unknown" if unexplained > UNKNOWN * needed else "nothing_missing"
+        return "unknown" if left > UNKNOWN * needed else "nothing_missing"
     best, automaton = selection.accepted[0], bench.automaton
     name = verdict_id(best.layer, automaton)
     others = (one for one in selection.rivals if verdict_id(one.layer, automaton) != name)

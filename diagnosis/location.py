@@ -14,12 +14,16 @@ import numpy as np
 
 from diagnosis.bench import Bench
 from diagnosis.estimation import Estimate
+from diagnosis.evidence import inflation
 from diagnosis.freedom import freed
 from diagnosis.layers import Layer, drift
 from diagnosis.locus import Locus, locus_of, over_time
 from language.document import Table
 from language.known import entries_of
 from language.rewrite import reads
+
+DISTURBED = 0.2
+"""Part that counts of what the small drifts of the base take up as well."""
 
 
 def located(bench: Bench, base: Estimate) -> tuple[Locus, ...]:
@@ -41,6 +45,17 @@ def located(bench: Bench, base: Estimate) -> tuple[Locus, ...]:
             found.append(dataclasses.replace(locus, gain=quiet - one.cost))
     found.sort(key=lambda locus: -locus.gain)
     return tuple([over_time(bench, found[0]), *found[1:]] if found else [])
+
+
+def unexplained(bench: Bench, base: Estimate, loci: Sequence[Locus]) -> float:
+    """Return what the freedom of the best place gains [nats].
+
+    What the base takes up with drifts as small as it may have counts little: a model has some
+    disturbance. All the same a load that acts on the road is one of these.
+    """
+    gain = max((locus.gain for locus in loci), default=0.0)
+    taken_up = min(max(0.0, freed(bench, base).cost - base.cost), gain)
+    return (gain - (1.0 - DISTURBED) * taken_up) / inflation(base, bench.series)
 
 
 def places_of_freedom(bench: Bench) -> list[tuple[str, Layer]]:
@@ -71,7 +86,7 @@ def likely(loci: Sequence[Locus], nearest: Iterable[str], bench: Bench) -> tuple
     """Return places of something unknown, led by an input or a body that acts at the first one.
 
     A drift in a balance is as well one of the input that drives it. `nearest` are the paths of what
-    comes nearest to what is missing, best first: they tell which of both is more likely.
+    comes nearest to what is missing and gains enough, best first: they tell which is more likely.
     """
     for path in nearest:
         section, _, place = path.partition(".")

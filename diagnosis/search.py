@@ -25,7 +25,9 @@ POOR = 2.0
 MOST_SCREENED = 5
 """Recordings that candidates are screened on first, spread over all."""
 HINT = 2.0
-"""Nats that a candidate gains there, if it is to be screened on all."""
+"""Nats that a candidate gains there at least, if it is to be screened on all."""
+HINT_PART = 0.3
+"""Part of what it has to promise that it gains there."""
 STARTS = 2
 """Starts of a candidate from which steps are made, the best ones."""
 HOPELESS = 0.05
@@ -72,8 +74,9 @@ def searched(
     for layer in layers:
         candidate = _possible(bench, base, layer)
         if candidate is not None:
-            make = partial(screened, bench, candidate, base)
-            known = [base.candidate, base.point, base.noises, base.columns]
+            hint = max(HINT, HINT_PART * worth)
+            make = partial(screened, bench, candidate, base, hint)
+            known = [base.candidate, base.point, base.noises, base.columns, hint]
             start = bench.kept("screened", candidate, known, make)
             promised.append((base.cost - start.cost, layer, start))
     promised.sort(key=lambda one: -one[0])
@@ -112,11 +115,11 @@ def _fitted(bench: Bench, base: Estimate, start: Estimate, units: Mapping[str, f
     return min(first, again, key=lambda one: one.cost)
 
 
-def screened(bench: Bench, candidate: Candidate, base: Estimate) -> Estimate:
+def screened(bench: Bench, candidate: Candidate, base: Estimate, hint: float = HINT) -> Estimate:
     """Return a candidate some steps from the best of its starts, seen from there.
 
-    Where there are many recordings, first on some: one that gains nothing there is not looked at
-    on all.
+    Where there are many recordings, first on some: one that gains less than a `hint` [nats] there,
+    and as it starts on all, is not looked at further.
     """
     rows = _screened_on(candidate, len(bench.series))
     every = list(range(len(bench.series)))
@@ -127,9 +130,20 @@ def screened(bench: Bench, candidate: Candidate, base: Estimate) -> Estimate:
     whole.own[rows] = found.point.own
     series = [bench.series[row] for row in rows]
     part = seen_at(base, series, Point(base.point.shared, base.point.own[rows]))
-    if part.cost - found.cost < HINT:
-        return seen_at(found, bench.series, Point(found.point.shared, whole.own))
+    if part.cost - found.cost < hint:
+        point = Point(found.point.shared, whole.own)
+        known = [seen_at(found, bench.series, point), _started(bench, candidate, base)]
+        best = min(known, key=lambda one: one.cost)
+        if base.cost - best.cost < hint:
+            return best
     return _reached(bench, candidate, base, every)
+
+
+def _started(bench: Bench, candidate: Candidate, base: Estimate) -> Estimate:
+    """Return a candidate at its first start: some show themselves in few recordings alone."""
+    start = starts_of(candidate, base.values(0))[0]
+    point = extended(candidate, base.candidate, base.point, start)
+    return looked_at(candidate, bench.series, base.noises, point, None)
 
 
 def _reached(bench: Bench, candidate: Candidate, base: Estimate, rows: list[int]) -> Estimate:
@@ -148,7 +162,9 @@ def _reached(bench: Bench, candidate: Candidate, base: Estimate, rows: list[int]
         found.append(turned(here, series))
     found.sort(key=lambda one: one.cost)
     reach = [reached(here, series, columns) for here in found[:STARTS]]
-    return min(reach, key=lambda one: one.cost)
+    best = min(reach, key=lambda one: one.cost)
+    again = turned(best, series)
+    return reached(again, series, columns) if again.cost < best.cost - HINT else best
 
 
 def _screened_on(candidate: Candidate, count: int) -> list[int]:

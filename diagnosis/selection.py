@@ -19,12 +19,12 @@ from diagnosis.search import Tell, Tried, searched
 from diagnosis.swap import swapped
 from diagnosis.threshold import EVERYWHERE, USUAL, Thresholds
 
-PART = 0.02
+PART = 0.005
 """A further effect gains at least this part of what the one before it gained: a strong effect is
 never described so well that nothing small is left beside it."""
 HOPE = 0.25
 """Part of what it needs to gain that a candidate must promise to be fitted."""
-NEXT = 9
+NEXT = 14
 """Candidates that are looked at again beside an accepted one: the best of the round before."""
 AGAIN = 15
 """Candidates that are looked at again where the model itself is found to fit better."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnosis.adaptation import adapted
+from diagnosis.adaptation import adapted, turned
 from diagnosis.bench import Bench
 from diagnosis.estimation import looked_at
 from diagnosis.layers import fitting, shipped_effects
@@ -31,3 +31,13 @@ def test_a_phase_is_found_far_from_that_of_other_recordings(bench: Bench, before
         apart = np.remainder(found.values(k)["ph_w_s"] - PHASE + np.pi, 2.0 * np.pi) - np.pi
         assert abs(apart) < 0.15
         assert found.values(k)["ecc_w_s"] == model.values(k)["ecc_w_s"]
+
+
+def test_a_phase_that_is_right_is_not_turned_to_a_start(bench: Bench) -> None:
+    effect = next(one for one in shipped_effects() if one.name == "sensor_eccentricity")
+    layer = next(one for one in fitting(bench.document, effect) if one.place == "w_s")
+    candidate = bench.candidate((layer,))
+    known = {**TRUTH, "ecc_w_s": 0.02, "ph_w_s": PHASE}
+    held = recorded(candidate, known)
+    model = looked_at(candidate, held, noises_of(held, {}), point_of(candidate, len(held), known))
+    assert turned(model, held).values(0)["ph_w_s"] == pytest.approx(PHASE)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
 from fractions import Fraction
 
 import numpy as np
 import pytest
 
-from diagnosis.adequacy import is_inadequate, refused
+from diagnosis.adequacy import is_inadequate, refused, remembers
 from diagnosis.bench import Bench
+from diagnosis.estimation import Estimate, estimated
 from diagnosis.evidence import evidence
 from diagnosis.joined import burnt
 from diagnosis.layers import fitting
@@ -32,10 +34,10 @@ def rubbing(bench: Bench) -> Bench:
     return with_effect(bench, "coulomb_friction@w_em", STRONG)
 
 
-def accepting(bench: Bench, rubbing: Bench, effect: str) -> Selection:
-    """Return a selection that has accepted an effect for what is recorded."""
+def accepting(bench: Bench, rubbing: Bench, effect: str, base: Estimate | None = None) -> Selection:
+    """Return a selection that has accepted an effect for what is recorded, over a base."""
     layers = {layer.id: layer for e in bench.effects for layer in fitting(bench.document, e)}
-    base = based(rubbing)
+    base = base or based(rubbing)
     units = units_of(base.candidate, rubbing.series, base.noises, base.values(0))
     candidate = rubbing.candidate((layers[effect],))
     model = settled(candidate, rubbing.series, base.noises, base.values(0), units)
@@ -52,6 +54,19 @@ def test_what_explains_less_than_it_leaves_is_inadequate(
 ) -> None:
     selection = accepting(bench, rubbing, effect)
     assert is_inadequate(rubbing, selection, NEEDED) is inadequate
+
+
+@pytest.mark.parametrize(
+    ("effect", "does"), [("coulomb_friction@w_em", False), ("sensor_lag@w_em", True)]
+)
+def test_innovations_remember_what_is_still_missing(
+    bench: Bench, rubbing: Bench, effect: str, does: bool
+) -> None:
+    base = based(rubbing)
+    quiet = dataclasses.replace(base, noises=dataclasses.replace(base.noises, drifts={}))
+    alone = estimated(quiet.candidate, rubbing.series, quiet.noises, quiet.point)
+    selection = accepting(bench, rubbing, effect, alone)
+    assert remembers(rubbing, selection) is does
 
 
 def test_what_was_refused_is_not_likely(bench: Bench, rubbing: Bench) -> None:

@@ -35,8 +35,12 @@ def torque(kind: int) -> np.ndarray:
     return np.asarray(25.0 * np.sign(np.sin(2 * np.pi * 0.6 * time)))
 
 
-def recorded(candidate: Candidate, values: dict[str, float]) -> tuple[Series, ...]:
-    """Return simulations without correction, with noise on what is seen."""
+def recorded(
+    candidate: Candidate, values: dict[str, float], brake: float = 0.0
+) -> tuple[Series, ...]:
+    """Return simulations without correction, with noise on what is seen; a `brake` [N*m] acts for
+    half a second.
+    """
     rng = np.random.default_rng(11)
     found = []
     states, seen = len(candidate.predictor.states), len(SEEN)
@@ -44,6 +48,7 @@ def recorded(candidate: Candidate, values: dict[str, float]) -> tuple[Series, ..
     for kind, speed in ((0, 60.0), (1, 120.0), (2, 5.0)):
         inputs = np.zeros((COUNT, len(candidate.predictor.inputs)))
         inputs[:, candidate.predictor.inputs.index("T_em")] = torque(kind)
+        inputs[160:260, candidate.predictor.inputs.index("T_br")] = brake
         measured = np.zeros((COUNT, seen))
         measured[0] = speed, speed / 9.0
         blank = Series(f"{kind}", PERIOD, Fraction(0), inputs, measured)

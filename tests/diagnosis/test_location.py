@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import pytest
 
 from diagnosis.bench import Bench
 from diagnosis.estimation import Estimate
+from diagnosis.evidence import inflation
 from diagnosis.freedom import freed
 from diagnosis.joined import BURN_IN
 from diagnosis.layers import drift, fitting
 from diagnosis.level import first_fit, recalibrated, units_of
-from diagnosis.location import acting, led_by
+from diagnosis.location import DISTURBED, acting, led_by, located, unexplained
 from diagnosis.locus import Locus, locus_of
 from diagnosis.place_sentence import NOTHING, place_sentence
 from diagnosis.prediction import noises_of
@@ -40,6 +43,17 @@ def test_a_sensor_is_not_taken_for_a_torque(bench: Bench) -> None:
     base = based(hidden)
     sensor = freed(hidden, base, drift("output", "w_s"))
     assert sensor.cost < freed(hidden, base, hidden.drifts[0]).cost - 100.0
+
+
+def test_what_small_drifts_of_the_base_take_up_is_hardly_unknown(bench: Bench) -> None:
+    hidden = with_effect(bench, "coulomb_friction@w_em", FRICTION)
+    base = based(hidden)
+    loci, quiet = located(hidden, base), freed(hidden, base).cost
+    gain = loci[0].gain / inflation(base, hidden.series)
+    without = dataclasses.replace(base, cost=quiet)
+    assert unexplained(hidden, without, loci) == pytest.approx(gain)
+    as_good = dataclasses.replace(base, cost=quiet - loci[0].gain)
+    assert unexplained(hidden, as_good, loci) == pytest.approx(DISTURBED * gain)
 
 
 def test_a_friction_is_no_sensor_and_told_with_its_size_and_what_it_goes_with(

@@ -118,8 +118,8 @@ def sensor_eccentricity(p: Physics) -> Compared:
     angle = np.cumsum(speed) * 2 * MS
     found = walked(p, 2 * MS, {"W_W": speed, "A_W": angle})["encoder"]
     return Compared(
-        found, speed, lambda f: library.eccentric(speed, angle, *f), (0.01, 1.0),
-        [(1, -2), (1, 3), (1, 5)],
+        found, speed, lambda f: library.eccentric(speed, angle, *f), (0.01, 1.0, 0.005),
+        [(1, -2, 0), (1, 3, 0), (1, 5, 1)],
     )  # fmt: skip
 
 

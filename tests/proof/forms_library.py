@@ -165,6 +165,8 @@ def tyre_slip(torque: Array, c_t: float) -> Array:
     return np.asarray(torque / c_t)
 
 
-def eccentric(y: Array, angle: Array, ecc: float, phase: float) -> Array:
-    """sensor_eccentricity."""
-    return np.asarray(y * (1 + ecc * np.sin(angle + phase)))
+def eccentric(y: Array, angle: Array, ecc: float, phase: float, tau: float) -> Array:
+    """sensor_eccentricity: `y` and its angle are behind a filter, the tone is before it."""
+    ahead, x = angle + phase + tau * y, tau * y
+    tone = (np.sin(ahead) - x * np.cos(ahead)) / (1 + x**2)
+    return np.asarray(y * (1 + ecc * tone))

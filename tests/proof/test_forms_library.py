@@ -34,7 +34,7 @@ WRITTEN_OUT: dict[str, str] = {
     "position_dependent_stiffness": "a ord ph s_2 c_2 s_3 c_3",
     "second_gap": "J_m k_2 c_2 x_c a_2",
     "sensor_delay": "T_d",
-    "sensor_eccentricity": "ecc ph",
+    "sensor_eccentricity": "ecc ph tau_e",
     "sensor_lag": "tau part",
     "stiffness_hysteresis": "k_r F_r",
     "stiffness_nonlinear": "q x_r",
@@ -115,9 +115,9 @@ TORQUES: list[tuple[str, str, Callable[[], Array]]] = [
         lambda: library.delay(integral(COURSE) / J, MS, 0.035),
     ),
     (
-        "sensor_eccentricity@w: {values: {ecc: 0.05, ph: 0.4 rad}}", "w",
+        "sensor_eccentricity@w: {values: {ecc: 0.05, ph: 0.4 rad, tau_e: 20 ms}}", "w",
         lambda: library.eccentric(
-            integral(COURSE) / J, integral(integral(COURSE)) / J, 0.05, 0.4
+            integral(COURSE) / J, integral(integral(COURSE)) / J, 0.05, 0.4, 0.02
         ),
     ),
 ]  # fmt: skip
