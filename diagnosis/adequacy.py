@@ -30,7 +30,7 @@ An error of an output is none of them: a sensor follows whatever the model gets 
 
 MEMORY = 1.2
 """Innovations that count as one from which on those of a model remember."""
-MEMORY_PART = 0.2
+MEMORY_PART = 0.25
 """Part of what the base's innovations remembered that those of an adequate model may: noise has no
 memory, and a form that is not quite right leaves little of it."""
 

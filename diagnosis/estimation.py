@@ -25,7 +25,7 @@ ENOUGH = 0.3
 """A round that gains less than this [nats] is the last."""
 FIRST_DAMPING = 1e-3
 LARGEST_DAMPING = 1e5
-SCREENED_ROUNDS = 4
+SCREENED_ROUNDS = 8
 """Most rounds while candidates are screened."""
 WORTH_A_ROUND = 3.0
 """A round of screening that gains less [nats] is the last."""

@@ -22,10 +22,12 @@ from diagnosis.threshold import EVERYWHERE, USUAL, Thresholds
 PART = 0.005
 """A further effect gains at least this part of what the one before it gained: a strong effect is
 never described so well that nothing small is left beside it."""
-HOPE = 0.25
-"""Part of what it needs to gain that a candidate must promise to be fitted."""
+HOPE, HOPE_BESIDE = 0.25, 0.5
+"""Part of what it needs to gain that a candidate must promise to be fitted, alone and beside what
+was accepted, where little is misjudged."""
 NEXT = 14
-"""Candidates that are looked at again beside an accepted one: the best of the round before."""
+"""Candidates that are looked at again beside an accepted one, the best of the round before; half
+as many beside two."""
 AGAIN = 15
 """Candidates that are looked at again where the model itself is found to fit better."""
 FEW = 3
@@ -91,7 +93,7 @@ def selected(
     layers = _near_best(known) or list(bench.layers())
     needed = 0.0
     while len(accepted) < MOST_EFFECTS:
-        worth = HOPE * max(needed, thresholds.usual)
+        worth = (HOPE_BESIDE if accepted else HOPE) * max(needed, thresholds.usual)
         tried = searched(bench, model, units, layers, tell, worth)
         better, tried = looked_again(bench, model, units, tried, tell)
         if better is not None:
@@ -107,7 +109,7 @@ def selected(
         before = [*accepted, best]
         accepted, model = swapped(bench, best.estimate, before, rounds[0], units, tell)
         rounds[0] = _refuted(rounds[0], before, accepted)
-        layers = _likely([*known, *tried])
+        layers = _likely([*known, *tried], NEXT // len(accepted))
     kept, model = _still_needed(bench, base, model, accepted, units, thresholds, tell)
     first = tuple(rounds[0]) if rounds else ()
     return Selection(base, model, kept, first, _rivals(first, kept))
@@ -127,9 +129,9 @@ def _enough(
     )
 
 
-def _likely(tried: Sequence[Tried]) -> list[Layer]:
-    """Return the layers that are looked at again beside an accepted one."""
-    return list({t.layer.id: t.layer for t in tried if t.promised > 0.0}.values())[:NEXT]
+def _likely(tried: Sequence[Tried], most: int) -> list[Layer]:
+    """Return the layers that are looked at again beside what was accepted."""
+    return list({t.layer.id: t.layer for t in tried if t.promised > 0.0}.values())[:most]
 
 
 def _near_best(known: Sequence[Tried]) -> list[Layer]:
