@@ -66,12 +66,12 @@ def piles_up(selection: Selection) -> bool:
     """Tell whether an effect needed another one at its place, which gains much of what it gained:
     together they imitate what is neither.
     """
-    gains: dict[str, float] = {}
+    firsts: dict[str, float] = {}
     for tried in selection.accepted:
-        gained = tried.evidence.train if tried.evidence else 0.0
-        first = gains.setdefault(place_path(tried.layer), gained)
-        if first is not gained and gained > PILED * first:
+        path, gained = place_path(tried.layer), tried.evidence.train if tried.evidence else 0.0
+        if path in firsts and gained > PILED * firsts[path]:
             return True
+        firsts.setdefault(path, gained)
     return False
 
 

@@ -143,7 +143,7 @@ def _started(bench: Bench, candidate: Candidate, base: Estimate) -> Estimate:
     """Return a candidate at its first start: some show themselves in few recordings alone."""
     start = starts_of(candidate, base.values(0))[0]
     point = extended(candidate, base.candidate, base.point, start)
-    return looked_at(candidate, bench.series, base.noises, point, None)
+    return looked_at(candidate, bench.series, base.noises, point)
 
 
 def _reached(bench: Bench, candidate: Candidate, base: Estimate, rows: list[int]) -> Estimate:

@@ -8,7 +8,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from diagnosis.adequacy import is_inadequate, refused, remembers
+from diagnosis.adequacy import is_inadequate, piles_up, refused, remembers
 from diagnosis.bench import Bench
 from diagnosis.estimation import Estimate, estimated
 from diagnosis.evidence import evidence
@@ -67,6 +67,19 @@ def test_innovations_remember_what_is_still_missing(
     alone = estimated(quiet.candidate, rubbing.series, quiet.noises, quiet.point)
     selection = accepting(bench, rubbing, effect, alone)
     assert remembers(rubbing, selection) is does
+
+
+@pytest.mark.parametrize(("further", "piles"), [(0.1, False), (0.8, True)])
+def test_two_that_gain_alike_at_one_place_are_neither(
+    bench: Bench, rubbing: Bench, further: float, piles: bool
+) -> None:
+    selection = accepting(bench, rubbing, "coulomb_friction@w_em")
+    (first,) = selection.accepted
+    assert first.evidence is not None
+    less = dataclasses.replace(first.evidence, train=further * first.evidence.train)
+    second = dataclasses.replace(first, evidence=less)
+    assert piles_up(dataclasses.replace(selection, accepted=(first, second))) is piles
+    assert not piles_up(selection)
 
 
 def test_what_was_refused_is_not_likely(bench: Bench, rubbing: Bench) -> None:
