@@ -30,7 +30,7 @@ HINT_PART = 0.1
 """Part of what it has to promise that it gains there."""
 STARTS = 2
 """Starts of a candidate from which steps are made, the best ones."""
-HOPELESS = 0.2
+HOPELESS = 0.05
 """A candidate that promises less than this part of what another has gained is not fitted."""
 PLAIN = 2.5
 """Nats that each number of an effect has to gain beyond its price."""

@@ -14,6 +14,7 @@ from diagnosis.estimation import Estimate
 from diagnosis.evidence import Evidence, evidence
 from diagnosis.layers import Layer
 from diagnosis.level import settled
+from diagnosis.naming import place_path
 from diagnosis.point import extended
 from diagnosis.search import Tell, Tried, searched
 from diagnosis.swap import swapped
@@ -32,6 +33,9 @@ AGAIN = 15
 """Candidates that are looked at again where the model itself is found to fit better."""
 FEW = 3
 """Recordings of which none can be against all others."""
+STAND_IN = 0.25
+"""Part of what another one at its place gains that an effect found before it must add to that: it
+may have stood in for it."""
 MUCH = 0.1
 """Part of what the best candidate gained: a model that gains more has them looked for anew, and
 candidates that gained less are not tried in another way."""
@@ -242,11 +246,19 @@ def _still_needed(
         given = (base.noises, start, units, 1)
         make = partial(settled, candidate, bench.series, *given)
         without = bench.kept("settled", candidate, given, make)
-        if evidence(model, without, bench.series).least <= thresholds.of(tried.layer):
+        needed = max(thresholds.of(tried.layer), STAND_IN * _gained_beside(tried, kept))
+        if evidence(model, without, bench.series).least <= needed:
             tell(f"{tried.layer.id} is needless beside the others")
             kept.remove(tried)
             model = without
     return tuple(kept), model
+
+
+def _gained_beside(one: Tried, kept: Sequence[Tried]) -> float:
+    """Return what the others at the place of an effect have gained [nats]."""
+    place = place_path(one.layer)
+    others = [t for t in kept if t is not one and place_path(t.layer) == place]
+    return sum(t.evidence.train for t in others if t.evidence)
 
 
 def _rivals(first: tuple[Tried, ...], kept: tuple[Tried, ...]) -> tuple[Tried, ...]:
