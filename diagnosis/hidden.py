@@ -82,7 +82,7 @@ def with_hidden(
         return selection, tuple(loci)
     layer, quiet = _inputs(bench)[found.locus.path], freed(bench, selection.base)
     gained = f"accepted {layer.id}: {counted(found.evidence):.0f} nats"
-    beside = f", beside what gained {found.explained:.0f}" if found.effects else ""
+    beside = f", beside effects that explain {found.explained:.0f}" if found.effects else ""
     tell(f"{gained}, silent most of the time{beside}")
     place = _from_silence(bench, found.locus, found.model)
     assert place.free is not None

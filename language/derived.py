@@ -42,8 +42,7 @@ def with_model(
         balances = {name: flow[name] for name in observer.states}
         a = matrix(balances, observer.states, point)
         c = matrix(seen, observer.states, point)
-        for rows, which in ((a, "A"), (c, "C")):
-            _check_constant(automaton, observer, rows, which)
+        _check_constant(automaton, observer, {"A": a, "C": c})
         b = _inputs(automaton, balances, point)
         inputs = tuple(u for u in automaton.inputs if any(u in row for row in b.values()))
         f, f_constants = _rests(balances, (*observer.states, *inputs), point, f"{name}_f")
@@ -108,9 +107,12 @@ def _measured(observer: Observer, mode: Mode, known: Mapping[str, Tree]) -> dict
     return found
 
 
-def _check_constant(automaton: Automaton, observer: Observer, rows: Rows, what: str) -> None:
+def _check_constant(
+    automaton: Automaton, observer: Observer, matrices: Mapping[str, Rows]
+) -> None:
     problems = Problems()
-    for row, entries in rows.items():
+    known = [(what, row, m[row]) for what, m in matrices.items() for row in m]
+    for what, row, entries in known:
         for column, tree in entries.items():
             for name in dict.fromkeys(read.path for read in names(tree)):
                 if name not in automaton.parameters:

@@ -40,20 +40,10 @@ def fit(
     modewright fit blind_driveline --train runs/*.csv --parameters k,c --out rig_7.yaml
     modewright fit emps --train run.csv --map my_columns --json
     """
-    from language.calibration import DATE
-    from language.names import NAME
     from modewright import show, show_diagnosis
     from modewright.diagnoses import UnusableRecordings, fit as fitted
 
-    if out:
-        if out.suffix != ".yaml":
-            raise OutputError(f"{out}: a calibration ends with .yaml")
-        require_calibration(out)
-    title = name or (out.stem if out else "fitted")
-    if not NAME.fullmatch(title):
-        raise typer.BadParameter(f"`{title}` is not a name", param_hint="--name")
-    if date and not DATE.fullmatch(date):
-        raise typer.BadParameter("a date is written as `2026-11-21`", param_hint="--date")
+    title = _checked_title(out, name, date)
     chosen = names_of(parameters) if parameters is not None else None
     try:
         with usage_errors():
@@ -68,6 +58,23 @@ def fit(
     else:
         show_diagnosis.print_fit(console(), found)
         announce([out] if out else [])
+
+
+def _checked_title(out: Path | None, name: str | None, date: str) -> str:
+    """Return the name of the calibration, which can be written as it is asked for."""
+    from language.calibration import DATE
+    from language.names import NAME
+
+    if out:
+        if out.suffix != ".yaml":
+            raise OutputError(f"{out}: a calibration ends with .yaml")
+        require_calibration(out)
+    title = name or (out.stem if out else "fitted")
+    if not NAME.fullmatch(title):
+        raise typer.BadParameter(f"`{title}` is not a name", param_hint="--name")
+    if date and not DATE.fullmatch(date):
+        raise typer.BadParameter("a date is written as `2026-11-21`", param_hint="--date")
+    return title
 
 
 def names_of(text: str) -> list[str]:

@@ -57,23 +57,28 @@ def sweep(
     modewright sweep random_tip_outs --out held_out --samples 200 --seed 7
     modewright sweep --summary results --csv summary.csv
     """
+    folder = _checked_folder(study, out, summary, form)
+    lost = 0
+    if study is not None:
+        options: dict[str, Any] = {"block": block, "samples": samples, "seed": seed}
+        options["workers"] = workers or None
+        lost = _run(study, folder, values_of(sets), options, as_json)
+    _show(folder, table, form, as_json)
+    if lost:
+        raise typer.Exit(PROBLEMS)
+
+
+def _checked_folder(study: str | None, out: Path | None, summary: Path | None, form: str) -> Path:
+    """Return the folder that is written or summed up."""
     if (study is None) == (summary is None):
         raise typer.BadParameter("name a study, or a folder with --summary", param_hint="STUDY")
     if study is not None and out is None:
         raise typer.BadParameter("say where the results go", param_hint="--out")
     if form not in FORMATS:
         raise typer.BadParameter(f"one of {', '.join(FORMATS)}", param_hint="--format")
-    lost = 0
-    if study is not None:
-        assert out is not None
-        options: dict[str, Any] = {"block": block, "samples": samples, "seed": seed}
-        options["workers"] = workers or None
-        lost = _run(study, out, values_of(sets), options, as_json)
     folder = out or summary
     assert folder is not None
-    _show(folder, table, form, as_json)
-    if lost:
-        raise typer.Exit(PROBLEMS)
+    return folder
 
 
 def _run(

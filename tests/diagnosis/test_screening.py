@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 
 import pytest
 
+from diagnosis import search
 from diagnosis.bench import Bench
+from diagnosis.candidate import Candidate
+from diagnosis.estimation import Estimate, looked_at
 from diagnosis.layers import fitting, shipped_effects
 from diagnosis.level import first_fit, units_of
+from diagnosis.point import Point, extended
 from diagnosis.prediction import noises_of
 from diagnosis.search import MOST_SCREENED, screened
 from tests.diagnosis.test_estimation import TRUTH, bench, recorded
@@ -18,10 +23,25 @@ COUNT = 9
 GAIN = 20.0
 
 
+def away_on_some(reached: Callable[..., Estimate]) -> Callable[..., Estimate]:
+    """Steps that on some of the recordings lead to where the brake has no drag."""
+
+    def found(bench: Bench, candidate: Candidate, base: Estimate, rows: list[int]) -> Estimate:
+        if len(rows) == len(bench.series):
+            return reached(bench, candidate, base, rows)
+        whole = extended(candidate, base.candidate, base.point, {"T_r_w_w": 0.0, "share_w_w": 0.0})
+        series = [bench.series[row] for row in rows]
+        return looked_at(candidate, series, base.noises, Point(whole.shared, whole.own[rows]))
+
+    return found
+
+
+@pytest.mark.parametrize("leads_away", [False, True])
 @pytest.mark.parametrize("braked", [1, 5])
 def test_what_a_single_recording_shows_is_found_where_it_is_not_looked_at_first(
-    bench: Bench, braked: int
+    bench: Bench, braked: int, leads_away: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """Also where steps on recordings that do not show it lead to where it does nothing."""
     brake = next(one for one in shipped_effects() if one.name == "brake_drag")
     drag = bench.candidate(tuple(fitting(bench.document, brake)))
     base, known = bench.candidate(()), {**TRUTH, "T_r_w_w": 150.0}
@@ -33,4 +53,6 @@ def test_what_a_single_recording_shows_is_found_where_it_is_not_looked_at_first(
     assert len(series) > MOST_SCREENED
     own = dataclasses.replace(bench, series=series, _made={})
     fitted = first_fit(base, series, units_of(base, series, noises_of(series, {}), {}))
+    if leads_away:
+        monkeypatch.setattr(search, "_reached", away_on_some(search._reached))
     assert fitted.cost - screened(own, drag, fitted).cost > GAIN

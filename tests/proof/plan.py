@@ -13,7 +13,7 @@ from dataclasses import dataclass
 SEED = 20261227
 """Of all cases that are concealed; a study with another one is another study. Of 20261225 thirteen
 were looked at, and the method was changed after that."""
-PAIRS = 48
+PAIRS = 40
 """Cases with two effects, at places of their own."""
 
 
@@ -42,8 +42,8 @@ def plans(pairs: Sequence[tuple[str, str]], seed: int, share: float = 1.0) -> tu
     drawn = sorted(random.Random(seed).sample(pairs, min(of(PAIRS), len(pairs))))
     return (
         Plan("full", f"all:{of(12)}"),
-        Plan("clean", f"all:{of(12)}", strength=0.0),
-        Plan("weak", f"all:{of(4)}", strength=0.3),
+        Plan("clean", f"all:{of(8)}", strength=0.0),
+        Plan("weak", f"all:{of(3)}", strength=0.3),
         Plan("pairs", ",".join("+".join(pair) + ":1" for pair in drawn)),
         Plan("removed", f"all:{of(2)}", without_own=True),
     )
