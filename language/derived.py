@@ -107,9 +107,7 @@ def _measured(observer: Observer, mode: Mode, known: Mapping[str, Tree]) -> dict
     return found
 
 
-def _check_constant(
-    automaton: Automaton, observer: Observer, matrices: Mapping[str, Rows]
-) -> None:
+def _check_constant(automaton: Automaton, observer: Observer, matrices: Mapping[str, Rows]) -> None:
     problems = Problems()
     known = [(what, row, m[row]) for what, m in matrices.items() for row in m]
     for what, row, entries in known:
