@@ -13,7 +13,7 @@ import numpy as np
 
 from diagnosis.bench import Bench
 from diagnosis.estimation import looked_at
-from diagnosis.evidence import inflation
+from diagnosis.evidence import inflation, inflations
 from diagnosis.freedom import WIDE_LEVELS, with_levels
 from diagnosis.layers import DRIFT, Layer, walks
 from diagnosis.level import units_of
@@ -33,6 +33,8 @@ MEMORY = 1.2
 MEMORY_PART = 0.25
 """Part of what the base's innovations remembered that those of an adequate model may: noise has no
 memory, and a form that is not quite right leaves little of it."""
+TYPICAL_PART = 0.2
+"""The same for the recordings, for which it is the median: a few may be far from the others."""
 
 PILED = 0.5
 """Part of what an effect gained that a further one gains at the same place, where neither is it."""
@@ -60,6 +62,19 @@ def remembers(bench: Bench, selection: Selection) -> bool:
     """Tell whether innovations remember much of what they did before effects were accepted."""
     before, after = (inflation(one, bench.series) for one in (selection.base, selection.model))
     return after > MEMORY and after - 1.0 > MEMORY_PART * (before - 1.0)
+
+
+def remembers_mostly(bench: Bench, selection: Selection) -> bool:
+    """Tell whether innovations remember, and those of most recordings in which they did before.
+
+    Where a form is not quite right some recordings show it that drive it far.
+    """
+    if not remembers(bench, selection):
+        return False
+    before, after = (inflations(one, bench.series) for one in (selection.base, selection.model))
+    heard = before > MEMORY
+    left = (after[heard] - 1.0) / (before[heard] - 1.0)
+    return not heard.any() or float(np.median(left)) > TYPICAL_PART
 
 
 def piles_up(selection: Selection) -> bool:

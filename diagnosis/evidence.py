@@ -77,10 +77,20 @@ def inflation(model: Estimate, series: Sequence[Series]) -> float:
 
     (Bartlett 1946, for a quadratic function of them.)
     """
-    lags = max(1, round(LAGS / float(series[0].period)))
+    return _counting_as_one(model.outcome.innovations, float(series[0].period))
+
+
+def inflations(model: Estimate, series: Sequence[Series]) -> Reals:
+    """Return how many innovations of each recording count as one: (recordings,)."""
+    period = float(series[0].period)
+    return np.array([_counting_as_one([one], period) for one in model.outcome.innovations])
+
+
+def _counting_as_one(innovations: Sequence[Reals], period: float) -> float:
+    lags = max(1, round(LAGS / period))
     found = []
-    for channel in range(len(model.candidate.predictor.seen)):
-        whole = [e[np.isfinite(e[:, channel]), channel] for e in model.outcome.innovations]
+    for channel in range(innovations[0].shape[1]):
+        whole = [e[np.isfinite(e[:, channel]), channel] for e in innovations]
         power = sum(float(e @ e) for e in whole)
         total = 1.0
         for lag in range(1, lags + 1) if power > 0.0 else ():

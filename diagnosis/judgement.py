@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from diagnosis.adequacy import is_inadequate, piles_up, refused, remembers
+from diagnosis.adequacy import is_inadequate, piles_up, refused, remembers_mostly
 from diagnosis.alone import LEFT_OUT, SIMULATED, alone, forgets
 from diagnosis.bench import Bench
 from diagnosis.bootstrap import bootstrapped, kept_thresholds
@@ -94,7 +94,7 @@ def _adequate(
     if not selection.accepted or any(not has_parameters(t.layer) for t in selection.accepted):
         return says, selection
     is_heard = says == "effect" and not is_still(selection, units)
-    is_other = remembers(bench, selection) or piles_up(selection)
+    is_other = remembers_mostly(bench, selection) or piles_up(selection)
     if not is_other and not (is_heard and is_inadequate(bench, selection, needed)):
         return says, selection
     names = ", ".join(tried.layer.id for tried in selection.accepted)

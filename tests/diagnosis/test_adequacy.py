@@ -8,10 +8,10 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from diagnosis.adequacy import is_inadequate, piles_up, refused, remembers
+from diagnosis.adequacy import is_inadequate, piles_up, refused, remembers, remembers_mostly
 from diagnosis.bench import Bench
 from diagnosis.estimation import Estimate, estimated
-from diagnosis.evidence import evidence
+from diagnosis.evidence import evidence, inflations
 from diagnosis.joined import burnt
 from diagnosis.layers import fitting
 from diagnosis.level import settled, units_of
@@ -25,6 +25,8 @@ from tests.diagnosis.test_location import based, with_effect
 __all__ = ["bench"]
 NEEDED = 50.0
 """Nats that a freedom has to gain at least."""
+FEW, LOUDER = 1, 50.0
+"""Recordings in which much is left, how much more than in the others."""
 STRONG = {"T_c_w_em": 10.0}
 
 
@@ -67,6 +69,7 @@ def test_innovations_remember_what_is_still_missing(
     alone = estimated(quiet.candidate, rubbing.series, quiet.noises, quiet.point)
     selection = accepting(bench, rubbing, effect, alone)
     assert remembers(rubbing, selection) is does
+    assert remembers_mostly(rubbing, selection) is does
 
 
 @pytest.mark.parametrize(("further", "piles"), [(0.1, False), (0.8, True)])
@@ -112,3 +115,24 @@ def test_an_unknown_that_is_heard_near_rest_is_what_a_friction_lacks() -> None:
     hit = np.exp(-np.abs(time - 3.3) / 0.1)
     assert resting([series], [rubs[start:]]) > 0.9
     assert resting([series], [hit[start:]]) < 0.3
+
+
+def test_a_few_recordings_in_which_much_is_left_do_not_speak_for_all(
+    bench: Bench, rubbing: Bench
+) -> None:
+    base = based(rubbing)
+    quiet = dataclasses.replace(base, noises=dataclasses.replace(base.noises, drifts={}))
+    alone = estimated(quiet.candidate, rubbing.series, quiet.noises, quiet.point)
+    right = accepting(bench, rubbing, "coulomb_friction@w_em", alone)
+    before = alone.outcome.innovations
+    assert len(before) > FEW
+    for bad, mostly in ((FEW, False), (len(before), True)):
+        outcome = dataclasses.replace(right.model.outcome)
+        after = list(outcome.innovations)
+        for k in np.argsort(-inflations(alone, rubbing.series))[:bad]:
+            after[k] = LOUDER * before[k]
+        vars(outcome)["joined"] = np.concatenate(after)
+        model = dataclasses.replace(right.model, outcome=outcome)
+        selection = dataclasses.replace(right, model=model)
+        assert remembers(rubbing, selection)
+        assert remembers_mostly(rubbing, selection) is mostly
