@@ -13,7 +13,7 @@ from tests.proof.bar import Bar, bars
 from tests.proof.cases import GENERATOR
 from tests.proof.catalogue import pairs_of
 from tests.proof.control import most_frequent, permuted, simpler, simpler_alarms
-from tests.proof.kept import answers, joined
+from tests.proof.kept import answers, carry
 from tests.proof.page import published
 from tests.proof.plan import SEED, Plan, plans
 from tests.proof.seals import is_sealed, sealed, seals_of
@@ -23,6 +23,7 @@ VERDICTS = ROOT / "docs" / "evidence" / "proof.parquet"
 EXAMPLES = """\
 python -m tests.proof --seal             # make all cases, write the hashes of their labels
 python -m tests.proof                    # diagnose what is not diagnosed yet, write docs/proof.md
+python -m tests.proof --carry            # results so far into docs/evidence, to go on elsewhere
 python -m tests.proof --seed 5 --share 0.1 --plans full,clean    # a look at other cases"""
 
 
@@ -33,11 +34,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if given.seal:
         sealed(seals_of(study, given.seed, given.generator))
         return 0
+    if given.carry:
+        count = carry(study, given.seed, given.generator, VERDICTS)
+        print(f"wrote {count} results to {VERDICTS.relative_to(ROOT)}")
+        return 0
     wanted = given.plans.split(",") if given.plans else [plan.name for plan in study]
     every: list[Answer] = []
     for plan in study:
         if plan.name in wanted:
-            every += answers(plan, given.seed, given.jobs, given.first, given.generator)
+            source = given.seed, given.jobs, given.first, given.generator
+            every += answers(plan, *source, carried=VERDICTS)
     found = bars(every)
     for bar in found:
         print(f"{'met ' if bar.met else 'OPEN'} {bar.about}: {bar.asked}: {bar.text}")
@@ -54,7 +60,7 @@ def _publish(
     """Write the page of a whole study whose labels were sealed before."""
     seals = seals_of(study, given.seed, given.generator)
     if is_sealed(seals):
-        joined(study, given.seed, given.generator, VERDICTS)
+        carry(study, given.seed, given.generator, VERDICTS)
         published(every, found, seals, _beside(every, given.seed))
         print("wrote docs/proof.md")
     else:
@@ -107,6 +113,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--share", type=float, default=1.0, help="of the cases of each plan (1)")
     parser.add_argument("--generator", default=GENERATOR, help=f"a package ({GENERATOR})")
     parser.add_argument("--seal", action="store_true", help="only write the hashes of all labels")
+    parser.add_argument(
+        "--carry", action="store_true", help="only write the results so far, to go on elsewhere"
+    )
     return parser
 
 

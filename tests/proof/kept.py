@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from functools import partial
 from pathlib import Path
 from typing import Any
-
-import pyarrow
-import pyarrow.parquet
 
 from sweep.block import DONE, STOPPED, Block, Row
 from sweep.manifest import Manifest
@@ -19,6 +16,7 @@ from sweep.preparation import digest_of
 from sweep.store import Store, locked, open_store
 from sweep.study import Presentation
 from tests.proof.answer import Answer
+from tests.proof.carried import restored, rows_of, written
 from tests.proof.cases import Cases, Label, made
 from tests.proof.plan import Plan
 from tests.proof.result import Result, diagnosed
@@ -34,16 +32,32 @@ MEASURES = (
 )
 
 
-def answers(plan: Plan, seed: int, jobs: int, most: int | None, generator: str) -> list[Answer]:
-    """Return what a diagnosis says of each case of a plan; what is missing is diagnosed now."""
+def answers(
+    plan: Plan, seed: int, jobs: int, most: int | None, generator: str, carried: Path | None = None
+) -> list[Answer]:
+    """Return what a diagnosis says of each case of a plan; what is missing is diagnosed now.
+
+    A file of `carried` results counts as diagnosed where it is of the same code and cases.
+    """
     cases = made(plan, seed, generator)
     known = cases.known(most)
-    folder = _folder(plan, cases)
-    with locked(folder):
-        store = open_store(folder, _manifest(plan, seed, cases))
+    with locked(_folder(plan, cases)):
+        store = _store(plan, seed, cases)
+        if carried and (count := restored(store, plan.name, carried)):
+            print(f"{plan.name}: {count} results of {carried.name}", flush=True)
         _fill(store, plan, cases, list(known.items()), seed, jobs)
-        rows = {row["scenario"]: row for row in _rows(store)}
+        rows = {row["scenario"]: row for row in rows_of(store)}
     return [_answer(rows[name], plan, label) for name, label in known.items()]
+
+
+def carry(study: Sequence[Plan], seed: int, generator: str, path: Path) -> int:
+    """Write all results of a study so far to one Parquet file; return how many there are."""
+    stores = {plan.name: _store(plan, seed, made(plan, seed, generator)) for plan in study}
+    return written(stores, path)
+
+
+def _store(plan: Plan, seed: int, cases: Cases) -> Store:
+    return open_store(_folder(plan, cases), _manifest(plan, seed, cases))
 
 
 def _answer(row: Mapping[str, Any], plan: Plan, label: Label) -> Answer:
@@ -118,17 +132,3 @@ def _tell(plan: Plan, label: Label, row: Row, progress: str) -> None:
         f"{plan.name} {progress}: {row.values['rate']:g} Hz, {answer.true}: {said}, {cpu}",
         flush=True,
     )
-
-
-def _rows(store: Store) -> Iterator[dict[str, Any]]:
-    for path in store.paths():
-        yield from pyarrow.parquet.read_table(path).to_pylist()
-
-
-def joined(study: Sequence[Plan], seed: int, generator: str, path: Path) -> None:
-    """Join all results of a study in one Parquet file."""
-    folders = [_folder(plan, made(plan, seed, generator)) for plan in study]
-    files = [one for folder in folders for one in sorted(folder.rglob("*.parquet"))]
-    tables = [pyarrow.parquet.read_table(one).replace_schema_metadata(None) for one in files]
-    table = pyarrow.concat_tables(tables)
-    pyarrow.parquet.write_table(table, path, compression="zstd", compression_level=19)

@@ -1,0 +1,64 @@
+"""Carried: results of a study in one file, with which it goes on on another machine."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import pyarrow
+import pyarrow.parquet
+
+from sweep.block import Block, Row
+from sweep.measure import Column
+from sweep.store import Store
+
+SHARED = ("number", "variant", "scenario", "sample", "replicate", "seed", "status", "message")
+
+
+def rows_of(store: Store) -> Iterator[dict[str, Any]]:
+    """Return what is kept in a store, one case after the other."""
+    for path in store.paths():
+        yield from pyarrow.parquet.read_table(path).to_pylist()
+
+
+def written(stores: Mapping[str, Store], path: Path) -> int:
+    """Write what is kept in the stores of some plans to one file; return how many cases."""
+    files = [one for store in stores.values() for one in store.paths()]
+    if not files:
+        return 0
+    tables = [pyarrow.parquet.read_table(one).replace_schema_metadata(None) for one in files]
+    marks = {name: store.manifest.digest for name, store in stores.items()}
+    table = pyarrow.concat_tables(tables).replace_schema_metadata(marks)
+    pyarrow.parquet.write_table(table, path, compression="zstd", compression_level=19)
+    return int(table.num_rows)
+
+
+def restored(store: Store, plan: str, path: Path) -> int:
+    """Put the cases of a plan that a file holds into its store; return how many were missing.
+
+    Results of other code, cases or seeds are left where they are.
+    """
+    if not path.exists():
+        return 0
+    table = pyarrow.parquet.read_table(path)
+    marks = table.schema.metadata or {}
+    if marks.get(plan.encode()) != store.manifest.digest.encode():
+        return 0
+    known = store.finished()
+    found = [_row(one, store) for one in table.to_pylist() if one["variant"] == plan]
+    missing = [row for row in found if row.number not in known]
+    for row in missing:
+        store.write(Block(row.number, row.number + 1), [row])
+    return len(missing)
+
+
+def _row(cells: Mapping[str, Any], store: Store) -> Row:
+    shared = {name: cells[name] for name in SHARED}
+    kinds = store.manifest.varied, store.manifest.measures
+    values, measures = (_some(cells, one) for one in kinds)
+    return Row(**shared, values=values, measures=measures)
+
+
+def _some(cells: Mapping[str, Any], columns: Sequence[Column]) -> dict[str, Any]:
+    return {column.name: cells[column.name] for column in columns}
