@@ -23,7 +23,8 @@ for python in $(PYTHON) python3 python3.14 python3.13 python3.12 python3.11 ""; 
 done
 endef
 
-.PHONY: help setup demo test verify verify-part prove-diagnosis bench check format generate lock clean
+.PHONY: help setup system-packages demo test target-test verify verify-part prove-diagnosis bench check
+.PHONY: format generate lock clean
 .PHONY: check-lock check-format check-lint check-types check-floors check-specs check-tests check-generated
 
 help: ## list the targets
@@ -34,6 +35,15 @@ setup: $(STAMP) ## build .venv with everything, this project included
 
 $(STAMP): pyproject.toml uv.lock tools/set_up.py
 	@$(find_python); exec $$python tools/set_up.py
+
+# A compiler for the target and its C library, its emulator, a second compiler for this machine.
+SYSTEM_PACKAGES := gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm clang-19
+SUDO := $(if $(filter 0,$(shell id -u)),,sudo)
+
+system-packages: ## install what the target needs (Debian, Ubuntu), if it is not there
+	@dpkg-query --show $(SYSTEM_PACKAGES) >/dev/null 2>&1 || { $(SUDO) apt-get -o Acquire::Retries=3 update && \
+		$(SUDO) env DEBIAN_FRONTEND=noninteractive apt-get -o Acquire::Retries=3 install --yes \
+		--no-install-recommends $(SYSTEM_PACKAGES); }
 
 demo: setup ## show the product at work
 	@$(BIN)/modewright demo $(ARGS)
@@ -49,6 +59,9 @@ test: export PYTHONUTF8 := 1
 test: export TZ := UTC
 test: setup ## run the tests, the same way everywhere
 	$(BIN)/pytest -n 2 -q $(ARGS)
+
+target-test: setup ## compare the C on an emulated Cortex-M4F with the engine
+	$(BIN)/pytest -n 2 -q tests/target $(ARGS)
 
 verify: setup ## measure every acceptance figure; with recordings: ARGS="--recordings DIR"
 	$(BIN)/python tests/verify/first_drive.py $(ARGS)
@@ -66,6 +79,7 @@ verify: setup ## measure every acceptance figure; with recordings: ARGS="--recor
 	$(BIN)/python tests/verify/variants.py
 	$(BIN)/python tests/verify/tip_out.py
 	$(BIN)/python tests/verify/kept_stages.py
+	$(BIN)/python tests/verify/target_bits.py
 	$(BIN)/python tests/verify/machines.py $(ARGS)
 
 verify-part: setup ## measure a fixed part of the figures, as CI does

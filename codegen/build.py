@@ -6,18 +6,10 @@ import os
 import shlex
 import shutil
 import subprocess
-import tempfile
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Sequence
 from pathlib import Path
 
-from codegen.cache import key_of, stored
-from codegen.names import REAL, CNames, c_member, c_type
-from codegen.rendering import render
-from codegen.source import c_files, stepped
 from language.missing import ToolMissing as ToolMissing
-from language.program import Constant, Program, Variable
 
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-fast-math", "-fno-math-errno")
 WARNINGS = [
@@ -42,14 +34,6 @@ SECONDS = 120
 
 class BuildError(Exception):
     """Generated code does not compile or run: a defect of ours; the message is the compiler's."""
-
-
-@dataclass(frozen=True)
-class Observed:
-    """A variable that the executable writes after each tick: its name and its kind."""
-
-    name: str
-    kind: str
 
 
 def compiler(named: str | None = None) -> list[str]:
@@ -80,49 +64,6 @@ def compiler_version(named: str | None = None) -> str:
     return f"{os.path.realpath(shutil.which(command[0]) or command[0])}: {first}"
 
 
-def observed(program: Program) -> tuple[Observed, ...]:
-    """Return what is compared after a tick: all that the instance carries in C.
-
-    What is in a ring is compared when it comes out of it.
-    """
-    program = stepped(program)
-    kinds = {"real": "real", "truth": "whole", "whole": "whole"}
-    return tuple(
-        Observed(variable.name, kinds[variable.type])
-        for variable in program.variables
-        if variable.name.partition(".")[0] not in ("work", "input", "is_new", "check")
-        and not variable.size
-    )
-
-
-def fed(program: Program) -> tuple[Variable, ...]:
-    """Return the inputs of a tick, the flags of new values among them."""
-    return tuple(
-        variable
-        for variable in program.variables
-        if variable.name.partition(".")[0] in ("input", "is_new")
-    )
-
-
-def tunable(program: Program) -> tuple[Constant, ...]:
-    """Return the parameters that a calibration page may change, in the order of its members."""
-    program = stepped(program)
-    return tuple(
-        constant
-        for constant in program.constants
-        if constant.kind == "tunable" and constant.type == "real" and not constant.items
-    )
-
-
-def write_harness(program: Program, folder: Path) -> list[Path]:
-    """Write the C files of a program and a main around them; return the sources to compile."""
-    files = c_files(program)
-    files["main.c"] = render("lockstep_main.c.jinja", _harness(program))
-    for name, text in files.items():
-        (folder / name).write_text(text)
-    return [folder / name for name in files if name.endswith(".c")]
-
-
 def compile_program(
     sources: Sequence[Path],
     target: Path,
@@ -130,27 +71,19 @@ def compile_program(
     named: str | None = None,
 ) -> None:
     """Compile sources into an executable. Raises ToolMissing, BuildError."""
-    command = [*compiler(named), *flags, *WARNINGS, *map(str, sources)]
+    linked([*compiler(named), *flags, *WARNINGS, *map(str, sources), "-lm"], target)
+
+
+def linked(command: Sequence[str], target: Path) -> None:
+    """Let a compiler make an executable. Raises BuildError with its first error."""
     try:
         done = subprocess.run(
-            [*command, "-lm", "-o", str(target)], capture_output=True, text=True, timeout=SECONDS
+            [*command, "-o", str(target)], capture_output=True, text=True, timeout=SECONDS
         )
     except subprocess.TimeoutExpired:
         raise BuildError(f"the compiler was not done after {SECONDS} s") from None
     if done.returncode != 0:
         raise BuildError(_first_error(done.stderr) or f"the compiler ended with {done.returncode}")
-
-
-@contextmanager
-def executable(
-    program: Program, flags: Sequence[str] = FLAGS, named: str | None = None
-) -> Iterator[Path]:
-    """Give the compiled harness of a program, kept from an earlier run if there was one."""
-    with tempfile.TemporaryDirectory(prefix="modewright-") as name:
-        folder = Path(name)
-        sources = write_harness(program, folder)
-        key = key_of(sources, [*compiler(named), *flags, *WARNINGS], compiler_version(named))
-        yield stored(key, lambda target: compile_program(sources, target, flags, named), folder)
 
 
 def run_executable(target: Path, records: bytes) -> bytes:
@@ -169,27 +102,3 @@ def _first_error(text: str) -> str:
     lines = text.strip().splitlines()
     first = next((k for k, line in enumerate(lines) if "error:" in line), 0)
     return "\n".join(lines[first:])
-
-
-def _harness(program: Program) -> Mapping[str, object]:
-    program = stepped(program)
-    place, real = CNames(program), REAL[program.number]
-    inputs = [
-        {"place": place(v.name).replace("in->", "in."), "type": c_type(v, program.number)}
-        for v in fed(program)
-    ]
-    fields = [
-        {
-            "place": place(o.name).replace("self->", "self."),
-            "type": real if o.kind == "real" else "int64_t",
-        }
-        for o in observed(program)
-    ]
-    return {
-        "name": program.name,
-        "cast": ("uint8_t", "int32_t", "float"),
-        "inputs": inputs,
-        "fields": fields,
-        "page": [c_member(constant.name) for constant in tunable(program)],
-        "real": real,
-    }

@@ -50,12 +50,14 @@ def cache_fault(folder: Path) -> str:
 
 
 def key_of(sources: Sequence[Path], command: Sequence[str], version: str) -> str:
-    """Return the key of a program: what is compiled, by what, and how."""
+    """Return the key of a program: what is compiled, all in one folder, by what, and how."""
     digest = hashlib.sha256()
     for text in (*command, version, *(path.name for path in sources)):
         digest.update(text.encode() + b"\0")
-    for path in sorted(sources[0].parent.glob("*.[ch]")) if sources else ():
-        digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
+    folder = sources[0].parent
+    for path in sorted(path for path in folder.rglob("*") if path.is_file()):
+        name = path.relative_to(folder).as_posix()
+        digest.update(name.encode() + b"\0" + path.read_bytes() + b"\0")
     return digest.hexdigest()
 
 

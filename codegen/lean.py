@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
-from codegen.build import tunable
+from codegen.harness import tunable
 from codegen.source import stepped
 from language.operation import Assign, Block
 from language.program import Program

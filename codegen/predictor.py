@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.build import compile_program, compiler, compiler_version, optimised, tunable
+from codegen.build import compile_program, compiler, compiler_version, optimised
 from codegen.cache import key_of, stored
+from codegen.harness import tunable
 from codegen.lean import lean
 from codegen.names import c_member, c_type
 from codegen.rendering import render

@@ -10,7 +10,9 @@ import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from codegen.build import FLAGS, executable, fed, observed, run_executable, tunable
+from codegen.build import FLAGS
+from codegen.harness import executable, fed, observed, tunable
+from codegen.machine import HOST, Machine
 from engine.firing import fired
 from engine.interpreter import Stepper
 from language.number import NumberType, decimal
@@ -125,13 +127,18 @@ class Tape:
         return self._value.size
 
 
-def compare(tape: Tape, flags: Sequence[str] = FLAGS, compiler: str | None = None) -> Verdict:
+def compare(
+    tape: Tape,
+    flags: Sequence[str] = FLAGS,
+    compiler: str | None = None,
+    machine: Machine = HOST,
+) -> Verdict:
     """Compile the tape's program, run it on the tape's inputs and compare every value.
 
     Raises ToolMissing, BuildError.
     """
-    with executable(tape.program, flags, compiler) as target:
-        return judged(tape, run_executable(target, b"".join(tape.inputs)))
+    with executable(tape.program, flags, compiler, machine) as target:
+        return judged(tape, machine.run(target, b"".join(tape.inputs)))
 
 
 def judged(tape: Tape, output: bytes) -> Verdict:

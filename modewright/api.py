@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from codegen.build import optimised
+from codegen.machine import HOST, MACHINES
 from codegen.source import c_files
 from engine.recording import Recording, read_recording
 from engine.replay import Replay, replay as replay_recording, used_columns
@@ -139,9 +140,11 @@ def lockstep(
     compiler: str | None = None,
     optimise: str = "O2",
     calibrations: Sequence[str] = (),
+    target: str = HOST.name,
 ) -> tuple[Trajectory, list[Verdict]]:
     """Simulate, then run the C of every instance on the same inputs and compare bits.
 
+    `target` is where the C runs: `host`, or `cortex-m4f` in an emulator.
     `numbers` replaces the number type of every instance; `changes` are pages of the calibration
     like `1.5 s: k_hs = 6000 N*m/rad`, in place of those of the scenario.
     Raises SpecError, ToolMissing.
@@ -165,7 +168,8 @@ def lockstep(
 
     trajectory = simulate_system(loaded.system, loaded.scenario, ticked=ticked)
     flags = optimised(optimise)
-    verdicts = [compare(tape, flags, compiler) for tape in tapes.values()]
+    machine = MACHINES[target]
+    verdicts = [compare(tape, flags, compiler, machine) for tape in tapes.values()]
     return trajectory, noted(verdicts, loaded.system, loaded.scenario, trajectory)
 
 

@@ -30,6 +30,11 @@ Optimise = Annotated[
     Literal["O0", "O1", "O2", "O3", "Os"], typer.Option(help="level of the C compiler")
 ]
 
+Target = Annotated[
+    Literal["host", "cortex-m4f"],
+    typer.Option(help="where the C runs: here, or on an emulated Cortex-M4F (QEMU)"),
+]
+
 
 def lockstep(
     system: System,
@@ -40,12 +45,14 @@ def lockstep(
     changes: Changes = None,
     compiler: Compiler = None,
     optimise: Optimise = "O2",
+    target: Target = "host",
     as_json: Json = False,
 ) -> None:
     """Compare engine and compiled C, tick by tick and bit by bit.
 
     \b
     modewright lockstep ev_driveline -s tip_out --numbers float32 --optimise O3
+    modewright lockstep ev_driveline -s tip_out --target cortex-m4f
     """
     from modewright import api, show
 
@@ -59,6 +66,7 @@ def lockstep(
             compiler=compiler,
             optimise=optimise,
             calibrations=calibrations or (),
+            target=target,
         )
     if as_json:
         found = {"lockstep": [show.verdict_json(verdict) for verdict in verdicts]}

@@ -14,11 +14,9 @@ from codegen.build import (
     ToolMissing,
     compile_program,
     compiler,
-    executable,
-    fed,
-    observed,
     run_executable,
 )
+from codegen.harness import executable, fed, observed
 from lockstep.compare import compare
 from tests.lockstep.heater import heater, heater_tape
 

@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from codegen import build, cache
-from codegen.build import FLAGS, executable, run_executable
+from codegen import cache, harness
+from codegen.build import FLAGS, linked, run_executable
+from codegen.harness import executable
 from lockstep.compare import compare
 from tests.lockstep.heater import heater, heater_tape
 
@@ -24,15 +25,11 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def compiled(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
     """What was compiled, call by call."""
     made: list[Path] = []
-    original = build.compile_program
-
-    def counting(
-        sources: list[Path], target: Path, flags: tuple[str, ...], named: str | None
-    ) -> None:
+    def counting(command: list[str], target: Path) -> None:
         made.append(target)
-        original(sources, target, flags, named)
+        linked(command, target)
 
-    monkeypatch.setattr(build, "compile_program", counting)
+    monkeypatch.setattr(harness, "linked", counting)
     return made
 
 
@@ -53,7 +50,7 @@ def test_other_flags_another_compiler_and_another_program_are_compiled(
     for flags in (FLAGS, (*FLAGS, "-O1")):
         with executable(heater(), flags):
             pass
-    monkeypatch.setattr(build, "compiler_version", lambda named: "another")
+    monkeypatch.setattr(harness, "compiler_version", lambda named: "another")
     with executable(heater()):
         pass
     assert len(compiled) == len(programs(folder)) == 3

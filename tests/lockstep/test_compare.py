@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import struct
 from collections.abc import Callable
 
 import pytest
 
-import lockstep.compare
+from codegen.machine import HOST
 from codegen.source import c_files
 from language.evaluate import apply
 from language.program import Program
@@ -33,7 +34,7 @@ def change(monkeypatch: pytest.MonkeyPatch) -> Change:
             assert sum(text.count(old) for text in found.values()) == 1, old
             return {name: text.replace(old, new) for name, text in found.items()}
 
-        monkeypatch.setattr("codegen.build.c_files", files)
+        monkeypatch.setattr("codegen.harness.c_files", files)
 
     return changed
 
@@ -169,7 +170,7 @@ def test_time_counts_from_the_start_of_the_tape(tape: Tape, change: Change) -> N
     assert found.time == pytest.approx(17.5 + found.tick * PERIOD)
 
 
-def test_missing_output_is_refused(tape: Tape, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(lockstep.compare, "run_executable", lambda target, records: b"\0" * 8)
+def test_missing_output_is_refused(tape: Tape) -> None:
+    silent = dataclasses.replace(HOST, run=lambda target, records: b"\0" * 8)
     with pytest.raises(ValueError, match=r"C wrote 8 bytes, \d+ were expected"):
-        compare(tape)
+        compare(tape, machine=silent)

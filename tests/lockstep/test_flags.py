@@ -19,8 +19,8 @@ from codegen.build import (
     compile_program,
     compiler,
     optimised,
-    write_harness,
 )
+from codegen.harness import write_harness
 from codegen.source import c_files
 from engine.simulate import simulate
 from language.number import NUMBERS, NumberType, decimal
@@ -62,7 +62,8 @@ def tapes(request: pytest.FixtureRequest) -> dict[str, Tape]:
     found: dict[str, Tape] = {}
 
     def ticked(name: str, used: Program, stepper: object) -> None:
-        found.setdefault(used.name, Tape(used, name)).record(stepper)  # type: ignore[arg-type]
+        found[used.name] = found.get(used.name) or Tape(used, name)
+        found[used.name].record(stepper)  # type: ignore[arg-type]
 
     scenario = dataclasses.replace(loaded.scenario, horizon=Fraction(9, 10))
     simulate(system, scenario, ticked=ticked)
@@ -183,7 +184,9 @@ def test_the_search_for_fused_operations_finds_them(product: Tape, tmp_path: Pat
 def objects(name: str, folder: Path, flags: tuple[str, ...]) -> list[Path]:
     """Return the compiled objects of an automaton, without the harness."""
     sources = write_harness(program(name), folder)
-    return [compiled(path, flags) for path in sources if path.name != "main.c"]
+    return [
+        compiled(path, flags) for path in sources if path.parent == folder and path.name != "main.c"
+    ]
 
 
 def compiled(source: Path, flags: tuple[str, ...]) -> Path:

@@ -15,7 +15,7 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 CODE = ("language", "engine", "codegen", "expectation", "lockstep", "sweep", "modewright", "spec")
 DIAGNOSIS = 5
 """The issue from which on figures depend on `diagnosis/` too."""
-SUFFIXES = (".py", ".yaml", ".lark", ".jinja", ".txt")
+SUFFIXES = (".py", ".yaml", ".lark", ".jinja", ".txt", ".c", ".h", ".ld")
 Figure = dict[str, Any]
 
 

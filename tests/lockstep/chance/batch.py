@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from codegen.build import compiler, optimised, write_harness
+from codegen.build import compiler, optimised
+from codegen.harness import write_harness
 from language.program import Program
 from lockstep.compare import Tape, Verdict, judged
 

@@ -1,0 +1,117 @@
+"""Harness: a main around the C of a Program - records of inputs in, all that it carries out."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from codegen.build import FLAGS, WARNINGS, compiler_version, linked
+from codegen.cache import key_of, stored
+from codegen.machine import HOST, Machine, harness_file
+from codegen.names import REAL, CNames, c_member, c_type
+from codegen.rendering import render
+from codegen.source import c_files, stepped
+from language.program import Constant, Program, Variable
+
+INCLUDED = ("harness.h", "cortex_m4f.h")
+
+
+@dataclass(frozen=True)
+class Observed:
+    """A variable that the executable writes after each tick: its name and its kind."""
+
+    name: str
+    kind: str
+
+
+def observed(program: Program) -> tuple[Observed, ...]:
+    """Return what is compared after a tick: all that the instance carries in C.
+
+    What is in a ring is compared when it comes out of it.
+    """
+    program = stepped(program)
+    kinds = {"real": "real", "truth": "whole", "whole": "whole"}
+    return tuple(
+        Observed(variable.name, kinds[variable.type])
+        for variable in program.variables
+        if variable.name.partition(".")[0] not in ("work", "input", "is_new", "check")
+        and not variable.size
+    )
+
+
+def fed(program: Program) -> tuple[Variable, ...]:
+    """Return the inputs of a tick, the flags of new values among them."""
+    return tuple(
+        variable
+        for variable in program.variables
+        if variable.name.partition(".")[0] in ("input", "is_new")
+    )
+
+
+def tunable(program: Program) -> tuple[Constant, ...]:
+    """Return the parameters that a calibration page may change, in the order of its members."""
+    program = stepped(program)
+    return tuple(
+        constant
+        for constant in program.constants
+        if constant.kind == "tunable" and constant.type == "real" and not constant.items
+    )
+
+
+def write_harness(program: Program, folder: Path, machine: Machine = HOST) -> list[Path]:
+    """Write the C files of a program and a main around them; return the sources to compile."""
+    (folder / "harness").mkdir(exist_ok=True)
+    for name in (*INCLUDED, *machine.files):
+        shutil.copyfile(harness_file(name), folder / "harness" / name)
+    files = c_files(program)
+    files["main.c"] = render("lockstep_main.c.jinja", _harness(program))
+    for name, text in files.items():
+        (folder / name).write_text(text)
+    names = (*files, *(f"harness/{name}" for name in machine.files))
+    return [folder / name for name in names if name.endswith(".c")]
+
+
+@contextmanager
+def executable(
+    program: Program,
+    flags: Sequence[str] = FLAGS,
+    named: str | None = None,
+    machine: Machine = HOST,
+) -> Iterator[Path]:
+    """Give the compiled harness of a program, kept from an earlier run if there was one."""
+    with tempfile.TemporaryDirectory(prefix="modewright-") as name:
+        folder = Path(name)
+        sources = write_harness(program, folder, machine)
+        command, link = machine.command(named), machine.link(folder / "harness")
+        version = compiler_version(command[0])
+        key = key_of(sources, [*command, *flags, *WARNINGS, *machine.link(Path())], version)
+        words = [*command, *flags, *WARNINGS, *map(str, sources), *link]
+        yield stored(key, lambda target: linked(words, target), folder)
+
+
+def _harness(program: Program) -> Mapping[str, object]:
+    program = stepped(program)
+    place, real = CNames(program), REAL[program.number]
+    inputs = [
+        {"place": place(v.name).replace("in->", "in."), "type": c_type(v, program.number)}
+        for v in fed(program)
+    ]
+    fields = [
+        {
+            "place": place(o.name).replace("self->", "self."),
+            "type": real if o.kind == "real" else "int64_t",
+        }
+        for o in observed(program)
+    ]
+    return {
+        "name": program.name,
+        "cast": ("uint8_t", "int32_t", "float"),
+        "inputs": inputs,
+        "fields": fields,
+        "page": [c_member(constant.name) for constant in tunable(program)],
+        "real": real,
+    }

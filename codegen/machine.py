@@ -1,0 +1,92 @@
+"""Machine: where generated C is compiled for, and how what was compiled is run there."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+
+from codegen.build import SECONDS, BuildError, compiler, run_executable
+from language.missing import ToolMissing
+
+ARM_COMPILER = "arm-none-eabi-gcc"
+EMULATOR = "qemu-system-arm"
+PACKAGES = {
+    ARM_COMPILER: "gcc-arm-none-eabi libnewlib-arm-none-eabi",
+    EMULATOR: "qemu-system-arm",
+}
+"""Debian packages of what a target needs."""
+CORTEX = ("-mcpu=cortex-m4", "-mthumb", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard")
+LINK = ("-nostartfiles", "-Wl,--gc-sections", "--specs=nano.specs", "--specs=nosys.specs")
+BOARD, SCRIPT = "mps2-an386", "mps2_an386.ld"
+ENDS = {
+    3: "a file of records cannot be opened",
+    4: "records cannot be written",
+    6: "FPSCR is not 0",
+}
+"""What exit codes of the harness of a target mean."""
+
+
+@dataclass(frozen=True)
+class Machine:
+    """`files` are those of the harness that it needs; `command` and `link` are words of a compiler:
+    for the one that is named, and with the files in a folder. `run` is given records of inputs.
+    """
+
+    name: str
+    files: tuple[str, ...]
+    command: Callable[[str | None], list[str]]
+    link: Callable[[Path], tuple[str, ...]]
+    run: Callable[[Path, bytes], bytes]
+
+
+def harness_file(name: str) -> Path:
+    """Return the path of a file of the harness."""
+    return Path(str(resources.files("codegen"))) / "targets" / name
+
+
+def _needed(tool: str) -> str:
+    """Return a tool. Raises ToolMissing."""
+    if shutil.which(tool) is None:
+        raise ToolMissing(f"`{tool}` is missing: apt-get install {PACKAGES[tool]}")
+    return tool
+
+
+def _cross_compiler(named: str | None) -> list[str]:
+    return [named or _needed(ARM_COMPILER), *CORTEX]
+
+
+def emulated(target: Path, records: bytes, options: Sequence[str] = ()) -> bytes:
+    """Run a program of a Cortex-M4F in QEMU on records. Raises ToolMissing, BuildError."""
+    emulator = _needed(EMULATOR)
+    semihosting = ("-semihosting-config", "enable=on,target=native")
+    quiet = ("-nographic", "-monitor", "none", "-serial", "none")
+    with tempfile.TemporaryDirectory(prefix="modewright-") as name:
+        folder = Path(name)
+        (folder / "records.in").write_bytes(records)
+        command = [emulator, "-M", BOARD, *quiet, *semihosting, *options, "-kernel", str(target)]
+        try:
+            done = subprocess.run(
+                command, cwd=folder, capture_output=True, timeout=SECONDS, stdin=subprocess.DEVNULL
+            )
+        except subprocess.TimeoutExpired:
+            raise BuildError(f"the emulated program was not done after {SECONDS} s") from None
+        if done.returncode != 0:
+            told = ENDS.get(done.returncode) or done.stderr.decode(errors="replace").strip()
+            raise BuildError(f"the emulated program ended with {done.returncode}: {told}")
+        return (folder / "records.out").read_bytes()
+
+
+HOST = Machine("host", ("stdio.c",), compiler, lambda folder: ("-lm",), run_executable)
+CORTEX_M4F = Machine(
+    "cortex-m4f",
+    ("semihosting.c", "cortex_m4f.c", SCRIPT),
+    _cross_compiler,
+    lambda folder: (*LINK, "-T", str(folder / SCRIPT), "-lm", "-lc", "-lgcc"),
+    emulated,
+)
+MACHINES = {machine.name: machine for machine in (HOST, CORTEX_M4F)}

@@ -1,0 +1,80 @@
+"""Closed loop: long seeded runs of the shipped systems, as the interpreter carried them out."""
+
+from __future__ import annotations
+
+import random
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from fractions import Fraction
+from pathlib import Path
+
+from engine.simulate import simulate
+from language.number import NumberType
+from language.program import Program
+from language.system import in_numbers
+from lockstep.compare import Tape
+from modewright.api import load
+
+TICK = Fraction(1, 100)
+"""Of the supervisor, and of the slower estimator [s]."""
+WORDS: Mapping[str, Callable[[random.Random], str]] = {
+    "key": lambda draw: draw.choice(["parked", "ignition", "crank", "crank", "crank"]),
+    "U_dc": lambda draw: draw.choice(["0 V", "395 V", "395 V", "395 V", "250 V"]),
+    "T_req": lambda draw: f"{draw.uniform(-200, 250):.3f} N*m",
+    "v": lambda draw: f"{draw.uniform(-2, 40):.3f} m/s",
+    "temp": lambda draw: f"{draw.uniform(20, 110):.2f} degC",
+    "hv_ok": lambda draw: "false" if draw.random() < 0.05 else "true",
+    "clear": lambda draw: "true" if draw.random() < 0.3 else "false",
+}
+"""How each input of the supervisor is drawn."""
+CHANGES = Fraction(1, 4)
+"""Seconds after which inputs change."""
+
+
+def driveline(number: NumberType, horizon: Fraction, instances: Sequence[str]) -> dict[str, Tape]:
+    """Return tapes of instances of the driveline with its estimators: a torque that steps."""
+    draw = random.Random(f"driveline {horizon}")
+    count = int(horizon / Fraction(2, 5))
+    steps = {Fraction(2 * k, 5): f"{draw.randint(-60, 60)} N*m" for k in range(1, count)}
+    speeds = "initial: {plant.w_w: 30 rad/s}"
+    return _run("ev_driveline", number, horizon, {"T_req": ("20 N*m", steps)}, instances, speeds)
+
+
+def supervisor(number: NumberType, horizon: Fraction) -> dict[str, Tape]:
+    """Return the tape of the supervisor: keys, voltages, temperatures and faults as they come."""
+    draw = random.Random(f"supervisor {horizon}")
+    times = [CHANGES * k for k in range(1, int(horizon / CHANGES))]
+    courses = {
+        name: (word(draw), {time: word(draw) for time in times}) for name, word in WORDS.items()
+    }
+    return _run("supervised", number, horizon, courses, ["sup"])
+
+
+def _run(
+    system: str,
+    number: NumberType,
+    horizon: Fraction,
+    courses: Mapping[str, tuple[str, Mapping[Fraction, str]]],
+    instances: Sequence[str],
+    extra: str = "",
+) -> dict[str, Tape]:
+    lines = ["language: 1", "scenario: long", f"of: {system}", f"horizon: {float(horizon)} s"]
+    lines += [extra, "inputs:"]
+    for name, (start, steps) in courses.items():
+        listed = ", ".join(f"{float(time)} s: {word}" for time, word in steps.items())
+        lines.append(f"  {name}: {{start: {start}, steps: {{{listed}}}}}")
+    lines.append("record: {every: 1 s}")
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "scenario_long.yaml"
+        path.write_text("\n".join([*lines, ""]))
+        loaded = load(system, str(path))
+    tapes: dict[str, Tape] = {}
+
+    def ticked(name: str, used: Program, stepper: object) -> None:
+        if name in instances:
+            tapes[name] = tapes.get(name) or Tape(used, name)
+            tapes[name].record(stepper)  # type: ignore[arg-type]
+
+    run = simulate(in_numbers(loaded.system, number), loaded.scenario, ticked=ticked)
+    assert run.stopped is None, run.stopped
+    return tapes

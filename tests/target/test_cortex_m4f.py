@@ -1,0 +1,82 @@
+"""The C on an emulated Cortex-M4F: the same bits, and controls that must fail."""
+
+from __future__ import annotations
+
+import shutil
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+
+from codegen.build import FLAGS, BuildError, optimised
+from codegen.machine import ARM_COMPILER, CORTEX_M4F, EMULATOR, emulated
+from language.number import NUMBERS, NumberType
+from lockstep.compare import Tape, compare
+from modewright.api import lockstep, program
+from tests.lockstep.programs import taped
+from tests.lockstep.test_flags import PRODUCT, TINY
+from tests.target.closed_loop import driveline, supervisor
+
+pytestmark = pytest.mark.skipif(
+    not (shutil.which(ARM_COMPILER) and shutil.which(EMULATOR)),
+    reason="no compiler for ARM, no emulator: make system-packages",
+)
+LEVELS = ("O0", "Os")
+"""The two whose code is least alike; `make verify` compares O2 and O3 too."""
+
+
+@pytest.fixture(scope="module", params=NUMBERS)
+def tapes(request: pytest.FixtureRequest) -> dict[str, Tape]:
+    number: NumberType = request.param
+    short = Fraction(3, 2)
+    return {
+        **driveline(number, short, ["plant", "est", "simple"]),
+        **supervisor(number, Fraction(20)),
+    }
+
+
+@pytest.mark.parametrize("level", LEVELS)
+@pytest.mark.parametrize("name", ["plant", "est", "simple", "sup"])
+def test_the_target_computes_the_same_bits(tapes: dict[str, Tape], name: str, level: str) -> None:
+    verdict = compare(tapes[name], optimised(level), machine=CORTEX_M4F)
+    assert verdict.is_equal, str(verdict.first)
+    assert verdict.transitions > 0
+    assert verdict.ticks == len(tapes[name].values) >= 150
+
+
+def product(folder: Path, number: NumberType) -> Tape:
+    """u * u - v where the product is rounded to v: 0, or the rounding error if contracted."""
+    spec = folder / "product.yaml"
+    spec.write_text(PRODUCT.replace("float64", number))
+    tiny = TINY[number]
+    return taped(program(str(spec)), [{"input.u": 1.0 + tiny, "input.v": 1.0 + 2.0 * tiny}])
+
+
+@pytest.mark.parametrize(
+    "flags", [("-std=c99", "-O2", "-ffp-contract=fast"), ("-std=gnu99", "-O2")]
+)
+def test_a_compiler_that_contracts_is_caught(tmp_path: Path, flags: tuple[str, ...]) -> None:
+    tape = product(tmp_path, "float32")
+    assert compare(tape, FLAGS, machine=CORTEX_M4F).is_equal
+    verdict = compare(tape, flags, machine=CORTEX_M4F)
+    assert verdict.first is not None
+    assert verdict.first.signal == "rest"
+
+
+def test_fast_math_is_refused_by_the_code_itself(tmp_path: Path) -> None:
+    with pytest.raises(BuildError, match="exact only without fast-math"):
+        compare(product(tmp_path, "float32"), (*FLAGS, "-ffast-math"), machine=CORTEX_M4F)
+
+
+def test_a_program_that_fails_on_the_target_is_told(tmp_path: Path) -> None:
+    image = tmp_path / "image"
+    image.write_bytes(b"no program")
+    with pytest.raises(BuildError, match="the emulated program ended with"):
+        emulated(image, b"")
+
+
+def test_the_command_takes_a_target() -> None:
+    trajectory, verdicts = lockstep("supervised", "day", target="cortex-m4f")
+    assert trajectory.stopped is None
+    assert [verdict.differing for verdict in verdicts] == [0]
+    assert verdicts[0].ticks > 100
