@@ -25,6 +25,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def compiled(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
     """What was compiled, call by call."""
     made: list[Path] = []
+
     def counting(command: list[str], target: Path) -> None:
         made.append(target)
         linked(command, target)
