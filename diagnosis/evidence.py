@@ -72,6 +72,16 @@ def evidence(model: Estimate, base: Estimate, series: Sequence[Series]) -> Evide
     return Evidence(float(train), float(np.sum(each)), tuple(float(one) for one in each))
 
 
+def less(whole: Evidence, parts: Sequence[Evidence]) -> Evidence:
+    """Return what is left of a gain when others have theirs."""
+    each = zip(whole.each, *(part.each for part in parts), strict=True)
+    return Evidence(
+        whole.train - sum(part.train for part in parts),
+        whole.left_out - sum(part.left_out for part in parts),
+        tuple(first - sum(rest) for first, *rest in each),
+    )
+
+
 def inflation(model: Estimate, series: Sequence[Series]) -> float:
     """Return how many innovations count as one: 1 + 2 sum of squared autocorrelations, at least 1.
 

@@ -17,8 +17,11 @@ Columns = Mapping[str, Reals]
 """How the joined innovations (n, seen) of all recordings change with the coordinate of a name."""
 MOST = 1e100
 """Bound of a change: a run that leaves all bounds tells no more than its sign."""
-STEP = 2e-3
+STEP, LEAST_STEP = 2e-3, 1e-7
 """Change of a coordinate for a difference, in standard deviations of its prior."""
+FAR = 0.05
+"""Change of innovations, in their standard deviations, up to which they follow a coordinate in
+proportion: the phase of a tone runs far with its order."""
 
 
 @dataclass(frozen=True)
@@ -49,12 +52,23 @@ def columns_of(
     names: Iterable[str],
 ) -> Columns:
     """Return how innovations change with some coordinates, by forward differences of `run`."""
+    scale = np.sqrt(outcome.variances)
+
+    def difference(k: int, step: float) -> tuple[Reals, float]:
+        ahead = point.moved(candidate, k, step)
+        size = float(ahead.shared[k] - point.shared[k])
+        changes = run(ahead).joined - outcome.joined
+        far = float(np.sqrt(np.nanmean((changes / scale) ** 2)))
+        return _known(changes / size), far
+
     found = {}
     for name in names:
         k = candidate.names.index(name)
-        ahead = point.moved(candidate, k, STEP)
-        size = float(ahead.shared[k] - point.shared[k])
-        found[name] = _known((run(ahead).joined - outcome.joined) / size)
+        step = STEP
+        found[name], far = difference(k, step)
+        while FAR < far < np.inf and step > LEAST_STEP:
+            step = max(step * FAR / far / 2.0, LEAST_STEP)
+            found[name], far = difference(k, step)
     return found
 
 

@@ -52,13 +52,14 @@ class Tried:
     def score(self) -> float:
         """What candidates are ranked by: what they gain, less for each number that they bring.
 
-        One that brings more also takes up what the form of a plainer one gets wrong.
+        One that brings more also takes up what the form of a plainer one gets wrong. What is left
+        out counts as much as what was fitted at most: more is an accident.
         """
         if self.evidence is None or self.estimate is None:
             return self.promised - 1e6
         names = [self.layer.named(name) for name in own_names(self.layer.effect.body)]
         brought = set(names) & set(self.estimate.candidate.names)
-        return self.evidence.total - PLAIN * len(brought)
+        return self.evidence.train + self.evidence.least - PLAIN * len(brought)
 
 
 def searched(

@@ -14,7 +14,7 @@ from diagnosis.estimation import Estimate
 from diagnosis.evidence import Evidence, evidence
 from diagnosis.layers import Layer
 from diagnosis.level import settled
-from diagnosis.naming import place_path
+from diagnosis.needed import Needed, renewed, still_needed
 from diagnosis.point import extended
 from diagnosis.search import Tell, Tried, searched
 from diagnosis.swap import swapped
@@ -33,9 +33,6 @@ AGAIN = 15
 """Candidates that are looked at again where the model itself is found to fit better."""
 FEW = 3
 """Recordings of which none can be against all others."""
-STAND_IN = 0.25
-"""Part of what another one at its place gains that an effect found before it must add to that: it
-may have stood in for it."""
 MUCH = 0.1
 """Part of what the best candidate gained: a model that gains more has them looked for anew, and
 candidates that gained less are not tried in another way."""
@@ -112,11 +109,12 @@ def selected(
         tell(f"accepted {best.layer.id}: {gained:.0f} nats")
         before = [*accepted, best]
         accepted, model = swapped(bench, best.estimate, before, rounds[0], units, tell)
-        rounds[0] = _refuted(rounds[0], before, accepted)
+        rounds[0] = renewed(rounds[0], before, accepted)
         layers = _likely([*known, *tried], NEXT // len(accepted))
-    kept, model = _still_needed(bench, base, model, accepted, units, thresholds, tell)
-    first = tuple(rounds[0]) if rounds else ()
-    return Selection(base, model, kept, first, _rivals(first, kept))
+    found = Needed(base, model, tuple(accepted))
+    found = still_needed(bench, found, units, thresholds, tell)
+    first = tuple(renewed(rounds[0], accepted, found.kept)) if rounds else ()
+    return Selection(base, found.model, found.kept, first, _rivals(first, found.kept))
 
 
 def _enough(
@@ -143,12 +141,6 @@ def _near_best(known: Sequence[Tried]) -> list[Layer]:
     gains = {t.layer.id: (t.evidence.total, t.layer) for t in known if t.evidence}
     best = max((total for total, _ in gains.values()), default=0.0)
     return [layer for total, layer in gains.values() if total > 0.0 and total > MUCH * best]
-
-
-def _refuted(first: list[Tried], before: list[Tried], after: list[Tried]) -> list[Tried]:
-    """Return the candidates of the first round; those that stood aside for another are none."""
-    out = {tried.layer.id for tried in before} - {tried.layer.id for tried in after}
-    return [Tried(t.layer, t.promised) if t.layer.id in out else t for t in first]
 
 
 def counted(known: Evidence, left_out: float = 1.0) -> float:
@@ -224,41 +216,6 @@ def _again(
         for t in known.values()
     ]
     return sorted(again, key=lambda one: -one.score)
-
-
-def _still_needed(
-    bench: Bench,
-    base: Estimate,
-    model: Estimate,
-    accepted: list[Tried],
-    units: Mapping[str, float],
-    thresholds: Thresholds,
-    tell: Tell,
-) -> tuple[tuple[Tried, ...], Estimate]:
-    """Take out what the effects found after it have made needless."""
-    kept = list(accepted)
-    for tried in accepted[:-1]:
-        rest = [other.layer for other in kept if other is not tried]
-        candidate = bench.possible(rest)
-        if candidate is None:
-            continue
-        start = extended(candidate, model.candidate, model.point, {})
-        given = (base.noises, start, units, 1)
-        make = partial(settled, candidate, bench.series, *given)
-        without = bench.kept("settled", candidate, given, make)
-        needed = max(thresholds.of(tried.layer), STAND_IN * _gained_beside(tried, kept))
-        if evidence(model, without, bench.series).least <= needed:
-            tell(f"{tried.layer.id} is needless beside the others")
-            kept.remove(tried)
-            model = without
-    return tuple(kept), model
-
-
-def _gained_beside(one: Tried, kept: Sequence[Tried]) -> float:
-    """Return what the others at the place of an effect have gained [nats]."""
-    place = place_path(one.layer)
-    others = [t for t in kept if t is not one and place_path(t.layer) == place]
-    return sum(t.evidence.train for t in others if t.evidence)
 
 
 def _rivals(first: tuple[Tried, ...], kept: tuple[Tried, ...]) -> tuple[Tried, ...]:

@@ -38,7 +38,7 @@ WRITTEN_OUT: dict[str, str] = {
     "sensor_lag": "tau part",
     "stiffness_hysteresis": "k_r F_r",
     "stiffness_nonlinear": "q x_r",
-    "stribeck_friction": "T_c rise w_k w_s",
+    "stribeck_friction": "T_c rise w_k bend",
     "torque_derating": "P_max share w_lo",
     "torque_drift": "drop tau_d load warm_0 u_r",
     "torque_rate_limit": "r_max tau_f",
@@ -146,8 +146,8 @@ LOSSES: list[tuple[str, Callable[[Array, Array], Array]]] = [
         lambda w, u: library.dry(w, 8.0, 0.0, 1.0, 2.0),
     ),
     (
-        "stribeck_friction@w: {values: {T_c: 8 N*m, rise: 0.8, w_k: 3, w_s: 2 rad/s}}",
-        lambda w, u: library.dry(w, 8.0, 0.8, 3.0, 2.0),
+        "stribeck_friction@w: {values: {T_c: 8 N*m, rise: 0.8, w_k: 5, bend: 0.4}}",
+        lambda w, u: library.dry(w, 8.0, 0.8, 5.0, 2.0),
     ),
     (
         "load_dependent_loss@w: {values: {loss: 0.3, w_s: 2 rad/s}}",
