@@ -22,6 +22,8 @@ STEP, LEAST_STEP = 2e-3, 1e-7
 FAR = 0.05
 """Change of innovations, in their standard deviations, up to which they follow a coordinate in
 proportion: the phase of a tone runs far with its order."""
+ALIKE = 0.5
+"""Correlation of changes from which on those over the wider step are taken."""
 
 
 @dataclass(frozen=True)
@@ -61,15 +63,24 @@ def columns_of(
         far = float(np.sqrt(np.nanmean((changes / scale) ** 2)))
         return _known(changes / size), far
 
-    found = {}
-    for name in names:
-        k = candidate.names.index(name)
+    def slope(k: int) -> Reals:
         step = STEP
-        found[name], far = difference(k, step)
+        wide, far = difference(k, step)
+        narrow = wide
         while FAR < far < np.inf and step > LEAST_STEP:
             step = max(step * FAR / far / 2.0, LEAST_STEP)
-            found[name], far = difference(k, step)
-    return found
+            narrow, far = difference(k, step)
+        return wide if _is_alike(wide, narrow) else narrow
+
+    return {name: slope(candidate.names.index(name)) for name in names}
+
+
+def _is_alike(first: Reals, second: Reals) -> bool:
+    """Tell whether changes over a wide step are those over a narrow one: they even out what sticks
+    and slips.
+    """
+    both = np.sum(first * first) * np.sum(second * second)
+    return bool(np.sum(first * second) >= ALIKE * np.sqrt(both))
 
 
 def _known(changes: Reals) -> Reals:
