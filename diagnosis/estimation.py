@@ -25,10 +25,11 @@ ENOUGH = 0.3
 """A round that gains less than this [nats] is the last."""
 FIRST_DAMPING = 1e-3
 LARGEST_DAMPING = 1e5
-SCREENED_ROUNDS, FIRST_ROUNDS = 8, 4
-"""Most rounds while candidates are screened; those of them that only have to be worth a round."""
+SCREENED_ROUNDS, ROUNDS_OF_ONE = 8, 4
+"""Most rounds while candidates are screened, and those after which, on a single recording, which
+cannot tell chance from physics, a further one has to gain much."""
 LATE_PART = 0.1
-"""Part of all that was gained that each further round gains, where an effect begins far away."""
+"""What is much: part of all that was gained."""
 WORTH_A_ROUND = 3.0
 """A round of screening that gains less [nats] is the last."""
 
@@ -127,12 +128,13 @@ def estimated(
 def reached(estimate: Estimate, series: Sequence[Series], known: Columns) -> Estimate:
     """Return where some steps lead for which `known` columns of a model near it are good enough."""
     now, damping = estimate, FIRST_DAMPING
-    for turn in range(SCREENED_ROUNDS if np.isfinite(now.cost) else 0):
+    early = ROUNDS_OF_ONE if len(series) == 1 else SCREENED_ROUNDS
+    for done in range(1, SCREENED_ROUNDS + 1 if np.isfinite(now.cost) else 0):
         better, damping = improved(with_normal(now, series, known), series, damping)
         if better is None:
             break
         gained, now = now.cost - better.cost, better
-        late = LATE_PART * (estimate.cost - now.cost) if turn >= FIRST_ROUNDS - 1 else 0.0
+        late = LATE_PART * (estimate.cost - now.cost) if done >= early else 0.0
         if gained < max(WORTH_A_ROUND, late):
             break
     regained = looked_at(now.candidate, series, now.noises, now.point, now.outcome)
