@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from diagnosis.estimation import Estimate
 from diagnosis.layers import Layer
+from diagnosis.normal import solution
 from diagnosis.verdict import Named, Quantity
 from language.effect import own_names
 from language.model import Automaton
@@ -79,7 +80,7 @@ def _covariance(model: Estimate) -> tuple[Reals, list[str]]:
     free = ~model.normal.own
     whole = np.sum(model.normal.a, axis=0)[np.ix_(free, free)] + np.eye(int(free.sum()))
     names = [name for name, one in zip(model.candidate.names, free, strict=True) if one]
-    return np.asarray(np.linalg.inv(whole), dtype=np.float64), names
+    return solution(whole, np.eye(len(whole))), names
 
 
 def _spreads(model: Estimate) -> Reals:

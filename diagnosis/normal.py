@@ -16,7 +16,8 @@ Reals = NDArray[np.float64]
 Columns = Mapping[str, Reals]
 """How the joined innovations (n, seen) of all recordings change with the coordinate of a name."""
 MOST = 1e100
-"""Bound of a change: a run that leaves all bounds tells no more than its sign."""
+"""Bound of a change: a run that leaves all bounds tells no more than its sign, and its coordinate
+stays where it is."""
 STEP, LEAST_STEP = 2e-3, 1e-7
 """Change of a coordinate for a difference, in standard deviations of its prior."""
 FAR = 0.05
@@ -60,8 +61,7 @@ def columns_of(
         ahead = point.moved(candidate, k, step)
         size = float(ahead.shared[k] - point.shared[k])
         changes = run(ahead).joined - outcome.joined
-        far = float(np.sqrt(np.nanmean((changes / scale) ** 2)))
-        return _known(changes / size), far
+        return _known(changes / size), _far(changes / scale)
 
     def slope(k: int) -> Reals:
         step = STEP
@@ -79,8 +79,16 @@ def _is_alike(first: Reals, second: Reals) -> bool:
     """Tell whether changes over a wide step are those over a narrow one: they even out what sticks
     and slips.
     """
-    both = np.sum(first * first) * np.sum(second * second)
-    return bool(np.sum(first * second) >= ALIKE * np.sqrt(both))
+    both = np.linalg.norm(first) * np.linalg.norm(second)
+    return bool(np.sum(first * second) >= ALIKE * both)
+
+
+def _far(changes: Reals) -> float:
+    """Return the root mean square of what is known of changes; without bound where one is."""
+    known = changes[~np.isnan(changes)]
+    if known.size == 0 or np.max(np.abs(known)) > MOST:
+        return np.inf
+    return float(np.sqrt(np.mean(known**2)))
 
 
 def _known(changes: Reals) -> Reals:
@@ -150,14 +158,23 @@ def _solved(point: Point, normal: Normal, damping: float, held: NDArray[np.bool_
         inner = a[np.ix_(own, own)]
         inner = inner + np.eye(len(inner)) + damping * np.diag(np.diag(inner))
         cross, rest = a[np.ix_(free, own)], -g[own] - point.own[r, own]
-        solved = np.linalg.solve(inner, np.column_stack([cross.T, rest]))
+        solved = solution(inner, np.column_stack([cross.T, rest]))
         matrix = matrix - cross @ solved[:, :-1]
         right = right - cross @ solved[:, -1]
         parts[int(r)] = (inner, cross, rest)
     matrix = matrix + damping * np.diag(np.maximum(np.diag(matrix), 1e-12))
     shared = np.zeros(len(own))
-    shared[free] = np.linalg.solve(matrix, right)
+    shared[free] = solution(matrix, right)
     each = np.zeros((len(point.own), len(own)))
     for r, (inner, cross, rest) in parts.items():
-        each[r, own] = np.linalg.solve(inner, rest - cross.T @ shared[free])
+        each[r, own] = solution(inner, rest - cross.T @ shared[free])
     return Point(shared, each)
+
+
+def solution(matrix: Reals, right: Reals) -> Reals:
+    """Solve; the smallest solution where changes without bound drown the priors."""
+    try:
+        return np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
+    except np.linalg.LinAlgError:
+        found, *_ = np.linalg.lstsq(matrix, right, rcond=None)
+        return np.asarray(found, dtype=np.float64)

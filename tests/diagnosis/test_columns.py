@@ -8,8 +8,8 @@ import pytest
 from diagnosis.bench import Bench
 from diagnosis.estimation import estimated, looked_at, outcome_at
 from diagnosis.layers import fitting, shipped_effects
-from diagnosis.normal import STEP, columns_of
-from diagnosis.point import point_of
+from diagnosis.normal import STEP, Normal, columns_of, stepped
+from diagnosis.point import Point, point_of
 from diagnosis.prediction import noises_of
 from tests.diagnosis.test_estimation import TRUTH, bench, recorded
 
@@ -42,3 +42,17 @@ def test_the_strength_of_a_tone_is_found_from_where_its_order_is_right(bench: Be
     start = {**TRUTH, **TONE, "a_T_em": 1.0}
     found = estimated(candidate, series, noises_of(series, {}), start)
     assert found.values(0)["a_T_em"] == pytest.approx(TONE["a_T_em"], rel=0.1)
+
+
+def test_a_step_is_found_where_changes_drown_the_priors(bench: Bench) -> None:
+    candidate = bench.candidate(())
+    count = len(candidate.names)
+    point = Point(np.zeros(count), np.zeros((1, count)))
+    normal = Normal(
+        np.full((1, count, count), 1e180),
+        np.full((1, count), 1e90),
+        np.zeros(count, dtype=bool),
+        np.zeros(1, dtype=np.int64),
+        np.zeros(1, dtype=np.int64),
+    )
+    assert np.all(np.isfinite(stepped(candidate, point, normal, 0.0).shared))
