@@ -33,6 +33,9 @@ class Place(Protocol):
     def whole(self, name: str, number: int) -> str:
         """Return a number as it is written beside a whole-number variable: a mode by its name."""
 
+    def is_unsigned(self, name: str) -> bool:
+        """Tell whether a variable is a whole number without a sign."""
+
 
 LIBRARY: Mapping[str, str] = {"abs": "fabs", "sqrt": "sqrt", "floor": "floor"}
 """Operations that C gives exactly; all others are in ha_math."""
@@ -64,6 +67,9 @@ def c_expression(expr: Expr, place: Place) -> str:
         case Compare(operator, left, right):
             if isinstance(left, Ref) and isinstance(right, Value) and type(right.value) is int:
                 return f"{place(left.name)} {operator} {place.whole(left.name, right.value)}"
+            if isinstance(left, Ref) and isinstance(right, Ref):
+                first, second = _of_one_sign(left.name, right.name, place)
+                return f"{first} {operator} {second}"
             return f"{_operand(left, place)} {operator} {_operand(right, place)}"
         case Select(condition, then, other):
             parts = [_operand(part, place) for part in (condition, then, other)]
@@ -80,6 +86,19 @@ def literal(value: float | int | bool, number: NumberType) -> str:
     if isinstance(value, int):
         return repr(value)
     return decimal(value, number) + SUFFIX[number].upper()
+
+
+def _of_one_sign(left: str, right: str, place: Place) -> list[str]:
+    """Return two variables for a comparison: one without a sign as a number with one, beside such
+    a one.
+    """
+    names = (left, right)
+    unsigned = [place.is_unsigned(name) for name in names]
+    mixed = len(set(unsigned)) == 2
+    return [
+        f"(int32_t){place(name)}" if mixed and is_unsigned else place(name)
+        for name, is_unsigned in zip(names, unsigned, strict=True)
+    ]
 
 
 def _operand(expr: Expr, place: Place) -> str:

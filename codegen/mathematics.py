@@ -11,10 +11,10 @@ from codegen.names import (
     REAL,
 )
 from codegen.rendering import render, version
-from codegen.statement import INDENT, WIDTH, wrapped
+from codegen.statement import INDENT, WIDTH, decided, is_nested, wrapped
 from language.functions import FUNCTIONS_OF
 from language.number import NumberType
-from language.operation import Assign
+from language.operation import Assign, Select
 from language.program import (
     Function,
     short,
@@ -69,6 +69,9 @@ class _FunctionNames:
     def whole(self, name: str, number: int) -> str:
         return str(number)
 
+    def is_unsigned(self, name: str) -> bool:
+        return False
+
 
 def _function(function: Function, number: NumberType) -> dict[str, Any]:
     place = _FunctionNames(number)
@@ -76,7 +79,11 @@ def _function(function: Function, number: NumberType) -> dict[str, Any]:
     for op in function.body:
         assert isinstance(op, Assign)
         left = "return " if op.target == "work.y" else f"const {REAL[number]} {place(op.target)} = "
-        lines += wrapped(left, c_expression(op.value, place), "", WIDTH - len(INDENT))
+        if isinstance(op.value, Select) and is_nested(op.value):
+            lines += decided(REAL[number], place(op.target), op.value, place, WIDTH - len(INDENT))
+            lines += ["return y;"] if op.target == "work.y" else []
+        else:
+            lines += wrapped(left, c_expression(op.value, place), "", WIDTH - len(INDENT))
     parameters = ", ".join(f"{REAL[number]} {name}" for name in function.parameters)
     about = function.about
     return {"name": function.name, "parameters": parameters, "about": about, "lines": lines}

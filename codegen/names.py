@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 from language.model import CHART
 from language.number import NumberType
@@ -14,14 +15,20 @@ MODES = ("memory.mode", "memory.run_mode")
 CHOSEN = ("memory.fired", "memory.log", "work.wish_", "work.takes_")
 """Variables that hold the number of a transition."""
 UNSIGNED = ("timer.", "memory.faults", *CHOSEN)
+SOLVED_APART, SOLVED_ON_PAGE = "solved_", "cal->solved."
+"""What stands before solved numbers: constants of their own, or a part of the calibration page."""
 
 
 @dataclass(frozen=True)
 class CNames:
-    """The C text of names inside one function: locals by their own name, the rest by group."""
+    """The C text of names inside one function: locals by their own name, the rest by group.
+
+    `solved` is what stands before solved numbers.
+    """
 
     program: Program
     local: frozenset[str] = frozenset()
+    solved: str = SOLVED_APART
 
     @property
     def number(self) -> NumberType:
@@ -38,7 +45,7 @@ class CNames:
             case "constant":
                 return f"constant.{rest}"
             case "solved":
-                return f"solved_{member}"
+                return f"{self.solved}{member}"
             case "axis":
                 return f"axis_{member}"
             case "calibration":
@@ -67,6 +74,15 @@ class CNames:
         if values and 0 <= number < len(values):
             return value_constant(self.program, values, number)
         return f"{number}U" if name.startswith(UNSIGNED) else str(number)
+
+    def is_unsigned(self, name: str) -> bool:
+        """Tell whether a variable is a whole number without a sign."""
+        return name in self._unsigned
+
+    @cached_property
+    def _unsigned(self) -> frozenset[str]:
+        kinds = {v.name: c_type(v, self.number) for v in self.program.variables}
+        return frozenset(name for name, kind in kinds.items() if kind.startswith("uint"))
 
     def _values(self, name: str) -> tuple[str, ...]:
         return next((values for known, values in _lists(self.program) if known == name), ())

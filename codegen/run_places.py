@@ -37,6 +37,10 @@ class Places:
         """Return a whole number beside a signal."""
         return repr(number)
 
+    def is_unsigned(self, name: str) -> bool:
+        """Signals are reals."""
+        return False
+
     def signal(self, name: str) -> str:
         """Return the C text of a signal."""
         courses = [course.name for course in self.assembly.courses]
@@ -76,6 +80,10 @@ class Clock:
     def whole(self, name: str, number: int) -> str:
         """Return a whole number beside it."""
         return repr(number)
+
+    def is_unsigned(self, name: str) -> bool:
+        """Time is a real."""
+        return False
 
 
 def column_places(assembly: Assembly) -> list[int]:

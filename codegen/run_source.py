@@ -15,11 +15,11 @@ from typing import Any
 from codegen.expression import literal
 from codegen.marks import marked
 from codegen.mathematics import math_files
+from codegen.member import page_of
 from codegen.names import REAL, c_member, c_type
 from codegen.rendering import render, version
 from codegen.run_module import module_of, varying
 from codegen.run_places import INSTANCE, Clock, Places, formula_of, row_width
-from codegen.source import page_of
 from language.assembly import Assembly, Course, Feed, ranged, short_input
 from language.continuous import PARTS
 from language.number import NumberType

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from codegen.comment import comment as safe
 from codegen.expression import SUFFIX, literal
 from codegen.gate import gated
 from codegen.mathematics import math_files
+from codegen.member import CONSTANTS, PAGE, Page, field_of, members
 from codegen.names import (
     REAL,
+    SOLVED_APART,
+    SOLVED_ON_PAGE,
     CNames,
     c_member,
     c_type,
@@ -22,38 +23,22 @@ from codegen.names import (
     value_constant,
 )
 from codegen.rendering import render, version
-from codegen.statement import Writer
+from codegen.statement import INDENT, WIDTH, Writer
 from codegen.unassigned import unassigned
 from codegen.usage import Usage, locals_of, usages
 from language.functions import FUNCTIONS_OF
 from language.invariant import GROUP, INVARIANTS
-from language.number import NumberType, decimal
 from language.operation import Run
 from language.printing import digest
 from language.program import (
-    Constant,
     Program,
     Variable,
 )
 from language.traversal import reads, walk
-from language.units import shown_unit
 from language.wiring import finished
 
-GROUPS = ("state", "discrete", "latched", "equation", "before", "innovation", "timer", "check")
-"""Nested structs of the instance, in order."""
 ENTRIES = ("init", "derive", "step")
 INLINE = ("min", "max", "clip", "sign", "pow2", "whole", "lookup", "lookup2")
-
-
-@dataclass(frozen=True)
-class Field:
-    """A member of a struct with its comment."""
-
-    type: str
-    name: str
-    comment: str
-    value: str = ""
-    size: int = 0
 
 
 def c_files(program: Program) -> dict[str, str]:
@@ -63,9 +48,10 @@ def c_files(program: Program) -> dict[str, str]:
     """
     if "step" not in program.blocks:
         raise ValueError(f"inputs of {program.name} vary inside a step: it has no C")
-    context = {**module_context(gated(stepped(program))), "digest": digest(program)}
+    context = {**module_context(gated(stepped(program)), PAGE), "digest": digest(program)}
     files = {
         f"{program.name}.h": render("module.h.jinja", context),
+        f"{program.name}_MemMap.h": render("memory_map.h.jinja", context),
         f"{program.name}.c": render("module.c.jinja", context),
     }
     if context["uses_math"]:
@@ -82,19 +68,21 @@ def stepped(program: Program) -> Program:
     return dataclasses.replace(program, blocks=blocks, variables=variables)
 
 
-def module_context(program: Program) -> dict[str, Any]:
+def module_context(program: Program, page: Page = CONSTANTS) -> dict[str, Any]:
     """Return what the templates of a Program's files read."""
     number = program.number
     local = locals_of(program)
-    used = usages(program, local)
+    used = usages(program, local, page.holds)
     kinds = {variable.name: c_type(variable, program.number) for variable in program.variables}
     called = {name.removeprefix("call ") for name in reads(program.blocks.values()) if " " in name}
     shared = _work(program, local)
-    blocks = [_block(program, name, local[name], used, kinds) for name in _callees_first(program)]
+    blocks = [
+        _block(program, name, local[name], used, kinds, page) for name in _callees_first(program)
+    ]
     return {
         **_names(program),
-        **_members(program),
-        "work": [_field(variable, number) for variable in shared],
+        **members(program, page),
+        "work": [field_of(variable, number) for variable in shared],
         "begun": _begun(program, shared, kinds),
         "blocks": [block for block in blocks if block["name"] not in ENTRIES],
         "entries": {block["name"]: block for block in blocks if block["name"] in ENTRIES},
@@ -132,28 +120,6 @@ def _names(program: Program) -> dict[str, Any]:
     }
 
 
-def page_of(program: Program) -> list[Field]:
-    """Return the members of the calibration page, tables among them, with their defaults."""
-    return [_constant(c, program.number) for c in program.constants if c.kind == "tunable"]
-
-
-def _members(program: Program) -> dict[str, Any]:
-    """The members of the structures."""
-    number, constants, variables = program.number, program.constants, program.variables
-    return {
-        "calibration": page_of(program),
-        "derived": [_constant(c, number) for c in constants if c.kind == "derived"],
-        "constants": [_constant(c, number) for c in constants if c.name.startswith("constant.")],
-        "axes": [_constant(c, number) for c in constants if c.name.startswith("axis.")],
-        "solved": [_constant(c, number) for c in constants if c.kind == "solved"],
-        "inputs": [_field(v, number) for v in program.inputs],
-        "is_new": [_field(v, number) for v in variables if v.name.startswith("is_new.")],
-        "groups": _groups(program),
-        "memory": [_field(v, number) for v in variables if v.name.startswith("memory.")],
-        "outputs": _outputs(program),
-    }
-
-
 def _pace(program: Program) -> str:
     if program.period is None:
         return f"Major step: {program.major_step} s"
@@ -166,51 +132,6 @@ def _step(program: Program) -> str:
             f"{program.major_step} s of flow under the inputs of the step before, then those of now"
         )
     return f"One tick of {program.period} s"
-
-
-def _field(variable: Variable, number: NumberType) -> Field:
-    comment = shown_unit(variable.unit) if variable.type == "real" else variable.about
-    if variable.type == "real" and variable.about:
-        comment = f"{shown_unit(variable.unit)}; {variable.about}"
-    member = c_member(variable.name)
-    return Field(c_type(variable, number), member, safe(comment), size=variable.size)
-
-
-def _constant(constant: Constant, number: NumberType) -> Field:
-    comment = "; ".join(text for text in (shown_unit(constant.unit), constant.key) if text)
-    if constant.range:
-        low, high = constant.range
-        comment += f"; {decimal(low, number)} to {decimal(high, number)}"
-    value = literal(constant.value, number)
-    if constant.items:
-        value = f"{{{', '.join(literal(item, number) for item in constant.items)}}}"
-    kind = c_type(Variable(constant.name, constant.type, values=constant.values), number)
-    comment = "; ".join(text for text in (comment, constant.about) if text)
-    return Field(kind, c_member(constant.name), safe(comment), value, len(constant.items))
-
-
-def _groups(program: Program) -> list[tuple[str, list[Field]]]:
-    found = []
-    for group in GROUPS:
-        inside = [v for v in program.variables if v.name.startswith(f"{group}.")]
-        fields = [_field(v, program.number) for v in inside]
-        if fields:
-            found.append((group, fields))
-    return found
-
-
-def _outputs(program: Program) -> list[dict[str, str]]:
-    types = {v.name: c_type(v, program.number) for v in program.variables}
-    place = CNames(program)
-    return [
-        {
-            "type": types[wire.source],
-            "name": wire.name,
-            "unit": shown_unit(wire.unit),
-            "source": place(wire.source),
-        }
-        for wire in program.outputs
-    ]
 
 
 def _work(program: Program, local: Mapping[str, Iterable[str]]) -> list[Variable]:
@@ -238,8 +159,9 @@ def _block(
     local: frozenset[str],
     used: Mapping[str, Usage],
     kinds: Mapping[str, str],
+    page: Page,
 ) -> dict[str, Any]:
-    place = CNames(program, local)
+    place = CNames(program, local, SOLVED_ON_PAGE if page.holds_solved else SOLVED_APART)
     writer = Writer(program, used, local, place, kinds)
     types = {
         "self": f"{program.name}_Self",
@@ -247,17 +169,30 @@ def _block(
         "in": f"{program.name}_In",
         "work": "Work",
     }
+    qualifiers = dict.fromkeys(types, "const ") | {"cal": f"{page.qualifiers} "}
     usage = used[name]
     parameters = [
-        f"{'' if pointer in usage.writes else 'const '}{types[pointer]} *{pointer}"
+        f"{'' if pointer in usage.writes else qualifiers[pointer]}{types[pointer]} *{pointer}"
         for pointer in usage.parameters
     ]
     return {
         "name": name,
-        "parameters": ", ".join(parameters) or "void",
+        "parameters": _listed(f"static inline void {name}(", parameters),
         "needs": usage.needs,
         "lines": [_in_derive(name, line) for line in writer.lines(program.blocks[name])],
     }
+
+
+def _listed(opening: str, parameters: Sequence[str]) -> str:
+    """Return what stands between the parentheses of a function, in lines that are not too long."""
+    lines = [""]
+    for place, parameter in enumerate(parameters):
+        text = parameter + ("," if place + 1 < len(parameters) else "")
+        start = opening if len(lines) == 1 else INDENT
+        if lines[-1] and len(start) + len(lines[-1]) + len(text) + 2 > WIDTH:
+            lines.append("")
+        lines[-1] += f" {text}" if lines[-1] else text
+    return f"\n{INDENT}".join(lines) if parameters else "void"
 
 
 def _in_derive(block: str, line: str) -> str:

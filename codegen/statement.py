@@ -23,6 +23,7 @@ from language.operation import (
     Loop,
     Op,
     Run,
+    Select,
     Store,
     Unary,
     Value,
@@ -31,6 +32,9 @@ from language.program import Program, short
 from language.traversal import expr_names
 
 INDENT = "    "
+NOTHING = f"{INDENT}/* nothing to do */"
+ELSE_NOTHING = ("} else {", NOTHING)
+"""The end of a chain of conditions none of which has to be true (MISRA C:2012, rule 15.7)."""
 WIDTH = 100
 """Longest line of generated C; longer expressions are broken at a sum or a blank."""
 
@@ -49,6 +53,8 @@ class Writer:
     def lines(self, block: Block) -> Iterator[str]:
         """Yield the lines of a block, no longer than there is `room`."""
         inner = dataclasses.replace(self, room=self.room - len(INDENT))
+        if not block:
+            yield NOTHING
         for op in block:
             for line in inner._op(op):
                 yield (INDENT + line) if line else ""
@@ -78,12 +84,18 @@ class Writer:
     def _assign(self, target: str, text: str, value: object, key: str) -> Iterator[str]:
         if isinstance(value, Value) and type(value.value) is int:
             text = self.place.whole(target, value.value)
-        declared = f"const {self.types[target]} " if target in self.local else ""
-        yield from wrapped(f"{declared}{self.place(target)} = ", text, key, self.room)
+        kind = self.types[target] if target in self.local else ""
+        if isinstance(value, Select) and is_nested(value):
+            yield from _cited(key)
+            yield from decided(kind, self.place(target), value, self.place, self.room)
+        else:
+            declared = f"const {kind} " if kind else ""
+            yield from wrapped(f"{declared}{self.place(target)} = ", text, key, self.room)
 
     def _branch(self, condition: Expr, then: Block, other: Block) -> Iterator[str]:
         yield from tested("if", c_expression(condition, self.place), "", self.room)
         yield from self.lines(then)
+        chained = len(other) == 1 and isinstance(other[0], Branch)
         while len(other) == 1 and isinstance(other[0], Branch):
             inner = other[0]
             yield from tested("} else if", c_expression(inner.condition, self.place), "", self.room)
@@ -92,6 +104,8 @@ class Writer:
         if other:
             yield "} else {"
             yield from self.lines(other)
+        elif chained:
+            yield from ELSE_NOTHING
         yield "}"
 
     def _choose(self, selector: str, cases: tuple[tuple[int, Block], ...]) -> Iterator[str]:
@@ -119,6 +133,7 @@ class Writer:
         yield f"{INDENT}{timer} = 0U;"
         yield f"}} else if ({timer} < {limit}U) {{"
         yield f"{INDENT}{timer}++;"
+        yield from ELSE_NOTHING
         yield "}"
 
 
@@ -132,6 +147,35 @@ def _while(index: str, body: Block) -> tuple[Expr | None, Block]:
         if index not in expr_names(inner.condition):
             return inner.condition, inner.then
     return None, body
+
+
+def is_nested(choice: Select) -> bool:
+    """Tell whether a choice leads to another one: it is read better as a chain of `if`."""
+    return isinstance(choice.then, Select) or isinstance(choice.other, Select)
+
+
+def decided(kind: str, target: str, value: Expr, place: Place, room: int = WIDTH) -> Iterator[str]:
+    """Yield what sets a target, of a `kind` if it is declared here, to the one chosen of many."""
+    if kind:
+        yield f"{kind} {target};"
+    if not isinstance(value, Select):
+        yield from wrapped(f"{target} = ", c_expression(value, place), "", room)
+        return
+    opening = "if"
+    while isinstance(value, Select):
+        yield from tested(opening, c_expression(value.condition, place), "", room)
+        inner = decided("", target, value.then, place, room - len(INDENT))
+        yield from (INDENT + line for line in inner)
+        opening, value = "} else if", value.other
+    yield "} else {"
+    inner = decided("", target, value, place, room - len(INDENT))
+    yield from (INDENT + line for line in inner)
+    yield "}"
+
+
+def _cited(key: str) -> Iterator[str]:
+    if key:
+        yield f"/* {safe(key)} */"
 
 
 def _comment(key: str) -> str:

@@ -20,7 +20,6 @@ from language.traversal import block_reads, block_writes, walk
 GROUP_OF = {
     "input": "in",
     "is_new": "in",
-    "calibration": "cal",
     "work": "work",
     "state": "self",
     "discrete": "self",
@@ -33,6 +32,7 @@ GROUP_OF = {
     "memory": "self",
     "derived": "self",
 }
+ON_PAGE = frozenset({"calibration"})
 ORDER = ("self", "cal", "in", "work")
 
 
@@ -49,16 +49,21 @@ class Usage:
         return tuple(name for name in ORDER if name in self.needs)
 
 
-def usages(program: Program, local: Mapping[str, frozenset[str]]) -> dict[str, Usage]:
-    """Return the usage of every block; `local` are the variables that live inside a block."""
+def usages(
+    program: Program, local: Mapping[str, frozenset[str]], on_page: frozenset[str] = ON_PAGE
+) -> dict[str, Usage]:
+    """Return the usage of every block; `local` are the variables that live inside a block,
+    `on_page` the groups of constants that the calibration page has.
+    """
+    groups = {**GROUP_OF, **dict.fromkeys(on_page, "cal")}
     found: dict[str, Usage] = {}
 
     def visit(name: str) -> Usage:
         if name not in found:
             read = {n for n in block_reads(program.blocks[name]) if n not in local[name]}
             written = {n for n in block_writes(program.blocks[name]) if n not in local[name]}
-            needs = {GROUP_OF.get(n.partition(".")[0], "") for n in read | written} - {""}
-            writes = {GROUP_OF.get(n.partition(".")[0], "") for n in written} - {""}
+            needs = {groups.get(n.partition(".")[0], "") for n in read | written} - {""}
+            writes = {groups.get(n.partition(".")[0], "") for n in written} - {""}
             for op in walk(program.blocks[name]):
                 if isinstance(op, Run):
                     inner = visit(op.block)

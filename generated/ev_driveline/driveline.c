@@ -3,6 +3,7 @@
  * Program digest: 2ecbde1f9390ae71
  */
 #include "driveline.h"
+#include "driveline_MemMap.h"
 
 #include <float.h>
 
@@ -47,7 +48,9 @@ static const struct {
     .k_hs_per_c_hs = 342.85714285714283, /* k_hs / c_hs */
 };
 
-const driveline_Cal driveline_default_cal = {
+const char driveline_Version[] = driveline_DIGEST;
+
+driveline_CALIBRATION const volatile driveline_Cal driveline_default_cal = {
     .J_em = 0.05,
 };
 
@@ -503,6 +506,8 @@ static inline void move_drive_contact(driveline_Self *self, Work *work)
             work->end_theta_d = work->at_theta_d;
             work->end_theta_b = work->at_theta_b;
         }
+    } else {
+        /* nothing to do */
     }
     self->state.w_w = work->end_w_w;
     self->state.w_em = work->end_w_em;
@@ -571,6 +576,8 @@ static inline void move_no_contact(driveline_Self *self, Work *work)
             work->end_theta_d = work->at_theta_d;
             work->end_theta_b = work->at_theta_b;
         }
+    } else {
+        /* nothing to do */
     }
     self->state.w_w = work->end_w_w;
     self->state.w_em = work->end_w_em;
@@ -624,6 +631,8 @@ static inline void move_coast_contact(driveline_Self *self, Work *work)
             work->end_theta_d = work->at_theta_d;
             work->end_theta_b = work->at_theta_b;
         }
+    } else {
+        /* nothing to do */
     }
     self->state.w_w = work->end_w_w;
     self->state.w_em = work->end_w_em;
@@ -662,6 +671,7 @@ static inline void elapse(driveline_Self *self, Work *work)
 
 static inline void load(void)
 {
+    /* nothing to do */
 }
 
 static inline void jump_drive_contact(driveline_Self *self, Work *work)
@@ -686,6 +696,8 @@ static inline void jump_no_contact(driveline_Self *self, Work *work)
         self->state.theta_b = -constant.alpha;
         self->mode = driveline_MODE_coast_contact;
         self->fired = 3U; /* driveline modes.no_contact.transitions.coast_contact */
+    } else {
+        /* nothing to do */
     }
 }
 
@@ -879,12 +891,12 @@ static inline void equations(driveline_Self *self)
     }
 }
 
-void driveline_Derive(const driveline_Cal *cal, driveline_Derived *derived)
+void driveline_Derive(const volatile driveline_Cal *cal, driveline_Derived *derived)
 {
     derived->per_J_em = 1.0 / cal->J_em; /* 1 / J_em */
 }
 
-void driveline_Init(driveline_Self *self, const driveline_Cal *cal)
+void driveline_Init(driveline_Self *self, const volatile driveline_Cal *cal)
 {
     static const driveline_Self zero; /* every member 0 or false */
 
@@ -895,13 +907,13 @@ void driveline_Init(driveline_Self *self, const driveline_Cal *cal)
     self->faults = 0U;
 }
 
-void driveline_Calibrate(driveline_Self *self, const driveline_Cal *cal)
+void driveline_Calibrate(driveline_Self *self, const volatile driveline_Cal *cal)
 {
     driveline_Derive(cal, &self->derived);
 }
 
-void driveline_Step(driveline_Self *self, const driveline_Cal *cal, const driveline_In *in,
-    driveline_Out *out)
+void driveline_Step(driveline_Self *self, const volatile driveline_Cal *cal,
+    const driveline_In *in, driveline_Out *out)
 {
     Work scratch;
     Work *const work = &scratch;

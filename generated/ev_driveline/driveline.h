@@ -22,7 +22,7 @@ enum {
 #define driveline_FAULT_zeno (1UL << 0)
 #define driveline_FAULT_livelock (1UL << 1)
 
-/* Tunable parameters */
+/* The calibration page: tunable parameters */
 typedef struct {
     double J_em; /* kg*m^2; driveline parameters.J_em; 0.01 to 0.2; motor and gears, at the motor */
 } driveline_Cal;
@@ -82,18 +82,21 @@ typedef struct {
     driveline_Derived derived;
 } driveline_Self;
 
-/* Default values of the tunable parameters */
-extern const driveline_Cal driveline_default_cal;
+/* The digest of the Program, which a tool compares with that of its description */
+extern const char driveline_Version[17];
+
+/* The page with default values, in a section of its own: driveline_MemMap.h */
+extern const volatile driveline_Cal driveline_default_cal;
 
 /* Before the first step */
-void driveline_Init(driveline_Self *self, const driveline_Cal *cal);
+void driveline_Init(driveline_Self *self, const volatile driveline_Cal *cal);
 
 /* After a change of the calibration page: X_Derive, and a fault if solved numbers do not fit it */
-void driveline_Calibrate(driveline_Self *self, const driveline_Cal *cal);
-void driveline_Derive(const driveline_Cal *cal, driveline_Derived *derived);
+void driveline_Calibrate(driveline_Self *self, const volatile driveline_Cal *cal);
+void driveline_Derive(const volatile driveline_Cal *cal, driveline_Derived *derived);
 
 /* 1/4000 s of flow under the inputs of the step before, then those of now */
-void driveline_Step(driveline_Self *self, const driveline_Cal *cal, const driveline_In *in,
-    driveline_Out *out);
+void driveline_Step(driveline_Self *self, const volatile driveline_Cal *cal,
+    const driveline_In *in, driveline_Out *out);
 
 #endif

@@ -3,6 +3,7 @@
  * Program digest: 22b210243a9c3b6e
  */
 #include "driveline_load.h"
+#include "driveline_load_MemMap.h"
 
 #include <float.h>
 
@@ -47,7 +48,9 @@ static const struct {
     .k_hs_per_c_hs = 342.85714285714283, /* k_hs / c_hs */
 };
 
-const driveline_load_Cal driveline_load_default_cal = {
+const char driveline_load_Version[] = driveline_load_DIGEST;
+
+driveline_load_CALIBRATION const volatile driveline_load_Cal driveline_load_default_cal = {
     .J_em = 0.05,
 };
 
@@ -566,6 +569,8 @@ static inline void move_drive_contact(driveline_load_Self *self, Work *work)
             work->end_theta_b = work->at_theta_b;
             work->end_T_l = work->at_T_l;
         }
+    } else {
+        /* nothing to do */
     }
     self->state.w_w = work->end_w_w;
     self->state.w_em = work->end_w_em;
@@ -639,6 +644,8 @@ static inline void move_no_contact(driveline_load_Self *self, Work *work)
             work->end_theta_b = work->at_theta_b;
             work->end_T_l = work->at_T_l;
         }
+    } else {
+        /* nothing to do */
     }
     self->state.w_w = work->end_w_w;
     self->state.w_em = work->end_w_em;
@@ -696,6 +703,8 @@ static inline void move_coast_contact(driveline_load_Self *self, Work *work)
             work->end_theta_b = work->at_theta_b;
             work->end_T_l = work->at_T_l;
         }
+    } else {
+        /* nothing to do */
     }
     self->state.w_w = work->end_w_w;
     self->state.w_em = work->end_w_em;
@@ -735,6 +744,7 @@ static inline void elapse(driveline_load_Self *self, Work *work)
 
 static inline void load(void)
 {
+    /* nothing to do */
 }
 
 static inline void jump_drive_contact(driveline_load_Self *self, Work *work)
@@ -759,6 +769,8 @@ static inline void jump_no_contact(driveline_load_Self *self, Work *work)
         self->state.theta_b = -constant.alpha;
         self->mode = driveline_load_MODE_coast_contact;
         self->fired = 3U; /* driveline_load modes.no_contact.transitions.coast_contact */
+    } else {
+        /* nothing to do */
     }
 }
 
@@ -958,12 +970,12 @@ static inline void equations(driveline_load_Self *self)
     }
 }
 
-void driveline_load_Derive(const driveline_load_Cal *cal, driveline_load_Derived *derived)
+void driveline_load_Derive(const volatile driveline_load_Cal *cal, driveline_load_Derived *derived)
 {
     derived->per_J_em = 1.0 / cal->J_em; /* 1 / J_em */
 }
 
-void driveline_load_Init(driveline_load_Self *self, const driveline_load_Cal *cal)
+void driveline_load_Init(driveline_load_Self *self, const volatile driveline_load_Cal *cal)
 {
     static const driveline_load_Self zero; /* every member 0 or false */
 
@@ -974,13 +986,13 @@ void driveline_load_Init(driveline_load_Self *self, const driveline_load_Cal *ca
     self->faults = 0U;
 }
 
-void driveline_load_Calibrate(driveline_load_Self *self, const driveline_load_Cal *cal)
+void driveline_load_Calibrate(driveline_load_Self *self, const volatile driveline_load_Cal *cal)
 {
     driveline_load_Derive(cal, &self->derived);
 }
 
-void driveline_load_Step(driveline_load_Self *self, const driveline_load_Cal *cal, const driveline_load_In *in,
-    driveline_load_Out *out)
+void driveline_load_Step(driveline_load_Self *self, const volatile driveline_load_Cal *cal,
+    const driveline_load_In *in, driveline_load_Out *out)
 {
     Work scratch;
     Work *const work = &scratch;

@@ -22,7 +22,7 @@ enum {
 #define driveline_load_FAULT_zeno (1UL << 0)
 #define driveline_load_FAULT_livelock (1UL << 1)
 
-/* Tunable parameters */
+/* The calibration page: tunable parameters */
 typedef struct {
     double J_em; /* kg*m^2; driveline_load parameters.J_em; 0.01 to 0.2; motor and gears, at the motor */
 } driveline_load_Cal;
@@ -83,18 +83,21 @@ typedef struct {
     driveline_load_Derived derived;
 } driveline_load_Self;
 
-/* Default values of the tunable parameters */
-extern const driveline_load_Cal driveline_load_default_cal;
+/* The digest of the Program, which a tool compares with that of its description */
+extern const char driveline_load_Version[17];
+
+/* The page with default values, in a section of its own: driveline_load_MemMap.h */
+extern const volatile driveline_load_Cal driveline_load_default_cal;
 
 /* Before the first step */
-void driveline_load_Init(driveline_load_Self *self, const driveline_load_Cal *cal);
+void driveline_load_Init(driveline_load_Self *self, const volatile driveline_load_Cal *cal);
 
 /* After a change of the calibration page: X_Derive, and a fault if solved numbers do not fit it */
-void driveline_load_Calibrate(driveline_load_Self *self, const driveline_load_Cal *cal);
-void driveline_load_Derive(const driveline_load_Cal *cal, driveline_load_Derived *derived);
+void driveline_load_Calibrate(driveline_load_Self *self, const volatile driveline_load_Cal *cal);
+void driveline_load_Derive(const volatile driveline_load_Cal *cal, driveline_load_Derived *derived);
 
 /* 1/4000 s of flow under the inputs of the step before, then those of now */
-void driveline_load_Step(driveline_load_Self *self, const driveline_load_Cal *cal, const driveline_load_In *in,
-    driveline_load_Out *out);
+void driveline_load_Step(driveline_load_Self *self, const volatile driveline_load_Cal *cal,
+    const driveline_load_In *in, driveline_load_Out *out);
 
 #endif

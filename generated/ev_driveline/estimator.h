@@ -37,9 +37,236 @@ enum {
 #define estimator_FAULT_range_w_w (1UL << 8)
 #define estimator_FAULT_range_theta_b (1UL << 9)
 
-/* Tunable parameters */
+/* The calibration page: tunable parameters */
 typedef struct {
     double J_em; /* kg*m^2; driveline parameters.J_em; 0.01 to 0.2; motor and gears, at the motor */
+    struct {
+        double drive_contact_A_w_w_w_w;
+        double drive_contact_A_w_w_w_em;
+        double drive_contact_A_w_w_theta_d;
+        double drive_contact_A_w_w_theta_b;
+        double drive_contact_A_w_em_w_w;
+        double drive_contact_A_w_em_w_em;
+        double drive_contact_A_w_em_theta_d;
+        double drive_contact_A_w_em_theta_b;
+        double drive_contact_A_theta_d_w_w;
+        double drive_contact_A_theta_d_w_em;
+        double drive_contact_E_w_w_w_w;
+        double drive_contact_E_w_w_w_em;
+        double drive_contact_E_w_w_theta_d;
+        double drive_contact_E_w_w_theta_b;
+        double drive_contact_E_w_em_w_w;
+        double drive_contact_E_w_em_w_em;
+        double drive_contact_E_w_em_theta_d;
+        double drive_contact_E_w_em_theta_b;
+        double drive_contact_E_theta_d_w_w;
+        double drive_contact_E_theta_d_w_em;
+        double drive_contact_E_theta_d_theta_d;
+        double drive_contact_E_theta_d_theta_b;
+        double drive_contact_E_theta_b_theta_b;
+        double drive_contact_F_w_w_w_w;
+        double drive_contact_F_w_w_w_em;
+        double drive_contact_F_w_w_theta_d;
+        double drive_contact_F_w_w_theta_b;
+        double drive_contact_F_w_em_w_w;
+        double drive_contact_F_w_em_w_em;
+        double drive_contact_F_w_em_theta_d;
+        double drive_contact_F_w_em_theta_b;
+        double drive_contact_F_theta_d_w_w;
+        double drive_contact_F_theta_d_w_em;
+        double drive_contact_F_theta_d_theta_d;
+        double drive_contact_F_theta_d_theta_b;
+        double drive_contact_F_theta_b_theta_b;
+        double drive_contact_Eh_w_w_w_w;
+        double drive_contact_Eh_w_w_w_em;
+        double drive_contact_Eh_w_w_theta_d;
+        double drive_contact_Eh_w_w_theta_b;
+        double drive_contact_Eh_w_em_w_w;
+        double drive_contact_Eh_w_em_w_em;
+        double drive_contact_Eh_w_em_theta_d;
+        double drive_contact_Eh_w_em_theta_b;
+        double drive_contact_Eh_theta_d_w_w;
+        double drive_contact_Eh_theta_d_w_em;
+        double drive_contact_Eh_theta_d_theta_d;
+        double drive_contact_Eh_theta_d_theta_b;
+        double drive_contact_Eh_theta_b_theta_b;
+        double drive_contact_Fh_w_w_w_w;
+        double drive_contact_Fh_w_w_w_em;
+        double drive_contact_Fh_w_w_theta_d;
+        double drive_contact_Fh_w_w_theta_b;
+        double drive_contact_Fh_w_em_w_w;
+        double drive_contact_Fh_w_em_w_em;
+        double drive_contact_Fh_w_em_theta_d;
+        double drive_contact_Fh_w_em_theta_b;
+        double drive_contact_Fh_theta_d_w_w;
+        double drive_contact_Fh_theta_d_w_em;
+        double drive_contact_Fh_theta_d_theta_d;
+        double drive_contact_Fh_theta_d_theta_b;
+        double drive_contact_Fh_theta_b_theta_b;
+        double no_contact_A_w_w_w_w;
+        double no_contact_A_w_em_w_em;
+        double no_contact_A_theta_d_w_w;
+        double no_contact_A_theta_d_w_em;
+        double no_contact_A_theta_b_w_w;
+        double no_contact_A_theta_b_w_em;
+        double no_contact_A_theta_b_theta_d;
+        double no_contact_A_theta_b_theta_b;
+        double no_contact_E_w_w_w_w;
+        double no_contact_E_w_em_w_em;
+        double no_contact_E_theta_d_w_w;
+        double no_contact_E_theta_d_w_em;
+        double no_contact_E_theta_d_theta_d;
+        double no_contact_E_theta_b_w_w;
+        double no_contact_E_theta_b_w_em;
+        double no_contact_E_theta_b_theta_d;
+        double no_contact_E_theta_b_theta_b;
+        double no_contact_F_w_w_w_w;
+        double no_contact_F_w_em_w_em;
+        double no_contact_F_theta_d_w_w;
+        double no_contact_F_theta_d_w_em;
+        double no_contact_F_theta_d_theta_d;
+        double no_contact_F_theta_b_w_w;
+        double no_contact_F_theta_b_w_em;
+        double no_contact_F_theta_b_theta_d;
+        double no_contact_F_theta_b_theta_b;
+        double no_contact_Eh_w_w_w_w;
+        double no_contact_Eh_w_em_w_em;
+        double no_contact_Eh_theta_d_w_w;
+        double no_contact_Eh_theta_d_w_em;
+        double no_contact_Eh_theta_d_theta_d;
+        double no_contact_Eh_theta_b_w_w;
+        double no_contact_Eh_theta_b_w_em;
+        double no_contact_Eh_theta_b_theta_d;
+        double no_contact_Eh_theta_b_theta_b;
+        double no_contact_Fh_w_w_w_w;
+        double no_contact_Fh_w_em_w_em;
+        double no_contact_Fh_theta_d_w_w;
+        double no_contact_Fh_theta_d_w_em;
+        double no_contact_Fh_theta_d_theta_d;
+        double no_contact_Fh_theta_b_w_w;
+        double no_contact_Fh_theta_b_w_em;
+        double no_contact_Fh_theta_b_theta_d;
+        double no_contact_Fh_theta_b_theta_b;
+        double coast_contact_A_w_w_w_w;
+        double coast_contact_A_w_w_w_em;
+        double coast_contact_A_w_w_theta_d;
+        double coast_contact_A_w_w_theta_b;
+        double coast_contact_A_w_em_w_w;
+        double coast_contact_A_w_em_w_em;
+        double coast_contact_A_w_em_theta_d;
+        double coast_contact_A_w_em_theta_b;
+        double coast_contact_A_theta_d_w_w;
+        double coast_contact_A_theta_d_w_em;
+        double coast_contact_E_w_w_w_w;
+        double coast_contact_E_w_w_w_em;
+        double coast_contact_E_w_w_theta_d;
+        double coast_contact_E_w_w_theta_b;
+        double coast_contact_E_w_em_w_w;
+        double coast_contact_E_w_em_w_em;
+        double coast_contact_E_w_em_theta_d;
+        double coast_contact_E_w_em_theta_b;
+        double coast_contact_E_theta_d_w_w;
+        double coast_contact_E_theta_d_w_em;
+        double coast_contact_E_theta_d_theta_d;
+        double coast_contact_E_theta_d_theta_b;
+        double coast_contact_E_theta_b_theta_b;
+        double coast_contact_F_w_w_w_w;
+        double coast_contact_F_w_w_w_em;
+        double coast_contact_F_w_w_theta_d;
+        double coast_contact_F_w_w_theta_b;
+        double coast_contact_F_w_em_w_w;
+        double coast_contact_F_w_em_w_em;
+        double coast_contact_F_w_em_theta_d;
+        double coast_contact_F_w_em_theta_b;
+        double coast_contact_F_theta_d_w_w;
+        double coast_contact_F_theta_d_w_em;
+        double coast_contact_F_theta_d_theta_d;
+        double coast_contact_F_theta_d_theta_b;
+        double coast_contact_F_theta_b_theta_b;
+        double coast_contact_Eh_w_w_w_w;
+        double coast_contact_Eh_w_w_w_em;
+        double coast_contact_Eh_w_w_theta_d;
+        double coast_contact_Eh_w_w_theta_b;
+        double coast_contact_Eh_w_em_w_w;
+        double coast_contact_Eh_w_em_w_em;
+        double coast_contact_Eh_w_em_theta_d;
+        double coast_contact_Eh_w_em_theta_b;
+        double coast_contact_Eh_theta_d_w_w;
+        double coast_contact_Eh_theta_d_w_em;
+        double coast_contact_Eh_theta_d_theta_d;
+        double coast_contact_Eh_theta_d_theta_b;
+        double coast_contact_Eh_theta_b_theta_b;
+        double coast_contact_Fh_w_w_w_w;
+        double coast_contact_Fh_w_w_w_em;
+        double coast_contact_Fh_w_w_theta_d;
+        double coast_contact_Fh_w_w_theta_b;
+        double coast_contact_Fh_w_em_w_w;
+        double coast_contact_Fh_w_em_w_em;
+        double coast_contact_Fh_w_em_theta_d;
+        double coast_contact_Fh_w_em_theta_b;
+        double coast_contact_Fh_theta_d_w_w;
+        double coast_contact_Fh_theta_d_w_em;
+        double coast_contact_Fh_theta_d_theta_d;
+        double coast_contact_Fh_theta_d_theta_b;
+        double coast_contact_Fh_theta_b_theta_b;
+        double drive_Phi_theta_d_theta_d;
+        double drive_Phi_theta_d_w_em;
+        double drive_Phi_theta_d_w_w;
+        double drive_Phi_w_em_theta_d;
+        double drive_Phi_w_em_w_em;
+        double drive_Phi_w_em_w_w;
+        double drive_Phi_w_w_theta_d;
+        double drive_Phi_w_w_w_em;
+        double drive_Phi_w_w_w_w;
+        double drive_Gamma_theta_d_T_em;
+        double drive_Gamma_theta_d_T_br;
+        double drive_Gamma_w_em_T_em;
+        double drive_Gamma_w_em_T_br;
+        double drive_Gamma_w_w_T_em;
+        double drive_Gamma_w_w_T_br;
+        double drive_G_theta_d_w_em;
+        double drive_G_theta_d_w_w;
+        double drive_G_w_em_w_em;
+        double drive_G_w_em_w_w;
+        double drive_G_w_w_w_em;
+        double drive_G_w_w_w_w;
+        double drive_L_theta_d_y_em;
+        double drive_L_theta_d_y_w;
+        double drive_L_w_em_y_em;
+        double drive_L_w_em_y_w;
+        double drive_L_w_w_y_em;
+        double drive_L_w_w_y_w;
+        double drive_f_w_w;
+        double coast_Phi_theta_d_theta_d;
+        double coast_Phi_theta_d_w_em;
+        double coast_Phi_theta_d_w_w;
+        double coast_Phi_w_em_theta_d;
+        double coast_Phi_w_em_w_em;
+        double coast_Phi_w_em_w_w;
+        double coast_Phi_w_w_theta_d;
+        double coast_Phi_w_w_w_em;
+        double coast_Phi_w_w_w_w;
+        double coast_Gamma_theta_d_T_em;
+        double coast_Gamma_theta_d_T_br;
+        double coast_Gamma_w_em_T_em;
+        double coast_Gamma_w_em_T_br;
+        double coast_Gamma_w_w_T_em;
+        double coast_Gamma_w_w_T_br;
+        double coast_G_theta_d_w_em;
+        double coast_G_theta_d_w_w;
+        double coast_G_w_em_w_em;
+        double coast_G_w_em_w_w;
+        double coast_G_w_w_w_em;
+        double coast_G_w_w_w_w;
+        double coast_L_theta_d_y_em;
+        double coast_L_theta_d_y_w;
+        double coast_L_w_em_y_em;
+        double coast_L_w_em_y_w;
+        double coast_L_w_w_y_em;
+        double coast_L_w_w_y_w;
+        double coast_f_w_w;
+        double stamp_J_em;
+    } solved; /* matrix exponentials and gains for these values, stamps of the values */
 } estimator_Cal;
 
 /* What follows from tunable parameters: estimator_Derive */
@@ -109,18 +336,21 @@ typedef struct {
     estimator_Derived derived;
 } estimator_Self;
 
-/* Default values of the tunable parameters */
-extern const estimator_Cal estimator_default_cal;
+/* The digest of the Program, which a tool compares with that of its description */
+extern const char estimator_Version[17];
+
+/* The page with default values, in a section of its own: estimator_MemMap.h */
+extern const volatile estimator_Cal estimator_default_cal;
 
 /* Before the first step */
-void estimator_Init(estimator_Self *self, const estimator_Cal *cal);
+void estimator_Init(estimator_Self *self, const volatile estimator_Cal *cal);
 
 /* After a change of the calibration page: X_Derive, and a fault if solved numbers do not fit it */
-void estimator_Calibrate(estimator_Self *self, const estimator_Cal *cal);
-void estimator_Derive(const estimator_Cal *cal, estimator_Derived *derived);
+void estimator_Calibrate(estimator_Self *self, const volatile estimator_Cal *cal);
+void estimator_Derive(const volatile estimator_Cal *cal, estimator_Derived *derived);
 
 /* One tick of 1/1000 s */
-void estimator_Step(estimator_Self *self, const estimator_Cal *cal, const estimator_In *in,
-    estimator_Out *out);
+void estimator_Step(estimator_Self *self, const volatile estimator_Cal *cal,
+    const estimator_In *in, estimator_Out *out);
 
 #endif

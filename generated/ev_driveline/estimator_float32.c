@@ -3,6 +3,7 @@
  * Program digest: 878fb6013bddd9ad
  */
 #include "estimator_float32.h"
+#include "estimator_float32_MemMap.h"
 
 #include <float.h>
 #include <math.h>
@@ -50,235 +51,237 @@ static const struct {
     .k_hs_per_J_v = 44.47533F, /* k_hs / J_v */
 };
 
-/* Numbers solved when the spec was checked: matrix exponentials, gains, stamps */
-static const float solved_drive_contact_A_w_w_w_w = -0.13190235F;
-static const float solved_drive_contact_A_w_w_w_em = 0.016014779F;
-static const float solved_drive_contact_A_w_w_theta_d = 44.47533F;
-static const float solved_drive_contact_A_w_w_theta_b = -44.47533F;
-static const float solved_drive_contact_A_w_em_w_w = 34.567898F;
-static const float solved_drive_contact_A_w_em_w_em = -4.3076415F;
-static const float solved_drive_contact_A_w_em_theta_d = -11851.852F;
-static const float solved_drive_contact_A_w_em_theta_b = 11851.852F;
-static const float solved_drive_contact_A_theta_d_w_w = -1.0F;
-static const float solved_drive_contact_A_theta_d_w_em = 0.12345678F;
-static const float solved_drive_contact_E_w_w_w_w = 0.9998462F;
-static const float solved_drive_contact_E_w_w_w_em = 1.8716255e-05F;
-static const float solved_drive_contact_E_w_w_theta_d = 0.04436649F;
-static const float solved_drive_contact_E_w_w_theta_b = -0.04436649F;
-static const float solved_drive_contact_E_w_em_w_w = 0.040399037F;
-static const float solved_drive_contact_E_w_em_w_em = 0.9949725F;
-static const float solved_drive_contact_E_w_em_theta_d = -11.822623F;
-static const float solved_drive_contact_E_w_em_theta_b = 11.822623F;
-static const float solved_drive_contact_E_theta_d_w_w = -0.0009975528F;
-static const float solved_drive_contact_E_theta_d_w_em = 0.00012315232F;
-static const float solved_drive_contact_E_theta_d_theta_d = 0.9992474F;
-static const float solved_drive_contact_E_theta_d_theta_b = 0.00075262535F;
-static const float solved_drive_contact_E_theta_b_theta_b = 1.0F;
-static const float solved_drive_contact_F_w_w_w_w = 0.0009999267F;
-static const float solved_drive_contact_F_w_w_w_em = 8.908596e-09F;
-static const float solved_drive_contact_F_w_w_theta_d = 2.22023e-05F;
-static const float solved_drive_contact_F_w_w_theta_b = -2.22023e-05F;
-static const float solved_drive_contact_F_w_em_w_w = 1.9229203e-05F;
-static const float solved_drive_contact_F_w_em_w_em = 0.0009976061F;
-static const float solved_drive_contact_F_w_em_theta_d = -0.005916427F;
-static const float solved_drive_contact_F_w_em_theta_b = 0.005916427F;
-static const float solved_drive_contact_F_theta_d_w_w = -4.992049e-07F;
-static const float solved_drive_contact_F_theta_d_w_em = 6.162945e-08F;
-static const float solved_drive_contact_F_theta_d_theta_d = 0.000999749F;
-static const float solved_drive_contact_F_theta_d_theta_b = 2.5098043e-07F;
-static const float solved_drive_contact_F_theta_b_theta_b = 0.001F;
-static const float solved_drive_contact_Eh_w_w_w_w = 0.9999286F;
-static const float solved_drive_contact_Eh_w_w_w_em = 8.683825e-06F;
-static const float solved_drive_contact_Eh_w_w_theta_d = 0.02221183F;
-static const float solved_drive_contact_Eh_w_w_theta_b = -0.02221183F;
-static const float solved_drive_contact_Eh_w_em_w_w = 0.018744035F;
-static const float solved_drive_contact_Eh_w_em_w_em = 0.99766594F;
-static const float solved_drive_contact_Eh_w_em_theta_d = -5.918985F;
-static const float solved_drive_contact_Eh_w_em_theta_b = 5.918985F;
-static const float solved_drive_contact_Eh_theta_d_w_w = -0.0004994191F;
-static const float solved_drive_contact_Eh_theta_d_w_em = 6.1656094e-05F;
-static const float solved_drive_contact_Eh_theta_d_theta_d = 0.9998117F;
-static const float solved_drive_contact_Eh_theta_d_theta_b = 0.00018831316F;
-static const float solved_drive_contact_Eh_theta_b_theta_b = 1.0F;
-static const float solved_drive_contact_Fh_w_w_w_w = 0.0004999826F;
-static const float solved_drive_contact_Fh_w_w_w_em = 2.1146298e-09F;
-static const float solved_drive_contact_Fh_w_w_theta_d = 5.5551677e-06F;
-static const float solved_drive_contact_Fh_w_w_theta_b = -5.5551677e-06F;
-static const float solved_drive_contact_Fh_w_em_w_w = 4.5644283e-06F;
-static const float solved_drive_contact_Fh_w_em_w_em = 0.0004994315F;
-static const float solved_drive_contact_Fh_w_em_theta_d = -0.0014803399F;
-static const float solved_drive_contact_Fh_w_em_theta_b = 0.0014803399F;
-static const float solved_drive_contact_Fh_theta_d_w_w = -1.2490447e-07F;
-static const float solved_drive_contact_Fh_theta_d_w_em = 1.5420207e-08F;
-static const float solved_drive_contact_Fh_theta_d_theta_d = 0.0004999686F;
-static const float solved_drive_contact_Fh_theta_d_theta_b = 3.139172e-08F;
-static const float solved_drive_contact_Fh_theta_b_theta_b = 0.0005F;
-static const float solved_no_contact_A_w_w_w_w = -0.0021826385F;
-static const float solved_no_contact_A_w_em_w_em = -0.040000003F;
-static const float solved_no_contact_A_theta_d_w_w = -1.0F;
-static const float solved_no_contact_A_theta_d_w_em = 0.12345678F;
-static const float solved_no_contact_A_theta_b_w_w = -1.0F;
-static const float solved_no_contact_A_theta_b_w_em = 0.12345678F;
-static const float solved_no_contact_A_theta_b_theta_d = 342.85715F;
-static const float solved_no_contact_A_theta_b_theta_b = -342.85715F;
-static const float solved_no_contact_E_w_w_w_w = 0.9999978F;
-static const float solved_no_contact_E_w_em_w_em = 0.99996F;
-static const float solved_no_contact_E_theta_d_w_w = -0.0009999989F;
-static const float solved_no_contact_E_theta_d_w_em = 0.00012345432F;
-static const float solved_no_contact_E_theta_d_theta_d = 1.0F;
-static const float solved_no_contact_E_theta_b_w_w = -0.0009999989F;
-static const float solved_no_contact_E_theta_b_w_em = 0.00012345432F;
-static const float solved_no_contact_E_theta_b_theta_d = 0.2902604F;
-static const float solved_no_contact_E_theta_b_theta_b = 0.7097396F;
-static const float solved_no_contact_F_w_w_w_w = 0.0009999989F;
-static const float solved_no_contact_F_w_em_w_em = 0.00099998F;
-static const float solved_no_contact_F_theta_d_w_w = -4.9999966e-07F;
-static const float solved_no_contact_F_theta_d_w_em = 6.172757e-08F;
-static const float solved_no_contact_F_theta_d_theta_d = 0.001F;
-static const float solved_no_contact_F_theta_b_w_w = -4.9999966e-07F;
-static const float solved_no_contact_F_theta_b_w_em = 6.172757e-08F;
-static const float solved_no_contact_F_theta_b_theta_d = 0.00015340715F;
-static const float solved_no_contact_F_theta_b_theta_b = 0.0008465928F;
-static const float solved_no_contact_Eh_w_w_w_w = 0.9999989F;
-static const float solved_no_contact_Eh_w_em_w_em = 0.99998F;
-static const float solved_no_contact_Eh_theta_d_w_w = -0.00049999973F;
-static const float solved_no_contact_Eh_theta_d_w_em = 6.172778e-05F;
-static const float solved_no_contact_Eh_theta_d_theta_d = 1.0F;
-static const float solved_no_contact_Eh_theta_b_w_w = -0.00049999973F;
-static const float solved_no_contact_Eh_theta_b_w_em = 6.172778e-05F;
-static const float solved_no_contact_Eh_theta_b_theta_d = 0.15753956F;
-static const float solved_no_contact_Eh_theta_b_theta_b = 0.84246045F;
-static const float solved_no_contact_Fh_w_w_w_w = 0.00049999973F;
-static const float solved_no_contact_Fh_w_em_w_em = 0.000499995F;
-static const float solved_no_contact_Fh_theta_d_w_w = -1.2499996e-07F;
-static const float solved_no_contact_Fh_theta_d_w_em = 1.5431995e-08F;
-static const float solved_no_contact_Fh_theta_d_theta_d = 0.0005F;
-static const float solved_no_contact_Fh_theta_b_w_w = -1.2499996e-07F;
-static const float solved_no_contact_Fh_theta_b_w_em = 1.5431995e-08F;
-static const float solved_no_contact_Fh_theta_b_theta_d = 4.050962e-05F;
-static const float solved_no_contact_Fh_theta_b_theta_b = 0.00045949037F;
-static const float solved_coast_contact_A_w_w_w_w = -0.13190235F;
-static const float solved_coast_contact_A_w_w_w_em = 0.016014779F;
-static const float solved_coast_contact_A_w_w_theta_d = 44.47533F;
-static const float solved_coast_contact_A_w_w_theta_b = -44.47533F;
-static const float solved_coast_contact_A_w_em_w_w = 34.567898F;
-static const float solved_coast_contact_A_w_em_w_em = -4.3076415F;
-static const float solved_coast_contact_A_w_em_theta_d = -11851.852F;
-static const float solved_coast_contact_A_w_em_theta_b = 11851.852F;
-static const float solved_coast_contact_A_theta_d_w_w = -1.0F;
-static const float solved_coast_contact_A_theta_d_w_em = 0.12345678F;
-static const float solved_coast_contact_E_w_w_w_w = 0.9998462F;
-static const float solved_coast_contact_E_w_w_w_em = 1.8716255e-05F;
-static const float solved_coast_contact_E_w_w_theta_d = 0.04436649F;
-static const float solved_coast_contact_E_w_w_theta_b = -0.04436649F;
-static const float solved_coast_contact_E_w_em_w_w = 0.040399037F;
-static const float solved_coast_contact_E_w_em_w_em = 0.9949725F;
-static const float solved_coast_contact_E_w_em_theta_d = -11.822623F;
-static const float solved_coast_contact_E_w_em_theta_b = 11.822623F;
-static const float solved_coast_contact_E_theta_d_w_w = -0.0009975528F;
-static const float solved_coast_contact_E_theta_d_w_em = 0.00012315232F;
-static const float solved_coast_contact_E_theta_d_theta_d = 0.9992474F;
-static const float solved_coast_contact_E_theta_d_theta_b = 0.00075262535F;
-static const float solved_coast_contact_E_theta_b_theta_b = 1.0F;
-static const float solved_coast_contact_F_w_w_w_w = 0.0009999267F;
-static const float solved_coast_contact_F_w_w_w_em = 8.908596e-09F;
-static const float solved_coast_contact_F_w_w_theta_d = 2.22023e-05F;
-static const float solved_coast_contact_F_w_w_theta_b = -2.22023e-05F;
-static const float solved_coast_contact_F_w_em_w_w = 1.9229203e-05F;
-static const float solved_coast_contact_F_w_em_w_em = 0.0009976061F;
-static const float solved_coast_contact_F_w_em_theta_d = -0.005916427F;
-static const float solved_coast_contact_F_w_em_theta_b = 0.005916427F;
-static const float solved_coast_contact_F_theta_d_w_w = -4.992049e-07F;
-static const float solved_coast_contact_F_theta_d_w_em = 6.162945e-08F;
-static const float solved_coast_contact_F_theta_d_theta_d = 0.000999749F;
-static const float solved_coast_contact_F_theta_d_theta_b = 2.5098043e-07F;
-static const float solved_coast_contact_F_theta_b_theta_b = 0.001F;
-static const float solved_coast_contact_Eh_w_w_w_w = 0.9999286F;
-static const float solved_coast_contact_Eh_w_w_w_em = 8.683825e-06F;
-static const float solved_coast_contact_Eh_w_w_theta_d = 0.02221183F;
-static const float solved_coast_contact_Eh_w_w_theta_b = -0.02221183F;
-static const float solved_coast_contact_Eh_w_em_w_w = 0.018744035F;
-static const float solved_coast_contact_Eh_w_em_w_em = 0.99766594F;
-static const float solved_coast_contact_Eh_w_em_theta_d = -5.918985F;
-static const float solved_coast_contact_Eh_w_em_theta_b = 5.918985F;
-static const float solved_coast_contact_Eh_theta_d_w_w = -0.0004994191F;
-static const float solved_coast_contact_Eh_theta_d_w_em = 6.1656094e-05F;
-static const float solved_coast_contact_Eh_theta_d_theta_d = 0.9998117F;
-static const float solved_coast_contact_Eh_theta_d_theta_b = 0.00018831316F;
-static const float solved_coast_contact_Eh_theta_b_theta_b = 1.0F;
-static const float solved_coast_contact_Fh_w_w_w_w = 0.0004999826F;
-static const float solved_coast_contact_Fh_w_w_w_em = 2.1146298e-09F;
-static const float solved_coast_contact_Fh_w_w_theta_d = 5.5551677e-06F;
-static const float solved_coast_contact_Fh_w_w_theta_b = -5.5551677e-06F;
-static const float solved_coast_contact_Fh_w_em_w_w = 4.5644283e-06F;
-static const float solved_coast_contact_Fh_w_em_w_em = 0.0004994315F;
-static const float solved_coast_contact_Fh_w_em_theta_d = -0.0014803399F;
-static const float solved_coast_contact_Fh_w_em_theta_b = 0.0014803399F;
-static const float solved_coast_contact_Fh_theta_d_w_w = -1.2490447e-07F;
-static const float solved_coast_contact_Fh_theta_d_w_em = 1.5420207e-08F;
-static const float solved_coast_contact_Fh_theta_d_theta_d = 0.0004999686F;
-static const float solved_coast_contact_Fh_theta_d_theta_b = 3.139172e-08F;
-static const float solved_coast_contact_Fh_theta_b_theta_b = 0.0005F;
-static const float solved_drive_Phi_theta_d_theta_d = 0.9992474F;
-static const float solved_drive_Phi_theta_d_w_em = 0.00012315232F;
-static const float solved_drive_Phi_theta_d_w_w = -0.0009975494F;
-static const float solved_drive_Phi_w_em_theta_d = -11.822623F;
-static const float solved_drive_Phi_w_em_w_em = 0.9949725F;
-static const float solved_drive_Phi_w_em_w_w = 0.040398907F;
-static const float solved_drive_Phi_w_w_theta_d = 0.04436634F;
-static const float solved_drive_Phi_w_w_w_em = 1.8716195e-05F;
-static const float solved_drive_Phi_w_w_w_w = 0.9998394F;
-static const float solved_drive_Gamma_theta_d_T_em = 1.2325889e-06F;
-static const float solved_drive_Gamma_theta_d_T_br = 4.625469e-09F;
-static const float solved_drive_Gamma_w_em_T_em = 0.01995212F;
-static const float solved_drive_Gamma_w_em_T_br = -1.7817152e-07F;
-static const float solved_drive_Gamma_w_w_T_em = 1.7817152e-07F;
-static const float solved_drive_Gamma_w_w_T_br = -9.264984e-06F;
-static const float solved_drive_G_theta_d_w_em = 6.162945e-08F;
-static const float solved_drive_G_theta_d_w_w = -4.9920374e-07F;
-static const float solved_drive_G_w_em_w_em = 0.0009976061F;
-static const float solved_drive_G_w_em_w_w = 1.9229159e-05F;
-static const float solved_drive_G_w_w_w_em = 8.908576e-09F;
-static const float solved_drive_G_w_w_w_w = 0.0009999233F;
-static const float solved_drive_L_theta_d_y_em = -0.0008191604F;
-static const float solved_drive_L_theta_d_y_w = 0.00023729044F;
-static const float solved_drive_L_w_em_y_em = 0.22364394F;
-static const float solved_drive_L_w_em_y_w = -0.011516665F;
-static const float solved_drive_L_w_w_y_em = -0.00031990735F;
-static const float solved_drive_L_w_w_y_w = 0.01774584F;
-static const float solved_drive_f_w_w = -0.19926697F;
-static const float solved_coast_Phi_theta_d_theta_d = 0.9992474F;
-static const float solved_coast_Phi_theta_d_w_em = 0.00012315232F;
-static const float solved_coast_Phi_theta_d_w_w = -0.0009975494F;
-static const float solved_coast_Phi_w_em_theta_d = -11.822623F;
-static const float solved_coast_Phi_w_em_w_em = 0.9949725F;
-static const float solved_coast_Phi_w_em_w_w = 0.040398907F;
-static const float solved_coast_Phi_w_w_theta_d = 0.04436634F;
-static const float solved_coast_Phi_w_w_w_em = 1.8716195e-05F;
-static const float solved_coast_Phi_w_w_w_w = 0.9998394F;
-static const float solved_coast_Gamma_theta_d_T_em = 1.2325889e-06F;
-static const float solved_coast_Gamma_theta_d_T_br = 4.625469e-09F;
-static const float solved_coast_Gamma_w_em_T_em = 0.01995212F;
-static const float solved_coast_Gamma_w_em_T_br = -1.7817152e-07F;
-static const float solved_coast_Gamma_w_w_T_em = 1.7817152e-07F;
-static const float solved_coast_Gamma_w_w_T_br = -9.264984e-06F;
-static const float solved_coast_G_theta_d_w_em = 6.162945e-08F;
-static const float solved_coast_G_theta_d_w_w = -4.9920374e-07F;
-static const float solved_coast_G_w_em_w_em = 0.0009976061F;
-static const float solved_coast_G_w_em_w_w = 1.9229159e-05F;
-static const float solved_coast_G_w_w_w_em = 8.908576e-09F;
-static const float solved_coast_G_w_w_w_w = 0.0009999233F;
-static const float solved_coast_L_theta_d_y_em = -0.0008191604F;
-static const float solved_coast_L_theta_d_y_w = 0.00023729044F;
-static const float solved_coast_L_w_em_y_em = 0.22364394F;
-static const float solved_coast_L_w_em_y_w = -0.011516665F;
-static const float solved_coast_L_w_w_y_em = -0.00031990735F;
-static const float solved_coast_L_w_w_y_w = 0.01774584F;
-static const float solved_coast_f_w_w = -0.19926697F;
-static const float solved_stamp_J_em = 0.05F;
+const char estimator_float32_Version[] = estimator_float32_DIGEST;
 
-const estimator_float32_Cal estimator_float32_default_cal = {
+estimator_float32_CALIBRATION const volatile estimator_float32_Cal estimator_float32_default_cal = {
     .J_em = 0.05F,
+    .solved = {
+        .drive_contact_A_w_w_w_w = -0.13190235F,
+        .drive_contact_A_w_w_w_em = 0.016014779F,
+        .drive_contact_A_w_w_theta_d = 44.47533F,
+        .drive_contact_A_w_w_theta_b = -44.47533F,
+        .drive_contact_A_w_em_w_w = 34.567898F,
+        .drive_contact_A_w_em_w_em = -4.3076415F,
+        .drive_contact_A_w_em_theta_d = -11851.852F,
+        .drive_contact_A_w_em_theta_b = 11851.852F,
+        .drive_contact_A_theta_d_w_w = -1.0F,
+        .drive_contact_A_theta_d_w_em = 0.12345678F,
+        .drive_contact_E_w_w_w_w = 0.9998462F,
+        .drive_contact_E_w_w_w_em = 1.8716255e-05F,
+        .drive_contact_E_w_w_theta_d = 0.04436649F,
+        .drive_contact_E_w_w_theta_b = -0.04436649F,
+        .drive_contact_E_w_em_w_w = 0.040399037F,
+        .drive_contact_E_w_em_w_em = 0.9949725F,
+        .drive_contact_E_w_em_theta_d = -11.822623F,
+        .drive_contact_E_w_em_theta_b = 11.822623F,
+        .drive_contact_E_theta_d_w_w = -0.0009975528F,
+        .drive_contact_E_theta_d_w_em = 0.00012315232F,
+        .drive_contact_E_theta_d_theta_d = 0.9992474F,
+        .drive_contact_E_theta_d_theta_b = 0.00075262535F,
+        .drive_contact_E_theta_b_theta_b = 1.0F,
+        .drive_contact_F_w_w_w_w = 0.0009999267F,
+        .drive_contact_F_w_w_w_em = 8.908596e-09F,
+        .drive_contact_F_w_w_theta_d = 2.22023e-05F,
+        .drive_contact_F_w_w_theta_b = -2.22023e-05F,
+        .drive_contact_F_w_em_w_w = 1.9229203e-05F,
+        .drive_contact_F_w_em_w_em = 0.0009976061F,
+        .drive_contact_F_w_em_theta_d = -0.005916427F,
+        .drive_contact_F_w_em_theta_b = 0.005916427F,
+        .drive_contact_F_theta_d_w_w = -4.992049e-07F,
+        .drive_contact_F_theta_d_w_em = 6.162945e-08F,
+        .drive_contact_F_theta_d_theta_d = 0.000999749F,
+        .drive_contact_F_theta_d_theta_b = 2.5098043e-07F,
+        .drive_contact_F_theta_b_theta_b = 0.001F,
+        .drive_contact_Eh_w_w_w_w = 0.9999286F,
+        .drive_contact_Eh_w_w_w_em = 8.683825e-06F,
+        .drive_contact_Eh_w_w_theta_d = 0.02221183F,
+        .drive_contact_Eh_w_w_theta_b = -0.02221183F,
+        .drive_contact_Eh_w_em_w_w = 0.018744035F,
+        .drive_contact_Eh_w_em_w_em = 0.99766594F,
+        .drive_contact_Eh_w_em_theta_d = -5.918985F,
+        .drive_contact_Eh_w_em_theta_b = 5.918985F,
+        .drive_contact_Eh_theta_d_w_w = -0.0004994191F,
+        .drive_contact_Eh_theta_d_w_em = 6.1656094e-05F,
+        .drive_contact_Eh_theta_d_theta_d = 0.9998117F,
+        .drive_contact_Eh_theta_d_theta_b = 0.00018831316F,
+        .drive_contact_Eh_theta_b_theta_b = 1.0F,
+        .drive_contact_Fh_w_w_w_w = 0.0004999826F,
+        .drive_contact_Fh_w_w_w_em = 2.1146298e-09F,
+        .drive_contact_Fh_w_w_theta_d = 5.5551677e-06F,
+        .drive_contact_Fh_w_w_theta_b = -5.5551677e-06F,
+        .drive_contact_Fh_w_em_w_w = 4.5644283e-06F,
+        .drive_contact_Fh_w_em_w_em = 0.0004994315F,
+        .drive_contact_Fh_w_em_theta_d = -0.0014803399F,
+        .drive_contact_Fh_w_em_theta_b = 0.0014803399F,
+        .drive_contact_Fh_theta_d_w_w = -1.2490447e-07F,
+        .drive_contact_Fh_theta_d_w_em = 1.5420207e-08F,
+        .drive_contact_Fh_theta_d_theta_d = 0.0004999686F,
+        .drive_contact_Fh_theta_d_theta_b = 3.139172e-08F,
+        .drive_contact_Fh_theta_b_theta_b = 0.0005F,
+        .no_contact_A_w_w_w_w = -0.0021826385F,
+        .no_contact_A_w_em_w_em = -0.040000003F,
+        .no_contact_A_theta_d_w_w = -1.0F,
+        .no_contact_A_theta_d_w_em = 0.12345678F,
+        .no_contact_A_theta_b_w_w = -1.0F,
+        .no_contact_A_theta_b_w_em = 0.12345678F,
+        .no_contact_A_theta_b_theta_d = 342.85715F,
+        .no_contact_A_theta_b_theta_b = -342.85715F,
+        .no_contact_E_w_w_w_w = 0.9999978F,
+        .no_contact_E_w_em_w_em = 0.99996F,
+        .no_contact_E_theta_d_w_w = -0.0009999989F,
+        .no_contact_E_theta_d_w_em = 0.00012345432F,
+        .no_contact_E_theta_d_theta_d = 1.0F,
+        .no_contact_E_theta_b_w_w = -0.0009999989F,
+        .no_contact_E_theta_b_w_em = 0.00012345432F,
+        .no_contact_E_theta_b_theta_d = 0.2902604F,
+        .no_contact_E_theta_b_theta_b = 0.7097396F,
+        .no_contact_F_w_w_w_w = 0.0009999989F,
+        .no_contact_F_w_em_w_em = 0.00099998F,
+        .no_contact_F_theta_d_w_w = -4.9999966e-07F,
+        .no_contact_F_theta_d_w_em = 6.172757e-08F,
+        .no_contact_F_theta_d_theta_d = 0.001F,
+        .no_contact_F_theta_b_w_w = -4.9999966e-07F,
+        .no_contact_F_theta_b_w_em = 6.172757e-08F,
+        .no_contact_F_theta_b_theta_d = 0.00015340715F,
+        .no_contact_F_theta_b_theta_b = 0.0008465928F,
+        .no_contact_Eh_w_w_w_w = 0.9999989F,
+        .no_contact_Eh_w_em_w_em = 0.99998F,
+        .no_contact_Eh_theta_d_w_w = -0.00049999973F,
+        .no_contact_Eh_theta_d_w_em = 6.172778e-05F,
+        .no_contact_Eh_theta_d_theta_d = 1.0F,
+        .no_contact_Eh_theta_b_w_w = -0.00049999973F,
+        .no_contact_Eh_theta_b_w_em = 6.172778e-05F,
+        .no_contact_Eh_theta_b_theta_d = 0.15753956F,
+        .no_contact_Eh_theta_b_theta_b = 0.84246045F,
+        .no_contact_Fh_w_w_w_w = 0.00049999973F,
+        .no_contact_Fh_w_em_w_em = 0.000499995F,
+        .no_contact_Fh_theta_d_w_w = -1.2499996e-07F,
+        .no_contact_Fh_theta_d_w_em = 1.5431995e-08F,
+        .no_contact_Fh_theta_d_theta_d = 0.0005F,
+        .no_contact_Fh_theta_b_w_w = -1.2499996e-07F,
+        .no_contact_Fh_theta_b_w_em = 1.5431995e-08F,
+        .no_contact_Fh_theta_b_theta_d = 4.050962e-05F,
+        .no_contact_Fh_theta_b_theta_b = 0.00045949037F,
+        .coast_contact_A_w_w_w_w = -0.13190235F,
+        .coast_contact_A_w_w_w_em = 0.016014779F,
+        .coast_contact_A_w_w_theta_d = 44.47533F,
+        .coast_contact_A_w_w_theta_b = -44.47533F,
+        .coast_contact_A_w_em_w_w = 34.567898F,
+        .coast_contact_A_w_em_w_em = -4.3076415F,
+        .coast_contact_A_w_em_theta_d = -11851.852F,
+        .coast_contact_A_w_em_theta_b = 11851.852F,
+        .coast_contact_A_theta_d_w_w = -1.0F,
+        .coast_contact_A_theta_d_w_em = 0.12345678F,
+        .coast_contact_E_w_w_w_w = 0.9998462F,
+        .coast_contact_E_w_w_w_em = 1.8716255e-05F,
+        .coast_contact_E_w_w_theta_d = 0.04436649F,
+        .coast_contact_E_w_w_theta_b = -0.04436649F,
+        .coast_contact_E_w_em_w_w = 0.040399037F,
+        .coast_contact_E_w_em_w_em = 0.9949725F,
+        .coast_contact_E_w_em_theta_d = -11.822623F,
+        .coast_contact_E_w_em_theta_b = 11.822623F,
+        .coast_contact_E_theta_d_w_w = -0.0009975528F,
+        .coast_contact_E_theta_d_w_em = 0.00012315232F,
+        .coast_contact_E_theta_d_theta_d = 0.9992474F,
+        .coast_contact_E_theta_d_theta_b = 0.00075262535F,
+        .coast_contact_E_theta_b_theta_b = 1.0F,
+        .coast_contact_F_w_w_w_w = 0.0009999267F,
+        .coast_contact_F_w_w_w_em = 8.908596e-09F,
+        .coast_contact_F_w_w_theta_d = 2.22023e-05F,
+        .coast_contact_F_w_w_theta_b = -2.22023e-05F,
+        .coast_contact_F_w_em_w_w = 1.9229203e-05F,
+        .coast_contact_F_w_em_w_em = 0.0009976061F,
+        .coast_contact_F_w_em_theta_d = -0.005916427F,
+        .coast_contact_F_w_em_theta_b = 0.005916427F,
+        .coast_contact_F_theta_d_w_w = -4.992049e-07F,
+        .coast_contact_F_theta_d_w_em = 6.162945e-08F,
+        .coast_contact_F_theta_d_theta_d = 0.000999749F,
+        .coast_contact_F_theta_d_theta_b = 2.5098043e-07F,
+        .coast_contact_F_theta_b_theta_b = 0.001F,
+        .coast_contact_Eh_w_w_w_w = 0.9999286F,
+        .coast_contact_Eh_w_w_w_em = 8.683825e-06F,
+        .coast_contact_Eh_w_w_theta_d = 0.02221183F,
+        .coast_contact_Eh_w_w_theta_b = -0.02221183F,
+        .coast_contact_Eh_w_em_w_w = 0.018744035F,
+        .coast_contact_Eh_w_em_w_em = 0.99766594F,
+        .coast_contact_Eh_w_em_theta_d = -5.918985F,
+        .coast_contact_Eh_w_em_theta_b = 5.918985F,
+        .coast_contact_Eh_theta_d_w_w = -0.0004994191F,
+        .coast_contact_Eh_theta_d_w_em = 6.1656094e-05F,
+        .coast_contact_Eh_theta_d_theta_d = 0.9998117F,
+        .coast_contact_Eh_theta_d_theta_b = 0.00018831316F,
+        .coast_contact_Eh_theta_b_theta_b = 1.0F,
+        .coast_contact_Fh_w_w_w_w = 0.0004999826F,
+        .coast_contact_Fh_w_w_w_em = 2.1146298e-09F,
+        .coast_contact_Fh_w_w_theta_d = 5.5551677e-06F,
+        .coast_contact_Fh_w_w_theta_b = -5.5551677e-06F,
+        .coast_contact_Fh_w_em_w_w = 4.5644283e-06F,
+        .coast_contact_Fh_w_em_w_em = 0.0004994315F,
+        .coast_contact_Fh_w_em_theta_d = -0.0014803399F,
+        .coast_contact_Fh_w_em_theta_b = 0.0014803399F,
+        .coast_contact_Fh_theta_d_w_w = -1.2490447e-07F,
+        .coast_contact_Fh_theta_d_w_em = 1.5420207e-08F,
+        .coast_contact_Fh_theta_d_theta_d = 0.0004999686F,
+        .coast_contact_Fh_theta_d_theta_b = 3.139172e-08F,
+        .coast_contact_Fh_theta_b_theta_b = 0.0005F,
+        .drive_Phi_theta_d_theta_d = 0.9992474F,
+        .drive_Phi_theta_d_w_em = 0.00012315232F,
+        .drive_Phi_theta_d_w_w = -0.0009975494F,
+        .drive_Phi_w_em_theta_d = -11.822623F,
+        .drive_Phi_w_em_w_em = 0.9949725F,
+        .drive_Phi_w_em_w_w = 0.040398907F,
+        .drive_Phi_w_w_theta_d = 0.04436634F,
+        .drive_Phi_w_w_w_em = 1.8716195e-05F,
+        .drive_Phi_w_w_w_w = 0.9998394F,
+        .drive_Gamma_theta_d_T_em = 1.2325889e-06F,
+        .drive_Gamma_theta_d_T_br = 4.625469e-09F,
+        .drive_Gamma_w_em_T_em = 0.01995212F,
+        .drive_Gamma_w_em_T_br = -1.7817152e-07F,
+        .drive_Gamma_w_w_T_em = 1.7817152e-07F,
+        .drive_Gamma_w_w_T_br = -9.264984e-06F,
+        .drive_G_theta_d_w_em = 6.162945e-08F,
+        .drive_G_theta_d_w_w = -4.9920374e-07F,
+        .drive_G_w_em_w_em = 0.0009976061F,
+        .drive_G_w_em_w_w = 1.9229159e-05F,
+        .drive_G_w_w_w_em = 8.908576e-09F,
+        .drive_G_w_w_w_w = 0.0009999233F,
+        .drive_L_theta_d_y_em = -0.0008191604F,
+        .drive_L_theta_d_y_w = 0.00023729044F,
+        .drive_L_w_em_y_em = 0.22364394F,
+        .drive_L_w_em_y_w = -0.011516665F,
+        .drive_L_w_w_y_em = -0.00031990735F,
+        .drive_L_w_w_y_w = 0.01774584F,
+        .drive_f_w_w = -0.19926697F,
+        .coast_Phi_theta_d_theta_d = 0.9992474F,
+        .coast_Phi_theta_d_w_em = 0.00012315232F,
+        .coast_Phi_theta_d_w_w = -0.0009975494F,
+        .coast_Phi_w_em_theta_d = -11.822623F,
+        .coast_Phi_w_em_w_em = 0.9949725F,
+        .coast_Phi_w_em_w_w = 0.040398907F,
+        .coast_Phi_w_w_theta_d = 0.04436634F,
+        .coast_Phi_w_w_w_em = 1.8716195e-05F,
+        .coast_Phi_w_w_w_w = 0.9998394F,
+        .coast_Gamma_theta_d_T_em = 1.2325889e-06F,
+        .coast_Gamma_theta_d_T_br = 4.625469e-09F,
+        .coast_Gamma_w_em_T_em = 0.01995212F,
+        .coast_Gamma_w_em_T_br = -1.7817152e-07F,
+        .coast_Gamma_w_w_T_em = 1.7817152e-07F,
+        .coast_Gamma_w_w_T_br = -9.264984e-06F,
+        .coast_G_theta_d_w_em = 6.162945e-08F,
+        .coast_G_theta_d_w_w = -4.9920374e-07F,
+        .coast_G_w_em_w_em = 0.0009976061F,
+        .coast_G_w_em_w_w = 1.9229159e-05F,
+        .coast_G_w_w_w_em = 8.908576e-09F,
+        .coast_G_w_w_w_w = 0.0009999233F,
+        .coast_L_theta_d_y_em = -0.0008191604F,
+        .coast_L_theta_d_y_w = 0.00023729044F,
+        .coast_L_w_em_y_em = 0.22364394F,
+        .coast_L_w_em_y_w = -0.011516665F,
+        .coast_L_w_w_y_em = -0.00031990735F,
+        .coast_L_w_w_y_w = 0.01774584F,
+        .coast_f_w_w = -0.19926697F,
+        .stamp_J_em = 0.05F,
+    },
 };
 
 /* Values that live within one step */
@@ -459,33 +462,36 @@ static inline void guards_coast_contact(Work *work)
     work->guard_0 = at_w_free > 0.0F;
 }
 
-static inline void series_drive_contact(const estimator_float32_Self *self, Work *work)
+static inline void series_drive_contact(const estimator_float32_Self *self,
+    const volatile estimator_float32_Cal *cal, Work *work)
 {
     work->order = 1.0F;
-    work->series_w_w[0] = (solved_drive_contact_A_w_w_w_w * self->state.w_w)
-        + (solved_drive_contact_A_w_w_w_em * self->state.w_em)
-        + (solved_drive_contact_A_w_w_theta_d * self->state.theta_d)
-        + (solved_drive_contact_A_w_w_theta_b * self->state.theta_b) + work->pull_w_w;
-    work->series_w_em[0] = (solved_drive_contact_A_w_em_w_w * self->state.w_w)
-        + (solved_drive_contact_A_w_em_w_em * self->state.w_em)
-        + (solved_drive_contact_A_w_em_theta_d * self->state.theta_d)
-        + (solved_drive_contact_A_w_em_theta_b * self->state.theta_b) + work->pull_w_em;
-    work->series_theta_d[0] = (solved_drive_contact_A_theta_d_w_w * self->state.w_w)
-        + (solved_drive_contact_A_theta_d_w_em * self->state.w_em) + work->pull_theta_d;
+    work->series_w_w[0] = (cal->solved.drive_contact_A_w_w_w_w * self->state.w_w)
+        + (cal->solved.drive_contact_A_w_w_w_em * self->state.w_em)
+        + (cal->solved.drive_contact_A_w_w_theta_d * self->state.theta_d)
+        + (cal->solved.drive_contact_A_w_w_theta_b * self->state.theta_b) + work->pull_w_w;
+    work->series_w_em[0] = (cal->solved.drive_contact_A_w_em_w_w * self->state.w_w)
+        + (cal->solved.drive_contact_A_w_em_w_em * self->state.w_em)
+        + (cal->solved.drive_contact_A_w_em_theta_d * self->state.theta_d)
+        + (cal->solved.drive_contact_A_w_em_theta_b * self->state.theta_b) + work->pull_w_em;
+    work->series_theta_d[0] = (cal->solved.drive_contact_A_theta_d_w_w * self->state.w_w)
+        + (cal->solved.drive_contact_A_theta_d_w_em * self->state.w_em) + work->pull_theta_d;
     work->series_theta_b[0] = work->pull_theta_b;
     for (int32_t term = 0; term < 16; term++) {
         work->order = work->order + 1.0F;
-        work->series_w_w[term + 1] = ((solved_drive_contact_A_w_w_w_w * work->series_w_w[term])
-            + (solved_drive_contact_A_w_w_w_em * work->series_w_em[term])
-            + (solved_drive_contact_A_w_w_theta_d * work->series_theta_d[term])
-            + (solved_drive_contact_A_w_w_theta_b * work->series_theta_b[term])) / work->order;
-        work->series_w_em[term + 1] = ((solved_drive_contact_A_w_em_w_w * work->series_w_w[term])
-            + (solved_drive_contact_A_w_em_w_em * work->series_w_em[term])
-            + (solved_drive_contact_A_w_em_theta_d * work->series_theta_d[term])
-            + (solved_drive_contact_A_w_em_theta_b * work->series_theta_b[term])) / work->order;
+        work->series_w_w[term + 1] =
+            ((cal->solved.drive_contact_A_w_w_w_w * work->series_w_w[term])
+            + (cal->solved.drive_contact_A_w_w_w_em * work->series_w_em[term])
+            + (cal->solved.drive_contact_A_w_w_theta_d * work->series_theta_d[term])
+            + (cal->solved.drive_contact_A_w_w_theta_b * work->series_theta_b[term])) / work->order;
+        work->series_w_em[term + 1] =
+            ((cal->solved.drive_contact_A_w_em_w_w * work->series_w_w[term])
+            + (cal->solved.drive_contact_A_w_em_w_em * work->series_w_em[term])
+            + (cal->solved.drive_contact_A_w_em_theta_d * work->series_theta_d[term])
+            + (cal->solved.drive_contact_A_w_em_theta_b * work->series_theta_b[term])) / work->order;
         work->series_theta_d[term + 1] =
-            ((solved_drive_contact_A_theta_d_w_w * work->series_w_w[term])
-            + (solved_drive_contact_A_theta_d_w_em * work->series_w_em[term])) / work->order;
+            ((cal->solved.drive_contact_A_theta_d_w_w * work->series_w_w[term])
+            + (cal->solved.drive_contact_A_theta_d_w_em * work->series_w_em[term])) / work->order;
         work->series_theta_b[term + 1] = 0.0F / work->order;
     }
 }
@@ -508,97 +514,100 @@ static inline void point(const estimator_float32_Self *self, Work *work)
     work->at_theta_b = self->state.theta_b + (work->s * work->sum_theta_b);
 }
 
-static inline void step_drive_contact(const estimator_float32_Self *self, Work *work)
+static inline void step_drive_contact(const estimator_float32_Self *self,
+    const volatile estimator_float32_Cal *cal, Work *work)
 {
     work->at_w_w = self->state.w_w;
     work->at_w_em = self->state.w_em;
     work->at_theta_d = self->state.theta_d;
     work->at_theta_b = self->state.theta_b;
     rates_drive_contact(self, work);
-    work->pull_w_w = work->rate_w_w - ((solved_drive_contact_A_w_w_w_w * work->at_w_w)
-        + (solved_drive_contact_A_w_w_w_em * work->at_w_em)
-        + (solved_drive_contact_A_w_w_theta_d * work->at_theta_d)
-        + (solved_drive_contact_A_w_w_theta_b * work->at_theta_b));
-    work->pull_w_em = work->rate_w_em - ((solved_drive_contact_A_w_em_w_w * work->at_w_w)
-        + (solved_drive_contact_A_w_em_w_em * work->at_w_em)
-        + (solved_drive_contact_A_w_em_theta_d * work->at_theta_d)
-        + (solved_drive_contact_A_w_em_theta_b * work->at_theta_b));
-    work->pull_theta_d = work->rate_theta_d - ((solved_drive_contact_A_theta_d_w_w * work->at_w_w)
-        + (solved_drive_contact_A_theta_d_w_em * work->at_w_em));
+    work->pull_w_w = work->rate_w_w - ((cal->solved.drive_contact_A_w_w_w_w * work->at_w_w)
+        + (cal->solved.drive_contact_A_w_w_w_em * work->at_w_em)
+        + (cal->solved.drive_contact_A_w_w_theta_d * work->at_theta_d)
+        + (cal->solved.drive_contact_A_w_w_theta_b * work->at_theta_b));
+    work->pull_w_em = work->rate_w_em - ((cal->solved.drive_contact_A_w_em_w_w * work->at_w_w)
+        + (cal->solved.drive_contact_A_w_em_w_em * work->at_w_em)
+        + (cal->solved.drive_contact_A_w_em_theta_d * work->at_theta_d)
+        + (cal->solved.drive_contact_A_w_em_theta_b * work->at_theta_b));
+    work->pull_theta_d =
+        work->rate_theta_d - ((cal->solved.drive_contact_A_theta_d_w_w * work->at_w_w)
+        + (cal->solved.drive_contact_A_theta_d_w_em * work->at_w_em));
     work->pull_theta_b = work->rate_theta_b;
     if (work->h == 0.001F) {
-        work->at_w_w = (solved_drive_contact_Eh_w_w_w_w * self->state.w_w)
-            + (solved_drive_contact_Eh_w_w_w_em * self->state.w_em)
-            + (solved_drive_contact_Eh_w_w_theta_d * self->state.theta_d)
-            + (solved_drive_contact_Eh_w_w_theta_b * self->state.theta_b)
-            + (solved_drive_contact_Fh_w_w_w_w * work->pull_w_w)
-            + (solved_drive_contact_Fh_w_w_w_em * work->pull_w_em)
-            + (solved_drive_contact_Fh_w_w_theta_d * work->pull_theta_d)
-            + (solved_drive_contact_Fh_w_w_theta_b * work->pull_theta_b);
-        work->at_w_em = (solved_drive_contact_Eh_w_em_w_w * self->state.w_w)
-            + (solved_drive_contact_Eh_w_em_w_em * self->state.w_em)
-            + (solved_drive_contact_Eh_w_em_theta_d * self->state.theta_d)
-            + (solved_drive_contact_Eh_w_em_theta_b * self->state.theta_b)
-            + (solved_drive_contact_Fh_w_em_w_w * work->pull_w_w)
-            + (solved_drive_contact_Fh_w_em_w_em * work->pull_w_em)
-            + (solved_drive_contact_Fh_w_em_theta_d * work->pull_theta_d)
-            + (solved_drive_contact_Fh_w_em_theta_b * work->pull_theta_b);
-        work->at_theta_d = (solved_drive_contact_Eh_theta_d_w_w * self->state.w_w)
-            + (solved_drive_contact_Eh_theta_d_w_em * self->state.w_em)
-            + (solved_drive_contact_Eh_theta_d_theta_d * self->state.theta_d)
-            + (solved_drive_contact_Eh_theta_d_theta_b * self->state.theta_b)
-            + (solved_drive_contact_Fh_theta_d_w_w * work->pull_w_w)
-            + (solved_drive_contact_Fh_theta_d_w_em * work->pull_w_em)
-            + (solved_drive_contact_Fh_theta_d_theta_d * work->pull_theta_d)
-            + (solved_drive_contact_Fh_theta_d_theta_b * work->pull_theta_b);
-        work->at_theta_b = (solved_drive_contact_Eh_theta_b_theta_b * self->state.theta_b)
-            + (solved_drive_contact_Fh_theta_b_theta_b * work->pull_theta_b);
+        work->at_w_w = (cal->solved.drive_contact_Eh_w_w_w_w * self->state.w_w)
+            + (cal->solved.drive_contact_Eh_w_w_w_em * self->state.w_em)
+            + (cal->solved.drive_contact_Eh_w_w_theta_d * self->state.theta_d)
+            + (cal->solved.drive_contact_Eh_w_w_theta_b * self->state.theta_b)
+            + (cal->solved.drive_contact_Fh_w_w_w_w * work->pull_w_w)
+            + (cal->solved.drive_contact_Fh_w_w_w_em * work->pull_w_em)
+            + (cal->solved.drive_contact_Fh_w_w_theta_d * work->pull_theta_d)
+            + (cal->solved.drive_contact_Fh_w_w_theta_b * work->pull_theta_b);
+        work->at_w_em = (cal->solved.drive_contact_Eh_w_em_w_w * self->state.w_w)
+            + (cal->solved.drive_contact_Eh_w_em_w_em * self->state.w_em)
+            + (cal->solved.drive_contact_Eh_w_em_theta_d * self->state.theta_d)
+            + (cal->solved.drive_contact_Eh_w_em_theta_b * self->state.theta_b)
+            + (cal->solved.drive_contact_Fh_w_em_w_w * work->pull_w_w)
+            + (cal->solved.drive_contact_Fh_w_em_w_em * work->pull_w_em)
+            + (cal->solved.drive_contact_Fh_w_em_theta_d * work->pull_theta_d)
+            + (cal->solved.drive_contact_Fh_w_em_theta_b * work->pull_theta_b);
+        work->at_theta_d = (cal->solved.drive_contact_Eh_theta_d_w_w * self->state.w_w)
+            + (cal->solved.drive_contact_Eh_theta_d_w_em * self->state.w_em)
+            + (cal->solved.drive_contact_Eh_theta_d_theta_d * self->state.theta_d)
+            + (cal->solved.drive_contact_Eh_theta_d_theta_b * self->state.theta_b)
+            + (cal->solved.drive_contact_Fh_theta_d_w_w * work->pull_w_w)
+            + (cal->solved.drive_contact_Fh_theta_d_w_em * work->pull_w_em)
+            + (cal->solved.drive_contact_Fh_theta_d_theta_d * work->pull_theta_d)
+            + (cal->solved.drive_contact_Fh_theta_d_theta_b * work->pull_theta_b);
+        work->at_theta_b = (cal->solved.drive_contact_Eh_theta_b_theta_b * self->state.theta_b)
+            + (cal->solved.drive_contact_Fh_theta_b_theta_b * work->pull_theta_b);
     } else {
-        series_drive_contact(self, work);
+        series_drive_contact(self, cal, work);
         work->s = 0.5F * work->h;
         point(self, work);
     }
     rates_drive_contact(self, work);
-    work->pull_w_w = work->rate_w_w - ((solved_drive_contact_A_w_w_w_w * work->at_w_w)
-        + (solved_drive_contact_A_w_w_w_em * work->at_w_em)
-        + (solved_drive_contact_A_w_w_theta_d * work->at_theta_d)
-        + (solved_drive_contact_A_w_w_theta_b * work->at_theta_b));
-    work->pull_w_em = work->rate_w_em - ((solved_drive_contact_A_w_em_w_w * work->at_w_w)
-        + (solved_drive_contact_A_w_em_w_em * work->at_w_em)
-        + (solved_drive_contact_A_w_em_theta_d * work->at_theta_d)
-        + (solved_drive_contact_A_w_em_theta_b * work->at_theta_b));
-    work->pull_theta_d = work->rate_theta_d - ((solved_drive_contact_A_theta_d_w_w * work->at_w_w)
-        + (solved_drive_contact_A_theta_d_w_em * work->at_w_em));
+    work->pull_w_w = work->rate_w_w - ((cal->solved.drive_contact_A_w_w_w_w * work->at_w_w)
+        + (cal->solved.drive_contact_A_w_w_w_em * work->at_w_em)
+        + (cal->solved.drive_contact_A_w_w_theta_d * work->at_theta_d)
+        + (cal->solved.drive_contact_A_w_w_theta_b * work->at_theta_b));
+    work->pull_w_em = work->rate_w_em - ((cal->solved.drive_contact_A_w_em_w_w * work->at_w_w)
+        + (cal->solved.drive_contact_A_w_em_w_em * work->at_w_em)
+        + (cal->solved.drive_contact_A_w_em_theta_d * work->at_theta_d)
+        + (cal->solved.drive_contact_A_w_em_theta_b * work->at_theta_b));
+    work->pull_theta_d =
+        work->rate_theta_d - ((cal->solved.drive_contact_A_theta_d_w_w * work->at_w_w)
+        + (cal->solved.drive_contact_A_theta_d_w_em * work->at_w_em));
     work->pull_theta_b = work->rate_theta_b;
     if (work->h == 0.001F) {
-        work->end_w_w = (solved_drive_contact_E_w_w_w_w * self->state.w_w)
-            + (solved_drive_contact_E_w_w_w_em * self->state.w_em)
-            + (solved_drive_contact_E_w_w_theta_d * self->state.theta_d)
-            + (solved_drive_contact_E_w_w_theta_b * self->state.theta_b)
-            + (solved_drive_contact_F_w_w_w_w * work->pull_w_w)
-            + (solved_drive_contact_F_w_w_w_em * work->pull_w_em)
-            + (solved_drive_contact_F_w_w_theta_d * work->pull_theta_d)
-            + (solved_drive_contact_F_w_w_theta_b * work->pull_theta_b);
-        work->end_w_em = (solved_drive_contact_E_w_em_w_w * self->state.w_w)
-            + (solved_drive_contact_E_w_em_w_em * self->state.w_em)
-            + (solved_drive_contact_E_w_em_theta_d * self->state.theta_d)
-            + (solved_drive_contact_E_w_em_theta_b * self->state.theta_b)
-            + (solved_drive_contact_F_w_em_w_w * work->pull_w_w)
-            + (solved_drive_contact_F_w_em_w_em * work->pull_w_em)
-            + (solved_drive_contact_F_w_em_theta_d * work->pull_theta_d)
-            + (solved_drive_contact_F_w_em_theta_b * work->pull_theta_b);
-        work->end_theta_d = (solved_drive_contact_E_theta_d_w_w * self->state.w_w)
-            + (solved_drive_contact_E_theta_d_w_em * self->state.w_em)
-            + (solved_drive_contact_E_theta_d_theta_d * self->state.theta_d)
-            + (solved_drive_contact_E_theta_d_theta_b * self->state.theta_b)
-            + (solved_drive_contact_F_theta_d_w_w * work->pull_w_w)
-            + (solved_drive_contact_F_theta_d_w_em * work->pull_w_em)
-            + (solved_drive_contact_F_theta_d_theta_d * work->pull_theta_d)
-            + (solved_drive_contact_F_theta_d_theta_b * work->pull_theta_b);
-        work->end_theta_b = (solved_drive_contact_E_theta_b_theta_b * self->state.theta_b)
-            + (solved_drive_contact_F_theta_b_theta_b * work->pull_theta_b);
+        work->end_w_w = (cal->solved.drive_contact_E_w_w_w_w * self->state.w_w)
+            + (cal->solved.drive_contact_E_w_w_w_em * self->state.w_em)
+            + (cal->solved.drive_contact_E_w_w_theta_d * self->state.theta_d)
+            + (cal->solved.drive_contact_E_w_w_theta_b * self->state.theta_b)
+            + (cal->solved.drive_contact_F_w_w_w_w * work->pull_w_w)
+            + (cal->solved.drive_contact_F_w_w_w_em * work->pull_w_em)
+            + (cal->solved.drive_contact_F_w_w_theta_d * work->pull_theta_d)
+            + (cal->solved.drive_contact_F_w_w_theta_b * work->pull_theta_b);
+        work->end_w_em = (cal->solved.drive_contact_E_w_em_w_w * self->state.w_w)
+            + (cal->solved.drive_contact_E_w_em_w_em * self->state.w_em)
+            + (cal->solved.drive_contact_E_w_em_theta_d * self->state.theta_d)
+            + (cal->solved.drive_contact_E_w_em_theta_b * self->state.theta_b)
+            + (cal->solved.drive_contact_F_w_em_w_w * work->pull_w_w)
+            + (cal->solved.drive_contact_F_w_em_w_em * work->pull_w_em)
+            + (cal->solved.drive_contact_F_w_em_theta_d * work->pull_theta_d)
+            + (cal->solved.drive_contact_F_w_em_theta_b * work->pull_theta_b);
+        work->end_theta_d = (cal->solved.drive_contact_E_theta_d_w_w * self->state.w_w)
+            + (cal->solved.drive_contact_E_theta_d_w_em * self->state.w_em)
+            + (cal->solved.drive_contact_E_theta_d_theta_d * self->state.theta_d)
+            + (cal->solved.drive_contact_E_theta_d_theta_b * self->state.theta_b)
+            + (cal->solved.drive_contact_F_theta_d_w_w * work->pull_w_w)
+            + (cal->solved.drive_contact_F_theta_d_w_em * work->pull_w_em)
+            + (cal->solved.drive_contact_F_theta_d_theta_d * work->pull_theta_d)
+            + (cal->solved.drive_contact_F_theta_d_theta_b * work->pull_theta_b);
+        work->end_theta_b = (cal->solved.drive_contact_E_theta_b_theta_b * self->state.theta_b)
+            + (cal->solved.drive_contact_F_theta_b_theta_b * work->pull_theta_b);
     } else {
-        series_drive_contact(self, work);
+        series_drive_contact(self, cal, work);
         work->s = work->h;
         point(self, work);
         work->end_w_w = work->at_w_w;
@@ -608,103 +617,110 @@ static inline void step_drive_contact(const estimator_float32_Self *self, Work *
     }
 }
 
-static inline void series_no_contact(const estimator_float32_Self *self, Work *work)
+static inline void series_no_contact(const estimator_float32_Self *self,
+    const volatile estimator_float32_Cal *cal, Work *work)
 {
     work->order = 1.0F;
-    work->series_w_w[0] = (solved_no_contact_A_w_w_w_w * self->state.w_w) + work->pull_w_w;
-    work->series_w_em[0] = (solved_no_contact_A_w_em_w_em * self->state.w_em) + work->pull_w_em;
-    work->series_theta_d[0] = (solved_no_contact_A_theta_d_w_w * self->state.w_w)
-        + (solved_no_contact_A_theta_d_w_em * self->state.w_em) + work->pull_theta_d;
-    work->series_theta_b[0] = (solved_no_contact_A_theta_b_w_w * self->state.w_w)
-        + (solved_no_contact_A_theta_b_w_em * self->state.w_em)
-        + (solved_no_contact_A_theta_b_theta_d * self->state.theta_d)
-        + (solved_no_contact_A_theta_b_theta_b * self->state.theta_b) + work->pull_theta_b;
+    work->series_w_w[0] = (cal->solved.no_contact_A_w_w_w_w * self->state.w_w) + work->pull_w_w;
+    work->series_w_em[0] =
+        (cal->solved.no_contact_A_w_em_w_em * self->state.w_em) + work->pull_w_em;
+    work->series_theta_d[0] = (cal->solved.no_contact_A_theta_d_w_w * self->state.w_w)
+        + (cal->solved.no_contact_A_theta_d_w_em * self->state.w_em) + work->pull_theta_d;
+    work->series_theta_b[0] = (cal->solved.no_contact_A_theta_b_w_w * self->state.w_w)
+        + (cal->solved.no_contact_A_theta_b_w_em * self->state.w_em)
+        + (cal->solved.no_contact_A_theta_b_theta_d * self->state.theta_d)
+        + (cal->solved.no_contact_A_theta_b_theta_b * self->state.theta_b) + work->pull_theta_b;
     for (int32_t term = 0; term < 16; term++) {
         work->order = work->order + 1.0F;
         work->series_w_w[term + 1] =
-            solved_no_contact_A_w_w_w_w * work->series_w_w[term] / work->order;
+            cal->solved.no_contact_A_w_w_w_w * work->series_w_w[term] / work->order;
         work->series_w_em[term + 1] =
-            solved_no_contact_A_w_em_w_em * work->series_w_em[term] / work->order;
+            cal->solved.no_contact_A_w_em_w_em * work->series_w_em[term] / work->order;
         work->series_theta_d[term + 1] =
-            ((solved_no_contact_A_theta_d_w_w * work->series_w_w[term])
-            + (solved_no_contact_A_theta_d_w_em * work->series_w_em[term])) / work->order;
+            ((cal->solved.no_contact_A_theta_d_w_w * work->series_w_w[term])
+            + (cal->solved.no_contact_A_theta_d_w_em * work->series_w_em[term])) / work->order;
         work->series_theta_b[term + 1] =
-            ((solved_no_contact_A_theta_b_w_w * work->series_w_w[term])
-            + (solved_no_contact_A_theta_b_w_em * work->series_w_em[term])
-            + (solved_no_contact_A_theta_b_theta_d * work->series_theta_d[term])
-            + (solved_no_contact_A_theta_b_theta_b * work->series_theta_b[term])) / work->order;
+            ((cal->solved.no_contact_A_theta_b_w_w * work->series_w_w[term])
+            + (cal->solved.no_contact_A_theta_b_w_em * work->series_w_em[term])
+            + (cal->solved.no_contact_A_theta_b_theta_d * work->series_theta_d[term])
+            + (cal->solved.no_contact_A_theta_b_theta_b * work->series_theta_b[term])) / work->order;
     }
 }
 
-static inline void step_no_contact(const estimator_float32_Self *self, Work *work)
+static inline void step_no_contact(const estimator_float32_Self *self,
+    const volatile estimator_float32_Cal *cal, Work *work)
 {
     work->at_w_w = self->state.w_w;
     work->at_w_em = self->state.w_em;
     work->at_theta_d = self->state.theta_d;
     work->at_theta_b = self->state.theta_b;
     rates_no_contact(self, work);
-    work->pull_w_w = work->rate_w_w - (solved_no_contact_A_w_w_w_w * work->at_w_w);
-    work->pull_w_em = work->rate_w_em - (solved_no_contact_A_w_em_w_em * work->at_w_em);
-    work->pull_theta_d = work->rate_theta_d - ((solved_no_contact_A_theta_d_w_w * work->at_w_w)
-        + (solved_no_contact_A_theta_d_w_em * work->at_w_em));
-    work->pull_theta_b = work->rate_theta_b - ((solved_no_contact_A_theta_b_w_w * work->at_w_w)
-        + (solved_no_contact_A_theta_b_w_em * work->at_w_em)
-        + (solved_no_contact_A_theta_b_theta_d * work->at_theta_d)
-        + (solved_no_contact_A_theta_b_theta_b * work->at_theta_b));
+    work->pull_w_w = work->rate_w_w - (cal->solved.no_contact_A_w_w_w_w * work->at_w_w);
+    work->pull_w_em = work->rate_w_em - (cal->solved.no_contact_A_w_em_w_em * work->at_w_em);
+    work->pull_theta_d =
+        work->rate_theta_d - ((cal->solved.no_contact_A_theta_d_w_w * work->at_w_w)
+        + (cal->solved.no_contact_A_theta_d_w_em * work->at_w_em));
+    work->pull_theta_b =
+        work->rate_theta_b - ((cal->solved.no_contact_A_theta_b_w_w * work->at_w_w)
+        + (cal->solved.no_contact_A_theta_b_w_em * work->at_w_em)
+        + (cal->solved.no_contact_A_theta_b_theta_d * work->at_theta_d)
+        + (cal->solved.no_contact_A_theta_b_theta_b * work->at_theta_b));
     if (work->h == 0.001F) {
-        work->at_w_w = (solved_no_contact_Eh_w_w_w_w * self->state.w_w)
-            + (solved_no_contact_Fh_w_w_w_w * work->pull_w_w);
-        work->at_w_em = (solved_no_contact_Eh_w_em_w_em * self->state.w_em)
-            + (solved_no_contact_Fh_w_em_w_em * work->pull_w_em);
-        work->at_theta_d = (solved_no_contact_Eh_theta_d_w_w * self->state.w_w)
-            + (solved_no_contact_Eh_theta_d_w_em * self->state.w_em)
-            + (solved_no_contact_Eh_theta_d_theta_d * self->state.theta_d)
-            + (solved_no_contact_Fh_theta_d_w_w * work->pull_w_w)
-            + (solved_no_contact_Fh_theta_d_w_em * work->pull_w_em)
-            + (solved_no_contact_Fh_theta_d_theta_d * work->pull_theta_d);
-        work->at_theta_b = (solved_no_contact_Eh_theta_b_w_w * self->state.w_w)
-            + (solved_no_contact_Eh_theta_b_w_em * self->state.w_em)
-            + (solved_no_contact_Eh_theta_b_theta_d * self->state.theta_d)
-            + (solved_no_contact_Eh_theta_b_theta_b * self->state.theta_b)
-            + (solved_no_contact_Fh_theta_b_w_w * work->pull_w_w)
-            + (solved_no_contact_Fh_theta_b_w_em * work->pull_w_em)
-            + (solved_no_contact_Fh_theta_b_theta_d * work->pull_theta_d)
-            + (solved_no_contact_Fh_theta_b_theta_b * work->pull_theta_b);
+        work->at_w_w = (cal->solved.no_contact_Eh_w_w_w_w * self->state.w_w)
+            + (cal->solved.no_contact_Fh_w_w_w_w * work->pull_w_w);
+        work->at_w_em = (cal->solved.no_contact_Eh_w_em_w_em * self->state.w_em)
+            + (cal->solved.no_contact_Fh_w_em_w_em * work->pull_w_em);
+        work->at_theta_d = (cal->solved.no_contact_Eh_theta_d_w_w * self->state.w_w)
+            + (cal->solved.no_contact_Eh_theta_d_w_em * self->state.w_em)
+            + (cal->solved.no_contact_Eh_theta_d_theta_d * self->state.theta_d)
+            + (cal->solved.no_contact_Fh_theta_d_w_w * work->pull_w_w)
+            + (cal->solved.no_contact_Fh_theta_d_w_em * work->pull_w_em)
+            + (cal->solved.no_contact_Fh_theta_d_theta_d * work->pull_theta_d);
+        work->at_theta_b = (cal->solved.no_contact_Eh_theta_b_w_w * self->state.w_w)
+            + (cal->solved.no_contact_Eh_theta_b_w_em * self->state.w_em)
+            + (cal->solved.no_contact_Eh_theta_b_theta_d * self->state.theta_d)
+            + (cal->solved.no_contact_Eh_theta_b_theta_b * self->state.theta_b)
+            + (cal->solved.no_contact_Fh_theta_b_w_w * work->pull_w_w)
+            + (cal->solved.no_contact_Fh_theta_b_w_em * work->pull_w_em)
+            + (cal->solved.no_contact_Fh_theta_b_theta_d * work->pull_theta_d)
+            + (cal->solved.no_contact_Fh_theta_b_theta_b * work->pull_theta_b);
     } else {
-        series_no_contact(self, work);
+        series_no_contact(self, cal, work);
         work->s = 0.5F * work->h;
         point(self, work);
     }
     rates_no_contact(self, work);
-    work->pull_w_w = work->rate_w_w - (solved_no_contact_A_w_w_w_w * work->at_w_w);
-    work->pull_w_em = work->rate_w_em - (solved_no_contact_A_w_em_w_em * work->at_w_em);
-    work->pull_theta_d = work->rate_theta_d - ((solved_no_contact_A_theta_d_w_w * work->at_w_w)
-        + (solved_no_contact_A_theta_d_w_em * work->at_w_em));
-    work->pull_theta_b = work->rate_theta_b - ((solved_no_contact_A_theta_b_w_w * work->at_w_w)
-        + (solved_no_contact_A_theta_b_w_em * work->at_w_em)
-        + (solved_no_contact_A_theta_b_theta_d * work->at_theta_d)
-        + (solved_no_contact_A_theta_b_theta_b * work->at_theta_b));
+    work->pull_w_w = work->rate_w_w - (cal->solved.no_contact_A_w_w_w_w * work->at_w_w);
+    work->pull_w_em = work->rate_w_em - (cal->solved.no_contact_A_w_em_w_em * work->at_w_em);
+    work->pull_theta_d =
+        work->rate_theta_d - ((cal->solved.no_contact_A_theta_d_w_w * work->at_w_w)
+        + (cal->solved.no_contact_A_theta_d_w_em * work->at_w_em));
+    work->pull_theta_b =
+        work->rate_theta_b - ((cal->solved.no_contact_A_theta_b_w_w * work->at_w_w)
+        + (cal->solved.no_contact_A_theta_b_w_em * work->at_w_em)
+        + (cal->solved.no_contact_A_theta_b_theta_d * work->at_theta_d)
+        + (cal->solved.no_contact_A_theta_b_theta_b * work->at_theta_b));
     if (work->h == 0.001F) {
-        work->end_w_w = (solved_no_contact_E_w_w_w_w * self->state.w_w)
-            + (solved_no_contact_F_w_w_w_w * work->pull_w_w);
-        work->end_w_em = (solved_no_contact_E_w_em_w_em * self->state.w_em)
-            + (solved_no_contact_F_w_em_w_em * work->pull_w_em);
-        work->end_theta_d = (solved_no_contact_E_theta_d_w_w * self->state.w_w)
-            + (solved_no_contact_E_theta_d_w_em * self->state.w_em)
-            + (solved_no_contact_E_theta_d_theta_d * self->state.theta_d)
-            + (solved_no_contact_F_theta_d_w_w * work->pull_w_w)
-            + (solved_no_contact_F_theta_d_w_em * work->pull_w_em)
-            + (solved_no_contact_F_theta_d_theta_d * work->pull_theta_d);
-        work->end_theta_b = (solved_no_contact_E_theta_b_w_w * self->state.w_w)
-            + (solved_no_contact_E_theta_b_w_em * self->state.w_em)
-            + (solved_no_contact_E_theta_b_theta_d * self->state.theta_d)
-            + (solved_no_contact_E_theta_b_theta_b * self->state.theta_b)
-            + (solved_no_contact_F_theta_b_w_w * work->pull_w_w)
-            + (solved_no_contact_F_theta_b_w_em * work->pull_w_em)
-            + (solved_no_contact_F_theta_b_theta_d * work->pull_theta_d)
-            + (solved_no_contact_F_theta_b_theta_b * work->pull_theta_b);
+        work->end_w_w = (cal->solved.no_contact_E_w_w_w_w * self->state.w_w)
+            + (cal->solved.no_contact_F_w_w_w_w * work->pull_w_w);
+        work->end_w_em = (cal->solved.no_contact_E_w_em_w_em * self->state.w_em)
+            + (cal->solved.no_contact_F_w_em_w_em * work->pull_w_em);
+        work->end_theta_d = (cal->solved.no_contact_E_theta_d_w_w * self->state.w_w)
+            + (cal->solved.no_contact_E_theta_d_w_em * self->state.w_em)
+            + (cal->solved.no_contact_E_theta_d_theta_d * self->state.theta_d)
+            + (cal->solved.no_contact_F_theta_d_w_w * work->pull_w_w)
+            + (cal->solved.no_contact_F_theta_d_w_em * work->pull_w_em)
+            + (cal->solved.no_contact_F_theta_d_theta_d * work->pull_theta_d);
+        work->end_theta_b = (cal->solved.no_contact_E_theta_b_w_w * self->state.w_w)
+            + (cal->solved.no_contact_E_theta_b_w_em * self->state.w_em)
+            + (cal->solved.no_contact_E_theta_b_theta_d * self->state.theta_d)
+            + (cal->solved.no_contact_E_theta_b_theta_b * self->state.theta_b)
+            + (cal->solved.no_contact_F_theta_b_w_w * work->pull_w_w)
+            + (cal->solved.no_contact_F_theta_b_w_em * work->pull_w_em)
+            + (cal->solved.no_contact_F_theta_b_theta_d * work->pull_theta_d)
+            + (cal->solved.no_contact_F_theta_b_theta_b * work->pull_theta_b);
     } else {
-        series_no_contact(self, work);
+        series_no_contact(self, cal, work);
         work->s = work->h;
         point(self, work);
         work->end_w_w = work->at_w_w;
@@ -714,128 +730,134 @@ static inline void step_no_contact(const estimator_float32_Self *self, Work *wor
     }
 }
 
-static inline void series_coast_contact(const estimator_float32_Self *self, Work *work)
+static inline void series_coast_contact(const estimator_float32_Self *self,
+    const volatile estimator_float32_Cal *cal, Work *work)
 {
     work->order = 1.0F;
-    work->series_w_w[0] = (solved_coast_contact_A_w_w_w_w * self->state.w_w)
-        + (solved_coast_contact_A_w_w_w_em * self->state.w_em)
-        + (solved_coast_contact_A_w_w_theta_d * self->state.theta_d)
-        + (solved_coast_contact_A_w_w_theta_b * self->state.theta_b) + work->pull_w_w;
-    work->series_w_em[0] = (solved_coast_contact_A_w_em_w_w * self->state.w_w)
-        + (solved_coast_contact_A_w_em_w_em * self->state.w_em)
-        + (solved_coast_contact_A_w_em_theta_d * self->state.theta_d)
-        + (solved_coast_contact_A_w_em_theta_b * self->state.theta_b) + work->pull_w_em;
-    work->series_theta_d[0] = (solved_coast_contact_A_theta_d_w_w * self->state.w_w)
-        + (solved_coast_contact_A_theta_d_w_em * self->state.w_em) + work->pull_theta_d;
+    work->series_w_w[0] = (cal->solved.coast_contact_A_w_w_w_w * self->state.w_w)
+        + (cal->solved.coast_contact_A_w_w_w_em * self->state.w_em)
+        + (cal->solved.coast_contact_A_w_w_theta_d * self->state.theta_d)
+        + (cal->solved.coast_contact_A_w_w_theta_b * self->state.theta_b) + work->pull_w_w;
+    work->series_w_em[0] = (cal->solved.coast_contact_A_w_em_w_w * self->state.w_w)
+        + (cal->solved.coast_contact_A_w_em_w_em * self->state.w_em)
+        + (cal->solved.coast_contact_A_w_em_theta_d * self->state.theta_d)
+        + (cal->solved.coast_contact_A_w_em_theta_b * self->state.theta_b) + work->pull_w_em;
+    work->series_theta_d[0] = (cal->solved.coast_contact_A_theta_d_w_w * self->state.w_w)
+        + (cal->solved.coast_contact_A_theta_d_w_em * self->state.w_em) + work->pull_theta_d;
     work->series_theta_b[0] = work->pull_theta_b;
     for (int32_t term = 0; term < 16; term++) {
         work->order = work->order + 1.0F;
-        work->series_w_w[term + 1] = ((solved_coast_contact_A_w_w_w_w * work->series_w_w[term])
-            + (solved_coast_contact_A_w_w_w_em * work->series_w_em[term])
-            + (solved_coast_contact_A_w_w_theta_d * work->series_theta_d[term])
-            + (solved_coast_contact_A_w_w_theta_b * work->series_theta_b[term])) / work->order;
-        work->series_w_em[term + 1] = ((solved_coast_contact_A_w_em_w_w * work->series_w_w[term])
-            + (solved_coast_contact_A_w_em_w_em * work->series_w_em[term])
-            + (solved_coast_contact_A_w_em_theta_d * work->series_theta_d[term])
-            + (solved_coast_contact_A_w_em_theta_b * work->series_theta_b[term])) / work->order;
+        work->series_w_w[term + 1] =
+            ((cal->solved.coast_contact_A_w_w_w_w * work->series_w_w[term])
+            + (cal->solved.coast_contact_A_w_w_w_em * work->series_w_em[term])
+            + (cal->solved.coast_contact_A_w_w_theta_d * work->series_theta_d[term])
+            + (cal->solved.coast_contact_A_w_w_theta_b * work->series_theta_b[term])) / work->order;
+        work->series_w_em[term + 1] =
+            ((cal->solved.coast_contact_A_w_em_w_w * work->series_w_w[term])
+            + (cal->solved.coast_contact_A_w_em_w_em * work->series_w_em[term])
+            + (cal->solved.coast_contact_A_w_em_theta_d * work->series_theta_d[term])
+            + (cal->solved.coast_contact_A_w_em_theta_b * work->series_theta_b[term])) / work->order;
         work->series_theta_d[term + 1] =
-            ((solved_coast_contact_A_theta_d_w_w * work->series_w_w[term])
-            + (solved_coast_contact_A_theta_d_w_em * work->series_w_em[term])) / work->order;
+            ((cal->solved.coast_contact_A_theta_d_w_w * work->series_w_w[term])
+            + (cal->solved.coast_contact_A_theta_d_w_em * work->series_w_em[term])) / work->order;
         work->series_theta_b[term + 1] = 0.0F / work->order;
     }
 }
 
-static inline void step_coast_contact(const estimator_float32_Self *self, Work *work)
+static inline void step_coast_contact(const estimator_float32_Self *self,
+    const volatile estimator_float32_Cal *cal, Work *work)
 {
     work->at_w_w = self->state.w_w;
     work->at_w_em = self->state.w_em;
     work->at_theta_d = self->state.theta_d;
     work->at_theta_b = self->state.theta_b;
     rates_coast_contact(self, work);
-    work->pull_w_w = work->rate_w_w - ((solved_coast_contact_A_w_w_w_w * work->at_w_w)
-        + (solved_coast_contact_A_w_w_w_em * work->at_w_em)
-        + (solved_coast_contact_A_w_w_theta_d * work->at_theta_d)
-        + (solved_coast_contact_A_w_w_theta_b * work->at_theta_b));
-    work->pull_w_em = work->rate_w_em - ((solved_coast_contact_A_w_em_w_w * work->at_w_w)
-        + (solved_coast_contact_A_w_em_w_em * work->at_w_em)
-        + (solved_coast_contact_A_w_em_theta_d * work->at_theta_d)
-        + (solved_coast_contact_A_w_em_theta_b * work->at_theta_b));
-    work->pull_theta_d = work->rate_theta_d - ((solved_coast_contact_A_theta_d_w_w * work->at_w_w)
-        + (solved_coast_contact_A_theta_d_w_em * work->at_w_em));
+    work->pull_w_w = work->rate_w_w - ((cal->solved.coast_contact_A_w_w_w_w * work->at_w_w)
+        + (cal->solved.coast_contact_A_w_w_w_em * work->at_w_em)
+        + (cal->solved.coast_contact_A_w_w_theta_d * work->at_theta_d)
+        + (cal->solved.coast_contact_A_w_w_theta_b * work->at_theta_b));
+    work->pull_w_em = work->rate_w_em - ((cal->solved.coast_contact_A_w_em_w_w * work->at_w_w)
+        + (cal->solved.coast_contact_A_w_em_w_em * work->at_w_em)
+        + (cal->solved.coast_contact_A_w_em_theta_d * work->at_theta_d)
+        + (cal->solved.coast_contact_A_w_em_theta_b * work->at_theta_b));
+    work->pull_theta_d =
+        work->rate_theta_d - ((cal->solved.coast_contact_A_theta_d_w_w * work->at_w_w)
+        + (cal->solved.coast_contact_A_theta_d_w_em * work->at_w_em));
     work->pull_theta_b = work->rate_theta_b;
     if (work->h == 0.001F) {
-        work->at_w_w = (solved_coast_contact_Eh_w_w_w_w * self->state.w_w)
-            + (solved_coast_contact_Eh_w_w_w_em * self->state.w_em)
-            + (solved_coast_contact_Eh_w_w_theta_d * self->state.theta_d)
-            + (solved_coast_contact_Eh_w_w_theta_b * self->state.theta_b)
-            + (solved_coast_contact_Fh_w_w_w_w * work->pull_w_w)
-            + (solved_coast_contact_Fh_w_w_w_em * work->pull_w_em)
-            + (solved_coast_contact_Fh_w_w_theta_d * work->pull_theta_d)
-            + (solved_coast_contact_Fh_w_w_theta_b * work->pull_theta_b);
-        work->at_w_em = (solved_coast_contact_Eh_w_em_w_w * self->state.w_w)
-            + (solved_coast_contact_Eh_w_em_w_em * self->state.w_em)
-            + (solved_coast_contact_Eh_w_em_theta_d * self->state.theta_d)
-            + (solved_coast_contact_Eh_w_em_theta_b * self->state.theta_b)
-            + (solved_coast_contact_Fh_w_em_w_w * work->pull_w_w)
-            + (solved_coast_contact_Fh_w_em_w_em * work->pull_w_em)
-            + (solved_coast_contact_Fh_w_em_theta_d * work->pull_theta_d)
-            + (solved_coast_contact_Fh_w_em_theta_b * work->pull_theta_b);
-        work->at_theta_d = (solved_coast_contact_Eh_theta_d_w_w * self->state.w_w)
-            + (solved_coast_contact_Eh_theta_d_w_em * self->state.w_em)
-            + (solved_coast_contact_Eh_theta_d_theta_d * self->state.theta_d)
-            + (solved_coast_contact_Eh_theta_d_theta_b * self->state.theta_b)
-            + (solved_coast_contact_Fh_theta_d_w_w * work->pull_w_w)
-            + (solved_coast_contact_Fh_theta_d_w_em * work->pull_w_em)
-            + (solved_coast_contact_Fh_theta_d_theta_d * work->pull_theta_d)
-            + (solved_coast_contact_Fh_theta_d_theta_b * work->pull_theta_b);
-        work->at_theta_b = (solved_coast_contact_Eh_theta_b_theta_b * self->state.theta_b)
-            + (solved_coast_contact_Fh_theta_b_theta_b * work->pull_theta_b);
+        work->at_w_w = (cal->solved.coast_contact_Eh_w_w_w_w * self->state.w_w)
+            + (cal->solved.coast_contact_Eh_w_w_w_em * self->state.w_em)
+            + (cal->solved.coast_contact_Eh_w_w_theta_d * self->state.theta_d)
+            + (cal->solved.coast_contact_Eh_w_w_theta_b * self->state.theta_b)
+            + (cal->solved.coast_contact_Fh_w_w_w_w * work->pull_w_w)
+            + (cal->solved.coast_contact_Fh_w_w_w_em * work->pull_w_em)
+            + (cal->solved.coast_contact_Fh_w_w_theta_d * work->pull_theta_d)
+            + (cal->solved.coast_contact_Fh_w_w_theta_b * work->pull_theta_b);
+        work->at_w_em = (cal->solved.coast_contact_Eh_w_em_w_w * self->state.w_w)
+            + (cal->solved.coast_contact_Eh_w_em_w_em * self->state.w_em)
+            + (cal->solved.coast_contact_Eh_w_em_theta_d * self->state.theta_d)
+            + (cal->solved.coast_contact_Eh_w_em_theta_b * self->state.theta_b)
+            + (cal->solved.coast_contact_Fh_w_em_w_w * work->pull_w_w)
+            + (cal->solved.coast_contact_Fh_w_em_w_em * work->pull_w_em)
+            + (cal->solved.coast_contact_Fh_w_em_theta_d * work->pull_theta_d)
+            + (cal->solved.coast_contact_Fh_w_em_theta_b * work->pull_theta_b);
+        work->at_theta_d = (cal->solved.coast_contact_Eh_theta_d_w_w * self->state.w_w)
+            + (cal->solved.coast_contact_Eh_theta_d_w_em * self->state.w_em)
+            + (cal->solved.coast_contact_Eh_theta_d_theta_d * self->state.theta_d)
+            + (cal->solved.coast_contact_Eh_theta_d_theta_b * self->state.theta_b)
+            + (cal->solved.coast_contact_Fh_theta_d_w_w * work->pull_w_w)
+            + (cal->solved.coast_contact_Fh_theta_d_w_em * work->pull_w_em)
+            + (cal->solved.coast_contact_Fh_theta_d_theta_d * work->pull_theta_d)
+            + (cal->solved.coast_contact_Fh_theta_d_theta_b * work->pull_theta_b);
+        work->at_theta_b = (cal->solved.coast_contact_Eh_theta_b_theta_b * self->state.theta_b)
+            + (cal->solved.coast_contact_Fh_theta_b_theta_b * work->pull_theta_b);
     } else {
-        series_coast_contact(self, work);
+        series_coast_contact(self, cal, work);
         work->s = 0.5F * work->h;
         point(self, work);
     }
     rates_coast_contact(self, work);
-    work->pull_w_w = work->rate_w_w - ((solved_coast_contact_A_w_w_w_w * work->at_w_w)
-        + (solved_coast_contact_A_w_w_w_em * work->at_w_em)
-        + (solved_coast_contact_A_w_w_theta_d * work->at_theta_d)
-        + (solved_coast_contact_A_w_w_theta_b * work->at_theta_b));
-    work->pull_w_em = work->rate_w_em - ((solved_coast_contact_A_w_em_w_w * work->at_w_w)
-        + (solved_coast_contact_A_w_em_w_em * work->at_w_em)
-        + (solved_coast_contact_A_w_em_theta_d * work->at_theta_d)
-        + (solved_coast_contact_A_w_em_theta_b * work->at_theta_b));
-    work->pull_theta_d = work->rate_theta_d - ((solved_coast_contact_A_theta_d_w_w * work->at_w_w)
-        + (solved_coast_contact_A_theta_d_w_em * work->at_w_em));
+    work->pull_w_w = work->rate_w_w - ((cal->solved.coast_contact_A_w_w_w_w * work->at_w_w)
+        + (cal->solved.coast_contact_A_w_w_w_em * work->at_w_em)
+        + (cal->solved.coast_contact_A_w_w_theta_d * work->at_theta_d)
+        + (cal->solved.coast_contact_A_w_w_theta_b * work->at_theta_b));
+    work->pull_w_em = work->rate_w_em - ((cal->solved.coast_contact_A_w_em_w_w * work->at_w_w)
+        + (cal->solved.coast_contact_A_w_em_w_em * work->at_w_em)
+        + (cal->solved.coast_contact_A_w_em_theta_d * work->at_theta_d)
+        + (cal->solved.coast_contact_A_w_em_theta_b * work->at_theta_b));
+    work->pull_theta_d =
+        work->rate_theta_d - ((cal->solved.coast_contact_A_theta_d_w_w * work->at_w_w)
+        + (cal->solved.coast_contact_A_theta_d_w_em * work->at_w_em));
     work->pull_theta_b = work->rate_theta_b;
     if (work->h == 0.001F) {
-        work->end_w_w = (solved_coast_contact_E_w_w_w_w * self->state.w_w)
-            + (solved_coast_contact_E_w_w_w_em * self->state.w_em)
-            + (solved_coast_contact_E_w_w_theta_d * self->state.theta_d)
-            + (solved_coast_contact_E_w_w_theta_b * self->state.theta_b)
-            + (solved_coast_contact_F_w_w_w_w * work->pull_w_w)
-            + (solved_coast_contact_F_w_w_w_em * work->pull_w_em)
-            + (solved_coast_contact_F_w_w_theta_d * work->pull_theta_d)
-            + (solved_coast_contact_F_w_w_theta_b * work->pull_theta_b);
-        work->end_w_em = (solved_coast_contact_E_w_em_w_w * self->state.w_w)
-            + (solved_coast_contact_E_w_em_w_em * self->state.w_em)
-            + (solved_coast_contact_E_w_em_theta_d * self->state.theta_d)
-            + (solved_coast_contact_E_w_em_theta_b * self->state.theta_b)
-            + (solved_coast_contact_F_w_em_w_w * work->pull_w_w)
-            + (solved_coast_contact_F_w_em_w_em * work->pull_w_em)
-            + (solved_coast_contact_F_w_em_theta_d * work->pull_theta_d)
-            + (solved_coast_contact_F_w_em_theta_b * work->pull_theta_b);
-        work->end_theta_d = (solved_coast_contact_E_theta_d_w_w * self->state.w_w)
-            + (solved_coast_contact_E_theta_d_w_em * self->state.w_em)
-            + (solved_coast_contact_E_theta_d_theta_d * self->state.theta_d)
-            + (solved_coast_contact_E_theta_d_theta_b * self->state.theta_b)
-            + (solved_coast_contact_F_theta_d_w_w * work->pull_w_w)
-            + (solved_coast_contact_F_theta_d_w_em * work->pull_w_em)
-            + (solved_coast_contact_F_theta_d_theta_d * work->pull_theta_d)
-            + (solved_coast_contact_F_theta_d_theta_b * work->pull_theta_b);
-        work->end_theta_b = (solved_coast_contact_E_theta_b_theta_b * self->state.theta_b)
-            + (solved_coast_contact_F_theta_b_theta_b * work->pull_theta_b);
+        work->end_w_w = (cal->solved.coast_contact_E_w_w_w_w * self->state.w_w)
+            + (cal->solved.coast_contact_E_w_w_w_em * self->state.w_em)
+            + (cal->solved.coast_contact_E_w_w_theta_d * self->state.theta_d)
+            + (cal->solved.coast_contact_E_w_w_theta_b * self->state.theta_b)
+            + (cal->solved.coast_contact_F_w_w_w_w * work->pull_w_w)
+            + (cal->solved.coast_contact_F_w_w_w_em * work->pull_w_em)
+            + (cal->solved.coast_contact_F_w_w_theta_d * work->pull_theta_d)
+            + (cal->solved.coast_contact_F_w_w_theta_b * work->pull_theta_b);
+        work->end_w_em = (cal->solved.coast_contact_E_w_em_w_w * self->state.w_w)
+            + (cal->solved.coast_contact_E_w_em_w_em * self->state.w_em)
+            + (cal->solved.coast_contact_E_w_em_theta_d * self->state.theta_d)
+            + (cal->solved.coast_contact_E_w_em_theta_b * self->state.theta_b)
+            + (cal->solved.coast_contact_F_w_em_w_w * work->pull_w_w)
+            + (cal->solved.coast_contact_F_w_em_w_em * work->pull_w_em)
+            + (cal->solved.coast_contact_F_w_em_theta_d * work->pull_theta_d)
+            + (cal->solved.coast_contact_F_w_em_theta_b * work->pull_theta_b);
+        work->end_theta_d = (cal->solved.coast_contact_E_theta_d_w_w * self->state.w_w)
+            + (cal->solved.coast_contact_E_theta_d_w_em * self->state.w_em)
+            + (cal->solved.coast_contact_E_theta_d_theta_d * self->state.theta_d)
+            + (cal->solved.coast_contact_E_theta_d_theta_b * self->state.theta_b)
+            + (cal->solved.coast_contact_F_theta_d_w_w * work->pull_w_w)
+            + (cal->solved.coast_contact_F_theta_d_w_em * work->pull_w_em)
+            + (cal->solved.coast_contact_F_theta_d_theta_d * work->pull_theta_d)
+            + (cal->solved.coast_contact_F_theta_d_theta_b * work->pull_theta_b);
+        work->end_theta_b = (cal->solved.coast_contact_E_theta_b_theta_b * self->state.theta_b)
+            + (cal->solved.coast_contact_F_theta_b_theta_b * work->pull_theta_b);
     } else {
-        series_coast_contact(self, work);
+        series_coast_contact(self, cal, work);
         work->s = work->h;
         point(self, work);
         work->end_w_w = work->at_w_w;
@@ -866,9 +888,10 @@ static inline void locate_drive_contact(const estimator_float32_Self *self, Work
     work->elapsed = ha_minf(work->high, work->h);
 }
 
-static inline void move_drive_contact(estimator_float32_Self *self, Work *work)
+static inline void move_drive_contact(estimator_float32_Self *self,
+    const volatile estimator_float32_Cal *cal, Work *work)
 {
-    step_drive_contact(self, work);
+    step_drive_contact(self, cal, work);
     work->elapsed = work->h;
     work->at_w_w = work->end_w_w;
     work->at_w_em = work->end_w_em;
@@ -877,7 +900,7 @@ static inline void move_drive_contact(estimator_float32_Self *self, Work *work)
     guards_drive_contact(work);
     work->crossed = work->guard_0;
     if (work->crossed) {
-        series_drive_contact(self, work);
+        series_drive_contact(self, cal, work);
         locate_drive_contact(self, work);
     }
     self->state.w_w = work->end_w_w;
@@ -922,9 +945,10 @@ static inline void locate_no_contact(const estimator_float32_Self *self, Work *w
     work->elapsed = ha_minf(work->high, work->h);
 }
 
-static inline void move_no_contact(estimator_float32_Self *self, Work *work)
+static inline void move_no_contact(estimator_float32_Self *self,
+    const volatile estimator_float32_Cal *cal, Work *work)
 {
-    step_no_contact(self, work);
+    step_no_contact(self, cal, work);
     work->elapsed = work->h;
     work->at_w_w = work->end_w_w;
     work->at_w_em = work->end_w_em;
@@ -933,7 +957,7 @@ static inline void move_no_contact(estimator_float32_Self *self, Work *work)
     guards_no_contact(work);
     work->crossed = work->guard_0 || work->guard_1;
     if (work->crossed) {
-        series_no_contact(self, work);
+        series_no_contact(self, cal, work);
         locate_no_contact(self, work);
     }
     self->state.w_w = work->end_w_w;
@@ -963,9 +987,10 @@ static inline void locate_coast_contact(const estimator_float32_Self *self, Work
     work->elapsed = ha_minf(work->high, work->h);
 }
 
-static inline void move_coast_contact(estimator_float32_Self *self, Work *work)
+static inline void move_coast_contact(estimator_float32_Self *self,
+    const volatile estimator_float32_Cal *cal, Work *work)
 {
-    step_coast_contact(self, work);
+    step_coast_contact(self, cal, work);
     work->elapsed = work->h;
     work->at_w_w = work->end_w_w;
     work->at_w_em = work->end_w_em;
@@ -974,7 +999,7 @@ static inline void move_coast_contact(estimator_float32_Self *self, Work *work)
     guards_coast_contact(work);
     work->crossed = work->guard_0;
     if (work->crossed) {
-        series_coast_contact(self, work);
+        series_coast_contact(self, cal, work);
         locate_coast_contact(self, work);
     }
     self->state.w_w = work->end_w_w;
@@ -1000,6 +1025,8 @@ static inline void switch_no_contact(estimator_float32_Self *self, const Work *w
         /* driveline modes.no_contact.transitions.coast_contact.reset.theta_b */
         self->state.theta_b = -constant.alpha;
         self->run_mode = estimator_float32_RUN_coast_contact;
+    } else {
+        /* nothing to do */
     }
 }
 
@@ -1010,33 +1037,35 @@ static inline void switch_coast_contact(estimator_float32_Self *self, const Work
     }
 }
 
-static inline void predict_drive(estimator_float32_Self *self)
+static inline void predict_drive(estimator_float32_Self *self,
+    const volatile estimator_float32_Cal *cal)
 {
     /* estimator_float32 modes.drive.observer.f.w_em */
     const float f_w_em = self->derived.k_hs_per_R_per_J_em * self->state.theta_b;
     /* estimator_float32 modes.drive.observer.f.w_w */
-    const float f_w_w = (-(constant.k_hs_per_J_v * self->state.theta_b)) + solved_drive_f_w_w;
+    const float f_w_w = (-(constant.k_hs_per_J_v * self->state.theta_b)) + cal->solved.drive_f_w_w;
     /* estimator_float32 modes.drive.observer */
-    const float predicted_theta_d = (solved_drive_Phi_theta_d_theta_d * self->state.theta_d)
-        + (solved_drive_Phi_theta_d_w_em * self->state.w_em)
-        + (solved_drive_Phi_theta_d_w_w * self->state.w_w)
-        + (solved_drive_Gamma_theta_d_T_em * self->before.T_em)
-        + (solved_drive_Gamma_theta_d_T_br * self->before.T_br)
-        + (solved_drive_G_theta_d_w_em * f_w_em) + (solved_drive_G_theta_d_w_w * f_w_w);
+    const float predicted_theta_d = (cal->solved.drive_Phi_theta_d_theta_d * self->state.theta_d)
+        + (cal->solved.drive_Phi_theta_d_w_em * self->state.w_em)
+        + (cal->solved.drive_Phi_theta_d_w_w * self->state.w_w)
+        + (cal->solved.drive_Gamma_theta_d_T_em * self->before.T_em)
+        + (cal->solved.drive_Gamma_theta_d_T_br * self->before.T_br)
+        + (cal->solved.drive_G_theta_d_w_em * f_w_em)
+        + (cal->solved.drive_G_theta_d_w_w * f_w_w);
     /* estimator_float32 modes.drive.observer */
-    const float predicted_w_em = (solved_drive_Phi_w_em_theta_d * self->state.theta_d)
-        + (solved_drive_Phi_w_em_w_em * self->state.w_em)
-        + (solved_drive_Phi_w_em_w_w * self->state.w_w)
-        + (solved_drive_Gamma_w_em_T_em * self->before.T_em)
-        + (solved_drive_Gamma_w_em_T_br * self->before.T_br)
-        + (solved_drive_G_w_em_w_em * f_w_em) + (solved_drive_G_w_em_w_w * f_w_w);
+    const float predicted_w_em = (cal->solved.drive_Phi_w_em_theta_d * self->state.theta_d)
+        + (cal->solved.drive_Phi_w_em_w_em * self->state.w_em)
+        + (cal->solved.drive_Phi_w_em_w_w * self->state.w_w)
+        + (cal->solved.drive_Gamma_w_em_T_em * self->before.T_em)
+        + (cal->solved.drive_Gamma_w_em_T_br * self->before.T_br)
+        + (cal->solved.drive_G_w_em_w_em * f_w_em) + (cal->solved.drive_G_w_em_w_w * f_w_w);
     /* estimator_float32 modes.drive.observer */
-    const float predicted_w_w = (solved_drive_Phi_w_w_theta_d * self->state.theta_d)
-        + (solved_drive_Phi_w_w_w_em * self->state.w_em)
-        + (solved_drive_Phi_w_w_w_w * self->state.w_w)
-        + (solved_drive_Gamma_w_w_T_em * self->before.T_em)
-        + (solved_drive_Gamma_w_w_T_br * self->before.T_br) + (solved_drive_G_w_w_w_em * f_w_em)
-        + (solved_drive_G_w_w_w_w * f_w_w);
+    const float predicted_w_w = (cal->solved.drive_Phi_w_w_theta_d * self->state.theta_d)
+        + (cal->solved.drive_Phi_w_w_w_em * self->state.w_em)
+        + (cal->solved.drive_Phi_w_w_w_w * self->state.w_w)
+        + (cal->solved.drive_Gamma_w_w_T_em * self->before.T_em)
+        + (cal->solved.drive_Gamma_w_w_T_br * self->before.T_br)
+        + (cal->solved.drive_G_w_w_w_em * f_w_em) + (cal->solved.drive_G_w_w_w_w * f_w_w);
     if (fabsf(predicted_theta_d) <= 0.5F) {
         self->state.theta_d = predicted_theta_d;
     } else {
@@ -1057,29 +1086,31 @@ static inline void predict_drive(estimator_float32_Self *self)
     }
 }
 
-static inline void correct_drive(estimator_float32_Self *self, const estimator_float32_In *in)
+static inline void correct_drive(estimator_float32_Self *self,
+    const volatile estimator_float32_Cal *cal, const estimator_float32_In *in)
 {
     self->innovation.y_em = in->is_new.y_em ? (self->latched.y_em - self->state.w_em) : 0.0F;
     self->innovation.y_w = in->is_new.y_w ? (self->latched.y_w - self->state.w_w) : 0.0F;
     const float new_theta_d =
-        self->state.theta_d + ((solved_drive_L_theta_d_y_em * self->innovation.y_em)
-        + (solved_drive_L_theta_d_y_w * self->innovation.y_w));
+        self->state.theta_d + ((cal->solved.drive_L_theta_d_y_em * self->innovation.y_em)
+        + (cal->solved.drive_L_theta_d_y_w * self->innovation.y_w));
     if (fabsf(new_theta_d) <= 0.5F) {
         self->state.theta_d = new_theta_d;
     } else {
         self->faults |= estimator_float32_FAULT_range_theta_d;
         self->state.theta_d = ha_clipf(new_theta_d, -0.5F, 0.5F);
     }
-    const float new_w_em = self->state.w_em + ((solved_drive_L_w_em_y_em * self->innovation.y_em)
-        + (solved_drive_L_w_em_y_w * self->innovation.y_w));
+    const float new_w_em =
+        self->state.w_em + ((cal->solved.drive_L_w_em_y_em * self->innovation.y_em)
+        + (cal->solved.drive_L_w_em_y_w * self->innovation.y_w));
     if ((new_w_em >= (-400.0F)) && (new_w_em <= 2400.0F)) {
         self->state.w_em = new_w_em;
     } else {
         self->faults |= estimator_float32_FAULT_range_w_em;
         self->state.w_em = ha_clipf(new_w_em, -400.0F, 2400.0F);
     }
-    const float new_w_w = self->state.w_w + ((solved_drive_L_w_w_y_em * self->innovation.y_em)
-        + (solved_drive_L_w_w_y_w * self->innovation.y_w));
+    const float new_w_w = self->state.w_w + ((cal->solved.drive_L_w_w_y_em * self->innovation.y_em)
+        + (cal->solved.drive_L_w_w_y_w * self->innovation.y_w));
     if ((new_w_w >= (-50.0F)) && (new_w_w <= 300.0F)) {
         self->state.w_w = new_w_w;
     } else {
@@ -1088,20 +1119,21 @@ static inline void correct_drive(estimator_float32_Self *self, const estimator_f
     }
 }
 
-static inline void run_gap(estimator_float32_Self *self, Work *work)
+static inline void run_gap(estimator_float32_Self *self, const volatile estimator_float32_Cal *cal,
+    Work *work)
 {
     work->left = 0.001F; /* estimator_float32 modes.gap.runs */
     for (int32_t event = 0; (event < 5) && (work->left > 0.0F); event++) {
         work->h = work->left;
         switch (self->run_mode) {
         case estimator_float32_RUN_drive_contact:
-            move_drive_contact(self, work);
+            move_drive_contact(self, cal, work);
             break;
         case estimator_float32_RUN_no_contact:
-            move_no_contact(self, work);
+            move_no_contact(self, cal, work);
             break;
         case estimator_float32_RUN_coast_contact:
-            move_coast_contact(self, work);
+            move_coast_contact(self, cal, work);
             break;
         default:
             break;
@@ -1158,33 +1190,35 @@ static inline void run_gap(estimator_float32_Self *self, Work *work)
     }
 }
 
-static inline void predict_coast(estimator_float32_Self *self)
+static inline void predict_coast(estimator_float32_Self *self,
+    const volatile estimator_float32_Cal *cal)
 {
     /* estimator_float32 modes.coast.observer.f.w_em */
     const float f_w_em = self->derived.k_hs_per_R_per_J_em * self->state.theta_b;
     /* estimator_float32 modes.coast.observer.f.w_w */
-    const float f_w_w = (-(constant.k_hs_per_J_v * self->state.theta_b)) + solved_coast_f_w_w;
+    const float f_w_w = (-(constant.k_hs_per_J_v * self->state.theta_b)) + cal->solved.coast_f_w_w;
     /* estimator_float32 modes.coast.observer */
-    const float predicted_theta_d = (solved_coast_Phi_theta_d_theta_d * self->state.theta_d)
-        + (solved_coast_Phi_theta_d_w_em * self->state.w_em)
-        + (solved_coast_Phi_theta_d_w_w * self->state.w_w)
-        + (solved_coast_Gamma_theta_d_T_em * self->before.T_em)
-        + (solved_coast_Gamma_theta_d_T_br * self->before.T_br)
-        + (solved_coast_G_theta_d_w_em * f_w_em) + (solved_coast_G_theta_d_w_w * f_w_w);
+    const float predicted_theta_d = (cal->solved.coast_Phi_theta_d_theta_d * self->state.theta_d)
+        + (cal->solved.coast_Phi_theta_d_w_em * self->state.w_em)
+        + (cal->solved.coast_Phi_theta_d_w_w * self->state.w_w)
+        + (cal->solved.coast_Gamma_theta_d_T_em * self->before.T_em)
+        + (cal->solved.coast_Gamma_theta_d_T_br * self->before.T_br)
+        + (cal->solved.coast_G_theta_d_w_em * f_w_em)
+        + (cal->solved.coast_G_theta_d_w_w * f_w_w);
     /* estimator_float32 modes.coast.observer */
-    const float predicted_w_em = (solved_coast_Phi_w_em_theta_d * self->state.theta_d)
-        + (solved_coast_Phi_w_em_w_em * self->state.w_em)
-        + (solved_coast_Phi_w_em_w_w * self->state.w_w)
-        + (solved_coast_Gamma_w_em_T_em * self->before.T_em)
-        + (solved_coast_Gamma_w_em_T_br * self->before.T_br)
-        + (solved_coast_G_w_em_w_em * f_w_em) + (solved_coast_G_w_em_w_w * f_w_w);
+    const float predicted_w_em = (cal->solved.coast_Phi_w_em_theta_d * self->state.theta_d)
+        + (cal->solved.coast_Phi_w_em_w_em * self->state.w_em)
+        + (cal->solved.coast_Phi_w_em_w_w * self->state.w_w)
+        + (cal->solved.coast_Gamma_w_em_T_em * self->before.T_em)
+        + (cal->solved.coast_Gamma_w_em_T_br * self->before.T_br)
+        + (cal->solved.coast_G_w_em_w_em * f_w_em) + (cal->solved.coast_G_w_em_w_w * f_w_w);
     /* estimator_float32 modes.coast.observer */
-    const float predicted_w_w = (solved_coast_Phi_w_w_theta_d * self->state.theta_d)
-        + (solved_coast_Phi_w_w_w_em * self->state.w_em)
-        + (solved_coast_Phi_w_w_w_w * self->state.w_w)
-        + (solved_coast_Gamma_w_w_T_em * self->before.T_em)
-        + (solved_coast_Gamma_w_w_T_br * self->before.T_br) + (solved_coast_G_w_w_w_em * f_w_em)
-        + (solved_coast_G_w_w_w_w * f_w_w);
+    const float predicted_w_w = (cal->solved.coast_Phi_w_w_theta_d * self->state.theta_d)
+        + (cal->solved.coast_Phi_w_w_w_em * self->state.w_em)
+        + (cal->solved.coast_Phi_w_w_w_w * self->state.w_w)
+        + (cal->solved.coast_Gamma_w_w_T_em * self->before.T_em)
+        + (cal->solved.coast_Gamma_w_w_T_br * self->before.T_br)
+        + (cal->solved.coast_G_w_w_w_em * f_w_em) + (cal->solved.coast_G_w_w_w_w * f_w_w);
     if (fabsf(predicted_theta_d) <= 0.5F) {
         self->state.theta_d = predicted_theta_d;
     } else {
@@ -1205,29 +1239,31 @@ static inline void predict_coast(estimator_float32_Self *self)
     }
 }
 
-static inline void correct_coast(estimator_float32_Self *self, const estimator_float32_In *in)
+static inline void correct_coast(estimator_float32_Self *self,
+    const volatile estimator_float32_Cal *cal, const estimator_float32_In *in)
 {
     self->innovation.y_em = in->is_new.y_em ? (self->latched.y_em - self->state.w_em) : 0.0F;
     self->innovation.y_w = in->is_new.y_w ? (self->latched.y_w - self->state.w_w) : 0.0F;
     const float new_theta_d =
-        self->state.theta_d + ((solved_coast_L_theta_d_y_em * self->innovation.y_em)
-        + (solved_coast_L_theta_d_y_w * self->innovation.y_w));
+        self->state.theta_d + ((cal->solved.coast_L_theta_d_y_em * self->innovation.y_em)
+        + (cal->solved.coast_L_theta_d_y_w * self->innovation.y_w));
     if (fabsf(new_theta_d) <= 0.5F) {
         self->state.theta_d = new_theta_d;
     } else {
         self->faults |= estimator_float32_FAULT_range_theta_d;
         self->state.theta_d = ha_clipf(new_theta_d, -0.5F, 0.5F);
     }
-    const float new_w_em = self->state.w_em + ((solved_coast_L_w_em_y_em * self->innovation.y_em)
-        + (solved_coast_L_w_em_y_w * self->innovation.y_w));
+    const float new_w_em =
+        self->state.w_em + ((cal->solved.coast_L_w_em_y_em * self->innovation.y_em)
+        + (cal->solved.coast_L_w_em_y_w * self->innovation.y_w));
     if ((new_w_em >= (-400.0F)) && (new_w_em <= 2400.0F)) {
         self->state.w_em = new_w_em;
     } else {
         self->faults |= estimator_float32_FAULT_range_w_em;
         self->state.w_em = ha_clipf(new_w_em, -400.0F, 2400.0F);
     }
-    const float new_w_w = self->state.w_w + ((solved_coast_L_w_w_y_em * self->innovation.y_em)
-        + (solved_coast_L_w_w_y_w * self->innovation.y_w));
+    const float new_w_w = self->state.w_w + ((cal->solved.coast_L_w_w_y_em * self->innovation.y_em)
+        + (cal->solved.coast_L_w_w_y_w * self->innovation.y_w));
     if ((new_w_w >= (-50.0F)) && (new_w_w <= 300.0F)) {
         self->state.w_w = new_w_w;
     } else {
@@ -1252,6 +1288,8 @@ static inline void jump_drive(estimator_float32_Self *self)
         self->timer.drive_gap = 0U;
     } else if (self->timer.drive_gap < 2U) {
         self->timer.drive_gap++;
+    } else {
+        /* nothing to do */
     }
     if (self->timer.drive_gap > 1U) {
         self->timer.drive_gap = 0U;
@@ -1283,12 +1321,16 @@ static inline void jump_gap(estimator_float32_Self *self)
         self->timer.gap_drive = 0U;
     } else if (self->timer.gap_drive < 2U) {
         self->timer.gap_drive++;
+    } else {
+        /* nothing to do */
     }
     /* estimator_float32 modes.gap.transitions.coast.when */
     if (self->run_mode != estimator_float32_RUN_coast_contact) {
         self->timer.gap_coast = 0U;
     } else if (self->timer.gap_coast < 2U) {
         self->timer.gap_coast++;
+    } else {
+        /* nothing to do */
     }
     if (self->timer.gap_drive > 1U) {
         self->timer.gap_drive = 0U;
@@ -1300,6 +1342,8 @@ static inline void jump_gap(estimator_float32_Self *self)
         self->timer.gap_coast = 0U;
         self->mode = estimator_float32_MODE_coast;
         self->fired = 3U; /* estimator_float32 modes.gap.transitions.coast */
+    } else {
+        /* nothing to do */
     }
 }
 
@@ -1319,6 +1363,8 @@ static inline void jump_coast(estimator_float32_Self *self)
         self->timer.coast_gap = 0U;
     } else if (self->timer.coast_gap < 2U) {
         self->timer.coast_gap++;
+    } else {
+        /* nothing to do */
     }
     if (self->timer.coast_gap > 1U) {
         self->timer.coast_gap = 0U;
@@ -1328,9 +1374,10 @@ static inline void jump_coast(estimator_float32_Self *self)
     }
 }
 
-static inline void compare_stamps(estimator_float32_Self *self, const estimator_float32_Cal *cal)
+static inline void compare_stamps(estimator_float32_Self *self,
+    const volatile estimator_float32_Cal *cal)
 {
-    if (cal->J_em != solved_stamp_J_em) {
+    if (cal->J_em != cal->solved.stamp_J_em) {
         self->faults |= estimator_float32_FAULT_stale_calibration;
     }
 }
@@ -1355,7 +1402,8 @@ static inline void remember(estimator_float32_Self *self)
     self->before.T_br = self->latched.T_br;
 }
 
-static inline void start(estimator_float32_Self *self, const estimator_float32_In *in)
+static inline void start(estimator_float32_Self *self, const volatile estimator_float32_Cal *cal,
+    const estimator_float32_In *in)
 {
     if (fabsf(constant.alpha) <= 0.5F) {
         self->state.theta_d = constant.alpha; /* estimator_float32 states.theta_d.initial */
@@ -1383,17 +1431,17 @@ static inline void start(estimator_float32_Self *self, const estimator_float32_I
     }
     self->mode = estimator_float32_MODE_drive;
     self->started = true;
-    correct_drive(self, in);
+    correct_drive(self, cal, in);
 }
 
-void estimator_float32_Derive(const estimator_float32_Cal *cal, estimator_float32_Derived *derived)
+void estimator_float32_Derive(const volatile estimator_float32_Cal *cal, estimator_float32_Derived *derived)
 {
     derived->per_J_em = 1.0F / cal->J_em; /* 1 / J_em */
     /* k_hs / R / J_em */
     derived->k_hs_per_R_per_J_em = constant.k_hs / constant.R / cal->J_em;
 }
 
-void estimator_float32_Init(estimator_float32_Self *self, const estimator_float32_Cal *cal)
+void estimator_float32_Init(estimator_float32_Self *self, const volatile estimator_float32_Cal *cal)
 {
     static const estimator_float32_Self zero; /* every member 0 or false */
 
@@ -1409,19 +1457,18 @@ void estimator_float32_Init(estimator_float32_Self *self, const estimator_float3
     compare_stamps(self, cal);
 }
 
-void estimator_float32_Calibrate(estimator_float32_Self *self, const estimator_float32_Cal *cal)
+void estimator_float32_Calibrate(estimator_float32_Self *self, const volatile estimator_float32_Cal *cal)
 {
     estimator_float32_Derive(cal, &self->derived);
     compare_stamps(self, cal);
 }
 
-void estimator_float32_Step(estimator_float32_Self *self, const estimator_float32_Cal *cal, const estimator_float32_In *in,
-    estimator_float32_Out *out)
+void estimator_float32_Step(estimator_float32_Self *self, const volatile estimator_float32_Cal *cal,
+    const estimator_float32_In *in, estimator_float32_Out *out)
 {
     Work scratch = {0};
     Work *const work = &scratch;
 
-    (void)cal;
     self->fired = 0U;
     latch(self, in);
     self->innovation.y_em = 0.0F;
@@ -1429,21 +1476,21 @@ void estimator_float32_Step(estimator_float32_Self *self, const estimator_float3
     if (self->started) {
         switch (self->mode) {
         case estimator_float32_MODE_drive:
-            predict_drive(self);
-            correct_drive(self, in);
+            predict_drive(self, cal);
+            correct_drive(self, cal, in);
             break;
         case estimator_float32_MODE_gap:
-            run_gap(self, work);
+            run_gap(self, cal, work);
             break;
         case estimator_float32_MODE_coast:
-            predict_coast(self);
-            correct_coast(self, in);
+            predict_coast(self, cal);
+            correct_coast(self, cal, in);
             break;
         default:
             break;
         }
     } else {
-        start(self, in);
+        start(self, cal, in);
     }
     switch (self->mode) {
     case estimator_float32_MODE_drive:

@@ -37,9 +37,236 @@ enum {
 #define estimator_float32_FAULT_range_w_w (1UL << 8)
 #define estimator_float32_FAULT_range_theta_b (1UL << 9)
 
-/* Tunable parameters */
+/* The calibration page: tunable parameters */
 typedef struct {
     float J_em; /* kg*m^2; driveline parameters.J_em; 0.01 to 0.2; motor and gears, at the motor */
+    struct {
+        float drive_contact_A_w_w_w_w;
+        float drive_contact_A_w_w_w_em;
+        float drive_contact_A_w_w_theta_d;
+        float drive_contact_A_w_w_theta_b;
+        float drive_contact_A_w_em_w_w;
+        float drive_contact_A_w_em_w_em;
+        float drive_contact_A_w_em_theta_d;
+        float drive_contact_A_w_em_theta_b;
+        float drive_contact_A_theta_d_w_w;
+        float drive_contact_A_theta_d_w_em;
+        float drive_contact_E_w_w_w_w;
+        float drive_contact_E_w_w_w_em;
+        float drive_contact_E_w_w_theta_d;
+        float drive_contact_E_w_w_theta_b;
+        float drive_contact_E_w_em_w_w;
+        float drive_contact_E_w_em_w_em;
+        float drive_contact_E_w_em_theta_d;
+        float drive_contact_E_w_em_theta_b;
+        float drive_contact_E_theta_d_w_w;
+        float drive_contact_E_theta_d_w_em;
+        float drive_contact_E_theta_d_theta_d;
+        float drive_contact_E_theta_d_theta_b;
+        float drive_contact_E_theta_b_theta_b;
+        float drive_contact_F_w_w_w_w;
+        float drive_contact_F_w_w_w_em;
+        float drive_contact_F_w_w_theta_d;
+        float drive_contact_F_w_w_theta_b;
+        float drive_contact_F_w_em_w_w;
+        float drive_contact_F_w_em_w_em;
+        float drive_contact_F_w_em_theta_d;
+        float drive_contact_F_w_em_theta_b;
+        float drive_contact_F_theta_d_w_w;
+        float drive_contact_F_theta_d_w_em;
+        float drive_contact_F_theta_d_theta_d;
+        float drive_contact_F_theta_d_theta_b;
+        float drive_contact_F_theta_b_theta_b;
+        float drive_contact_Eh_w_w_w_w;
+        float drive_contact_Eh_w_w_w_em;
+        float drive_contact_Eh_w_w_theta_d;
+        float drive_contact_Eh_w_w_theta_b;
+        float drive_contact_Eh_w_em_w_w;
+        float drive_contact_Eh_w_em_w_em;
+        float drive_contact_Eh_w_em_theta_d;
+        float drive_contact_Eh_w_em_theta_b;
+        float drive_contact_Eh_theta_d_w_w;
+        float drive_contact_Eh_theta_d_w_em;
+        float drive_contact_Eh_theta_d_theta_d;
+        float drive_contact_Eh_theta_d_theta_b;
+        float drive_contact_Eh_theta_b_theta_b;
+        float drive_contact_Fh_w_w_w_w;
+        float drive_contact_Fh_w_w_w_em;
+        float drive_contact_Fh_w_w_theta_d;
+        float drive_contact_Fh_w_w_theta_b;
+        float drive_contact_Fh_w_em_w_w;
+        float drive_contact_Fh_w_em_w_em;
+        float drive_contact_Fh_w_em_theta_d;
+        float drive_contact_Fh_w_em_theta_b;
+        float drive_contact_Fh_theta_d_w_w;
+        float drive_contact_Fh_theta_d_w_em;
+        float drive_contact_Fh_theta_d_theta_d;
+        float drive_contact_Fh_theta_d_theta_b;
+        float drive_contact_Fh_theta_b_theta_b;
+        float no_contact_A_w_w_w_w;
+        float no_contact_A_w_em_w_em;
+        float no_contact_A_theta_d_w_w;
+        float no_contact_A_theta_d_w_em;
+        float no_contact_A_theta_b_w_w;
+        float no_contact_A_theta_b_w_em;
+        float no_contact_A_theta_b_theta_d;
+        float no_contact_A_theta_b_theta_b;
+        float no_contact_E_w_w_w_w;
+        float no_contact_E_w_em_w_em;
+        float no_contact_E_theta_d_w_w;
+        float no_contact_E_theta_d_w_em;
+        float no_contact_E_theta_d_theta_d;
+        float no_contact_E_theta_b_w_w;
+        float no_contact_E_theta_b_w_em;
+        float no_contact_E_theta_b_theta_d;
+        float no_contact_E_theta_b_theta_b;
+        float no_contact_F_w_w_w_w;
+        float no_contact_F_w_em_w_em;
+        float no_contact_F_theta_d_w_w;
+        float no_contact_F_theta_d_w_em;
+        float no_contact_F_theta_d_theta_d;
+        float no_contact_F_theta_b_w_w;
+        float no_contact_F_theta_b_w_em;
+        float no_contact_F_theta_b_theta_d;
+        float no_contact_F_theta_b_theta_b;
+        float no_contact_Eh_w_w_w_w;
+        float no_contact_Eh_w_em_w_em;
+        float no_contact_Eh_theta_d_w_w;
+        float no_contact_Eh_theta_d_w_em;
+        float no_contact_Eh_theta_d_theta_d;
+        float no_contact_Eh_theta_b_w_w;
+        float no_contact_Eh_theta_b_w_em;
+        float no_contact_Eh_theta_b_theta_d;
+        float no_contact_Eh_theta_b_theta_b;
+        float no_contact_Fh_w_w_w_w;
+        float no_contact_Fh_w_em_w_em;
+        float no_contact_Fh_theta_d_w_w;
+        float no_contact_Fh_theta_d_w_em;
+        float no_contact_Fh_theta_d_theta_d;
+        float no_contact_Fh_theta_b_w_w;
+        float no_contact_Fh_theta_b_w_em;
+        float no_contact_Fh_theta_b_theta_d;
+        float no_contact_Fh_theta_b_theta_b;
+        float coast_contact_A_w_w_w_w;
+        float coast_contact_A_w_w_w_em;
+        float coast_contact_A_w_w_theta_d;
+        float coast_contact_A_w_w_theta_b;
+        float coast_contact_A_w_em_w_w;
+        float coast_contact_A_w_em_w_em;
+        float coast_contact_A_w_em_theta_d;
+        float coast_contact_A_w_em_theta_b;
+        float coast_contact_A_theta_d_w_w;
+        float coast_contact_A_theta_d_w_em;
+        float coast_contact_E_w_w_w_w;
+        float coast_contact_E_w_w_w_em;
+        float coast_contact_E_w_w_theta_d;
+        float coast_contact_E_w_w_theta_b;
+        float coast_contact_E_w_em_w_w;
+        float coast_contact_E_w_em_w_em;
+        float coast_contact_E_w_em_theta_d;
+        float coast_contact_E_w_em_theta_b;
+        float coast_contact_E_theta_d_w_w;
+        float coast_contact_E_theta_d_w_em;
+        float coast_contact_E_theta_d_theta_d;
+        float coast_contact_E_theta_d_theta_b;
+        float coast_contact_E_theta_b_theta_b;
+        float coast_contact_F_w_w_w_w;
+        float coast_contact_F_w_w_w_em;
+        float coast_contact_F_w_w_theta_d;
+        float coast_contact_F_w_w_theta_b;
+        float coast_contact_F_w_em_w_w;
+        float coast_contact_F_w_em_w_em;
+        float coast_contact_F_w_em_theta_d;
+        float coast_contact_F_w_em_theta_b;
+        float coast_contact_F_theta_d_w_w;
+        float coast_contact_F_theta_d_w_em;
+        float coast_contact_F_theta_d_theta_d;
+        float coast_contact_F_theta_d_theta_b;
+        float coast_contact_F_theta_b_theta_b;
+        float coast_contact_Eh_w_w_w_w;
+        float coast_contact_Eh_w_w_w_em;
+        float coast_contact_Eh_w_w_theta_d;
+        float coast_contact_Eh_w_w_theta_b;
+        float coast_contact_Eh_w_em_w_w;
+        float coast_contact_Eh_w_em_w_em;
+        float coast_contact_Eh_w_em_theta_d;
+        float coast_contact_Eh_w_em_theta_b;
+        float coast_contact_Eh_theta_d_w_w;
+        float coast_contact_Eh_theta_d_w_em;
+        float coast_contact_Eh_theta_d_theta_d;
+        float coast_contact_Eh_theta_d_theta_b;
+        float coast_contact_Eh_theta_b_theta_b;
+        float coast_contact_Fh_w_w_w_w;
+        float coast_contact_Fh_w_w_w_em;
+        float coast_contact_Fh_w_w_theta_d;
+        float coast_contact_Fh_w_w_theta_b;
+        float coast_contact_Fh_w_em_w_w;
+        float coast_contact_Fh_w_em_w_em;
+        float coast_contact_Fh_w_em_theta_d;
+        float coast_contact_Fh_w_em_theta_b;
+        float coast_contact_Fh_theta_d_w_w;
+        float coast_contact_Fh_theta_d_w_em;
+        float coast_contact_Fh_theta_d_theta_d;
+        float coast_contact_Fh_theta_d_theta_b;
+        float coast_contact_Fh_theta_b_theta_b;
+        float drive_Phi_theta_d_theta_d;
+        float drive_Phi_theta_d_w_em;
+        float drive_Phi_theta_d_w_w;
+        float drive_Phi_w_em_theta_d;
+        float drive_Phi_w_em_w_em;
+        float drive_Phi_w_em_w_w;
+        float drive_Phi_w_w_theta_d;
+        float drive_Phi_w_w_w_em;
+        float drive_Phi_w_w_w_w;
+        float drive_Gamma_theta_d_T_em;
+        float drive_Gamma_theta_d_T_br;
+        float drive_Gamma_w_em_T_em;
+        float drive_Gamma_w_em_T_br;
+        float drive_Gamma_w_w_T_em;
+        float drive_Gamma_w_w_T_br;
+        float drive_G_theta_d_w_em;
+        float drive_G_theta_d_w_w;
+        float drive_G_w_em_w_em;
+        float drive_G_w_em_w_w;
+        float drive_G_w_w_w_em;
+        float drive_G_w_w_w_w;
+        float drive_L_theta_d_y_em;
+        float drive_L_theta_d_y_w;
+        float drive_L_w_em_y_em;
+        float drive_L_w_em_y_w;
+        float drive_L_w_w_y_em;
+        float drive_L_w_w_y_w;
+        float drive_f_w_w;
+        float coast_Phi_theta_d_theta_d;
+        float coast_Phi_theta_d_w_em;
+        float coast_Phi_theta_d_w_w;
+        float coast_Phi_w_em_theta_d;
+        float coast_Phi_w_em_w_em;
+        float coast_Phi_w_em_w_w;
+        float coast_Phi_w_w_theta_d;
+        float coast_Phi_w_w_w_em;
+        float coast_Phi_w_w_w_w;
+        float coast_Gamma_theta_d_T_em;
+        float coast_Gamma_theta_d_T_br;
+        float coast_Gamma_w_em_T_em;
+        float coast_Gamma_w_em_T_br;
+        float coast_Gamma_w_w_T_em;
+        float coast_Gamma_w_w_T_br;
+        float coast_G_theta_d_w_em;
+        float coast_G_theta_d_w_w;
+        float coast_G_w_em_w_em;
+        float coast_G_w_em_w_w;
+        float coast_G_w_w_w_em;
+        float coast_G_w_w_w_w;
+        float coast_L_theta_d_y_em;
+        float coast_L_theta_d_y_w;
+        float coast_L_w_em_y_em;
+        float coast_L_w_em_y_w;
+        float coast_L_w_w_y_em;
+        float coast_L_w_w_y_w;
+        float coast_f_w_w;
+        float stamp_J_em;
+    } solved; /* matrix exponentials and gains for these values, stamps of the values */
 } estimator_float32_Cal;
 
 /* What follows from tunable parameters: estimator_float32_Derive */
@@ -109,18 +336,21 @@ typedef struct {
     estimator_float32_Derived derived;
 } estimator_float32_Self;
 
-/* Default values of the tunable parameters */
-extern const estimator_float32_Cal estimator_float32_default_cal;
+/* The digest of the Program, which a tool compares with that of its description */
+extern const char estimator_float32_Version[17];
+
+/* The page with default values, in a section of its own: estimator_float32_MemMap.h */
+extern const volatile estimator_float32_Cal estimator_float32_default_cal;
 
 /* Before the first step */
-void estimator_float32_Init(estimator_float32_Self *self, const estimator_float32_Cal *cal);
+void estimator_float32_Init(estimator_float32_Self *self, const volatile estimator_float32_Cal *cal);
 
 /* After a change of the calibration page: X_Derive, and a fault if solved numbers do not fit it */
-void estimator_float32_Calibrate(estimator_float32_Self *self, const estimator_float32_Cal *cal);
-void estimator_float32_Derive(const estimator_float32_Cal *cal, estimator_float32_Derived *derived);
+void estimator_float32_Calibrate(estimator_float32_Self *self, const volatile estimator_float32_Cal *cal);
+void estimator_float32_Derive(const volatile estimator_float32_Cal *cal, estimator_float32_Derived *derived);
 
 /* One tick of 1/1000 s */
-void estimator_float32_Step(estimator_float32_Self *self, const estimator_float32_Cal *cal, const estimator_float32_In *in,
-    estimator_float32_Out *out);
+void estimator_float32_Step(estimator_float32_Self *self, const volatile estimator_float32_Cal *cal,
+    const estimator_float32_In *in, estimator_float32_Out *out);
 
 #endif

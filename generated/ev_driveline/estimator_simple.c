@@ -3,6 +3,7 @@
  * Program digest: 73fa241d43b96d4a
  */
 #include "estimator_simple.h"
+#include "estimator_simple_MemMap.h"
 
 #include <float.h>
 #include <math.h>
@@ -30,67 +31,69 @@ static const struct {
     .per_R = 0.1234567901234568, /* 1 / R */
 };
 
-/* Numbers solved when the spec was checked: matrix exponentials, gains, stamps */
-static const double solved_drive_Phi_theta_d_theta_d = 0.9266450076651614;
-static const double solved_drive_Phi_theta_d_w_em = 0.0011774624864130231;
-static const double solved_drive_Phi_theta_d_w_w = -0.009538955318479479;
-static const double solved_drive_Phi_w_em_theta_d = -113.03639869565022;
-static const double solved_drive_Phi_w_em_w_em = 0.8877247096409043;
-static const double solved_drive_Phi_w_em_w_w = 0.9063027998317674;
-static const double solved_drive_Phi_w_w_theta_d = 0.4242481865063841;
-static const double solved_drive_Phi_w_w_w_em = 0.0004198762102533091;
-static const double solved_drive_Phi_w_w_w_w = 0.9965087774211902;
-static const double solved_drive_Gamma_theta_d_T_em = 0.00012013454601784477;
-static const double solved_drive_Gamma_theta_d_T_br = 4.5086463545619123e-07;
-static const double solved_drive_Gamma_w_em_T_em = 0.19102066835634401;
-static const double solved_drive_Gamma_w_em_T_br = -3.354883425114947e-05;
-static const double solved_drive_Gamma_w_w_T_em = 3.3548834251149476e-05;
-static const double solved_drive_Gamma_w_w_T_br = -9.25268702445275e-05;
-static const double solved_drive_G_theta_d_w_em = 6.006727300892239e-06;
-static const double solved_drive_G_theta_d_w_w = -4.865956578160943e-05;
-static const double solved_drive_G_w_em_w_em = 0.009551033417817201;
-static const double solved_drive_G_w_em_w_w = 0.003620757936555306;
-static const double solved_drive_G_w_w_w_em = 1.6774417125574738e-06;
-static const double solved_drive_G_w_w_w_w = 0.00998596247114063;
-static const double solved_drive_L_theta_d_y_em = -0.0013918329312859541;
-static const double solved_drive_L_theta_d_y_w = -0.00021584339292280485;
-static const double solved_drive_L_w_em_y_em = 0.6103463852031026;
-static const double solved_drive_L_w_em_y_w = 0.006514375143095953;
-static const double solved_drive_L_w_w_y_em = 0.00018095486508599873;
-static const double solved_drive_L_w_w_y_w = 0.05094578933709926;
-static const double solved_drive_f_w_w = -0.19926695404517647;
-static const double solved_coast_Phi_theta_d_theta_d = 0.9266450076651614;
-static const double solved_coast_Phi_theta_d_w_em = 0.0011774624864130231;
-static const double solved_coast_Phi_theta_d_w_w = -0.009538955318479479;
-static const double solved_coast_Phi_w_em_theta_d = -113.03639869565022;
-static const double solved_coast_Phi_w_em_w_em = 0.8877247096409043;
-static const double solved_coast_Phi_w_em_w_w = 0.9063027998317674;
-static const double solved_coast_Phi_w_w_theta_d = 0.4242481865063841;
-static const double solved_coast_Phi_w_w_w_em = 0.0004198762102533091;
-static const double solved_coast_Phi_w_w_w_w = 0.9965087774211902;
-static const double solved_coast_Gamma_theta_d_T_em = 0.00012013454601784477;
-static const double solved_coast_Gamma_theta_d_T_br = 4.5086463545619123e-07;
-static const double solved_coast_Gamma_w_em_T_em = 0.19102066835634401;
-static const double solved_coast_Gamma_w_em_T_br = -3.354883425114947e-05;
-static const double solved_coast_Gamma_w_w_T_em = 3.3548834251149476e-05;
-static const double solved_coast_Gamma_w_w_T_br = -9.25268702445275e-05;
-static const double solved_coast_G_theta_d_w_em = 6.006727300892239e-06;
-static const double solved_coast_G_theta_d_w_w = -4.865956578160943e-05;
-static const double solved_coast_G_w_em_w_em = 0.009551033417817201;
-static const double solved_coast_G_w_em_w_w = 0.003620757936555306;
-static const double solved_coast_G_w_w_w_em = 1.6774417125574738e-06;
-static const double solved_coast_G_w_w_w_w = 0.00998596247114063;
-static const double solved_coast_L_theta_d_y_em = -0.0013918329312859541;
-static const double solved_coast_L_theta_d_y_w = -0.00021584339292280485;
-static const double solved_coast_L_w_em_y_em = 0.6103463852031026;
-static const double solved_coast_L_w_em_y_w = 0.006514375143095953;
-static const double solved_coast_L_w_w_y_em = 0.00018095486508599873;
-static const double solved_coast_L_w_w_y_w = 0.05094578933709926;
-static const double solved_coast_f_w_w = -0.19926695404517647;
-static const double solved_stamp_J_em = 0.05;
+const char estimator_simple_Version[] = estimator_simple_DIGEST;
 
-const estimator_simple_Cal estimator_simple_default_cal = {
+estimator_simple_CALIBRATION const volatile estimator_simple_Cal estimator_simple_default_cal = {
     .J_em = 0.05,
+    .solved = {
+        .drive_Phi_theta_d_theta_d = 0.9266450076651614,
+        .drive_Phi_theta_d_w_em = 0.0011774624864130231,
+        .drive_Phi_theta_d_w_w = -0.009538955318479479,
+        .drive_Phi_w_em_theta_d = -113.03639869565022,
+        .drive_Phi_w_em_w_em = 0.8877247096409043,
+        .drive_Phi_w_em_w_w = 0.9063027998317674,
+        .drive_Phi_w_w_theta_d = 0.4242481865063841,
+        .drive_Phi_w_w_w_em = 0.0004198762102533091,
+        .drive_Phi_w_w_w_w = 0.9965087774211902,
+        .drive_Gamma_theta_d_T_em = 0.00012013454601784477,
+        .drive_Gamma_theta_d_T_br = 4.5086463545619123e-07,
+        .drive_Gamma_w_em_T_em = 0.19102066835634401,
+        .drive_Gamma_w_em_T_br = -3.354883425114947e-05,
+        .drive_Gamma_w_w_T_em = 3.3548834251149476e-05,
+        .drive_Gamma_w_w_T_br = -9.25268702445275e-05,
+        .drive_G_theta_d_w_em = 6.006727300892239e-06,
+        .drive_G_theta_d_w_w = -4.865956578160943e-05,
+        .drive_G_w_em_w_em = 0.009551033417817201,
+        .drive_G_w_em_w_w = 0.003620757936555306,
+        .drive_G_w_w_w_em = 1.6774417125574738e-06,
+        .drive_G_w_w_w_w = 0.00998596247114063,
+        .drive_L_theta_d_y_em = -0.0013918329312859541,
+        .drive_L_theta_d_y_w = -0.00021584339292280485,
+        .drive_L_w_em_y_em = 0.6103463852031026,
+        .drive_L_w_em_y_w = 0.006514375143095953,
+        .drive_L_w_w_y_em = 0.00018095486508599873,
+        .drive_L_w_w_y_w = 0.05094578933709926,
+        .drive_f_w_w = -0.19926695404517647,
+        .coast_Phi_theta_d_theta_d = 0.9266450076651614,
+        .coast_Phi_theta_d_w_em = 0.0011774624864130231,
+        .coast_Phi_theta_d_w_w = -0.009538955318479479,
+        .coast_Phi_w_em_theta_d = -113.03639869565022,
+        .coast_Phi_w_em_w_em = 0.8877247096409043,
+        .coast_Phi_w_em_w_w = 0.9063027998317674,
+        .coast_Phi_w_w_theta_d = 0.4242481865063841,
+        .coast_Phi_w_w_w_em = 0.0004198762102533091,
+        .coast_Phi_w_w_w_w = 0.9965087774211902,
+        .coast_Gamma_theta_d_T_em = 0.00012013454601784477,
+        .coast_Gamma_theta_d_T_br = 4.5086463545619123e-07,
+        .coast_Gamma_w_em_T_em = 0.19102066835634401,
+        .coast_Gamma_w_em_T_br = -3.354883425114947e-05,
+        .coast_Gamma_w_w_T_em = 3.3548834251149476e-05,
+        .coast_Gamma_w_w_T_br = -9.25268702445275e-05,
+        .coast_G_theta_d_w_em = 6.006727300892239e-06,
+        .coast_G_theta_d_w_w = -4.865956578160943e-05,
+        .coast_G_w_em_w_em = 0.009551033417817201,
+        .coast_G_w_em_w_w = 0.003620757936555306,
+        .coast_G_w_w_w_em = 1.6774417125574738e-06,
+        .coast_G_w_w_w_w = 0.00998596247114063,
+        .coast_L_theta_d_y_em = -0.0013918329312859541,
+        .coast_L_theta_d_y_w = -0.00021584339292280485,
+        .coast_L_w_em_y_em = 0.6103463852031026,
+        .coast_L_w_em_y_w = 0.006514375143095953,
+        .coast_L_w_w_y_em = 0.00018095486508599873,
+        .coast_L_w_w_y_w = 0.05094578933709926,
+        .coast_f_w_w = -0.19926695404517647,
+        .stamp_J_em = 0.05,
+    },
 };
 
 /* Values that live within one step */
@@ -135,33 +138,35 @@ static inline void latch_apart(estimator_simple_Self *self, const estimator_simp
     }
 }
 
-static inline void predict_drive(estimator_simple_Self *self)
+static inline void predict_drive(estimator_simple_Self *self,
+    const volatile estimator_simple_Cal *cal)
 {
     /* estimator_simple modes.drive.observer.f.w_em */
     const double f_w_em = self->derived.k_hs_per_R_per_J_em * self->state.theta_b;
     /* estimator_simple modes.drive.observer.f.w_w */
-    const double f_w_w = (-(constant.k_hs_per_J_v * self->state.theta_b)) + solved_drive_f_w_w;
+    const double f_w_w = (-(constant.k_hs_per_J_v * self->state.theta_b)) + cal->solved.drive_f_w_w;
     /* estimator_simple modes.drive.observer */
-    const double predicted_theta_d = (solved_drive_Phi_theta_d_theta_d * self->state.theta_d)
-        + (solved_drive_Phi_theta_d_w_em * self->state.w_em)
-        + (solved_drive_Phi_theta_d_w_w * self->state.w_w)
-        + (solved_drive_Gamma_theta_d_T_em * self->before.T_em)
-        + (solved_drive_Gamma_theta_d_T_br * self->before.T_br)
-        + (solved_drive_G_theta_d_w_em * f_w_em) + (solved_drive_G_theta_d_w_w * f_w_w);
+    const double predicted_theta_d = (cal->solved.drive_Phi_theta_d_theta_d * self->state.theta_d)
+        + (cal->solved.drive_Phi_theta_d_w_em * self->state.w_em)
+        + (cal->solved.drive_Phi_theta_d_w_w * self->state.w_w)
+        + (cal->solved.drive_Gamma_theta_d_T_em * self->before.T_em)
+        + (cal->solved.drive_Gamma_theta_d_T_br * self->before.T_br)
+        + (cal->solved.drive_G_theta_d_w_em * f_w_em)
+        + (cal->solved.drive_G_theta_d_w_w * f_w_w);
     /* estimator_simple modes.drive.observer */
-    const double predicted_w_em = (solved_drive_Phi_w_em_theta_d * self->state.theta_d)
-        + (solved_drive_Phi_w_em_w_em * self->state.w_em)
-        + (solved_drive_Phi_w_em_w_w * self->state.w_w)
-        + (solved_drive_Gamma_w_em_T_em * self->before.T_em)
-        + (solved_drive_Gamma_w_em_T_br * self->before.T_br)
-        + (solved_drive_G_w_em_w_em * f_w_em) + (solved_drive_G_w_em_w_w * f_w_w);
+    const double predicted_w_em = (cal->solved.drive_Phi_w_em_theta_d * self->state.theta_d)
+        + (cal->solved.drive_Phi_w_em_w_em * self->state.w_em)
+        + (cal->solved.drive_Phi_w_em_w_w * self->state.w_w)
+        + (cal->solved.drive_Gamma_w_em_T_em * self->before.T_em)
+        + (cal->solved.drive_Gamma_w_em_T_br * self->before.T_br)
+        + (cal->solved.drive_G_w_em_w_em * f_w_em) + (cal->solved.drive_G_w_em_w_w * f_w_w);
     /* estimator_simple modes.drive.observer */
-    const double predicted_w_w = (solved_drive_Phi_w_w_theta_d * self->state.theta_d)
-        + (solved_drive_Phi_w_w_w_em * self->state.w_em)
-        + (solved_drive_Phi_w_w_w_w * self->state.w_w)
-        + (solved_drive_Gamma_w_w_T_em * self->before.T_em)
-        + (solved_drive_Gamma_w_w_T_br * self->before.T_br) + (solved_drive_G_w_w_w_em * f_w_em)
-        + (solved_drive_G_w_w_w_w * f_w_w);
+    const double predicted_w_w = (cal->solved.drive_Phi_w_w_theta_d * self->state.theta_d)
+        + (cal->solved.drive_Phi_w_w_w_em * self->state.w_em)
+        + (cal->solved.drive_Phi_w_w_w_w * self->state.w_w)
+        + (cal->solved.drive_Gamma_w_w_T_em * self->before.T_em)
+        + (cal->solved.drive_Gamma_w_w_T_br * self->before.T_br)
+        + (cal->solved.drive_G_w_w_w_em * f_w_em) + (cal->solved.drive_G_w_w_w_w * f_w_w);
     if (fabs(predicted_theta_d) <= 0.5) {
         self->state.theta_d = predicted_theta_d;
     } else {
@@ -182,29 +187,32 @@ static inline void predict_drive(estimator_simple_Self *self)
     }
 }
 
-static inline void correct_drive(estimator_simple_Self *self, const estimator_simple_In *in)
+static inline void correct_drive(estimator_simple_Self *self,
+    const volatile estimator_simple_Cal *cal, const estimator_simple_In *in)
 {
     self->innovation.y_em = in->is_new.y_em ? (self->latched.y_em - self->state.w_em) : 0.0;
     self->innovation.y_w = in->is_new.y_w ? (self->latched.y_w - self->state.w_w) : 0.0;
     const double new_theta_d =
-        self->state.theta_d + ((solved_drive_L_theta_d_y_em * self->innovation.y_em)
-        + (solved_drive_L_theta_d_y_w * self->innovation.y_w));
+        self->state.theta_d + ((cal->solved.drive_L_theta_d_y_em * self->innovation.y_em)
+        + (cal->solved.drive_L_theta_d_y_w * self->innovation.y_w));
     if (fabs(new_theta_d) <= 0.5) {
         self->state.theta_d = new_theta_d;
     } else {
         self->faults |= estimator_simple_FAULT_range_theta_d;
         self->state.theta_d = ha_clip(new_theta_d, -0.5, 0.5);
     }
-    const double new_w_em = self->state.w_em + ((solved_drive_L_w_em_y_em * self->innovation.y_em)
-        + (solved_drive_L_w_em_y_w * self->innovation.y_w));
+    const double new_w_em =
+        self->state.w_em + ((cal->solved.drive_L_w_em_y_em * self->innovation.y_em)
+        + (cal->solved.drive_L_w_em_y_w * self->innovation.y_w));
     if ((new_w_em >= (-400.0)) && (new_w_em <= 2400.0)) {
         self->state.w_em = new_w_em;
     } else {
         self->faults |= estimator_simple_FAULT_range_w_em;
         self->state.w_em = ha_clip(new_w_em, -400.0, 2400.0);
     }
-    const double new_w_w = self->state.w_w + ((solved_drive_L_w_w_y_em * self->innovation.y_em)
-        + (solved_drive_L_w_w_y_w * self->innovation.y_w));
+    const double new_w_w =
+        self->state.w_w + ((cal->solved.drive_L_w_w_y_em * self->innovation.y_em)
+        + (cal->solved.drive_L_w_w_y_w * self->innovation.y_w));
     if ((new_w_w >= (-50.0)) && (new_w_w <= 300.0)) {
         self->state.w_w = new_w_w;
     } else {
@@ -213,33 +221,35 @@ static inline void correct_drive(estimator_simple_Self *self, const estimator_si
     }
 }
 
-static inline void predict_coast(estimator_simple_Self *self)
+static inline void predict_coast(estimator_simple_Self *self,
+    const volatile estimator_simple_Cal *cal)
 {
     /* estimator_simple modes.coast.observer.f.w_em */
     const double f_w_em = self->derived.k_hs_per_R_per_J_em * self->state.theta_b;
     /* estimator_simple modes.coast.observer.f.w_w */
-    const double f_w_w = (-(constant.k_hs_per_J_v * self->state.theta_b)) + solved_coast_f_w_w;
+    const double f_w_w = (-(constant.k_hs_per_J_v * self->state.theta_b)) + cal->solved.coast_f_w_w;
     /* estimator_simple modes.coast.observer */
-    const double predicted_theta_d = (solved_coast_Phi_theta_d_theta_d * self->state.theta_d)
-        + (solved_coast_Phi_theta_d_w_em * self->state.w_em)
-        + (solved_coast_Phi_theta_d_w_w * self->state.w_w)
-        + (solved_coast_Gamma_theta_d_T_em * self->before.T_em)
-        + (solved_coast_Gamma_theta_d_T_br * self->before.T_br)
-        + (solved_coast_G_theta_d_w_em * f_w_em) + (solved_coast_G_theta_d_w_w * f_w_w);
+    const double predicted_theta_d = (cal->solved.coast_Phi_theta_d_theta_d * self->state.theta_d)
+        + (cal->solved.coast_Phi_theta_d_w_em * self->state.w_em)
+        + (cal->solved.coast_Phi_theta_d_w_w * self->state.w_w)
+        + (cal->solved.coast_Gamma_theta_d_T_em * self->before.T_em)
+        + (cal->solved.coast_Gamma_theta_d_T_br * self->before.T_br)
+        + (cal->solved.coast_G_theta_d_w_em * f_w_em)
+        + (cal->solved.coast_G_theta_d_w_w * f_w_w);
     /* estimator_simple modes.coast.observer */
-    const double predicted_w_em = (solved_coast_Phi_w_em_theta_d * self->state.theta_d)
-        + (solved_coast_Phi_w_em_w_em * self->state.w_em)
-        + (solved_coast_Phi_w_em_w_w * self->state.w_w)
-        + (solved_coast_Gamma_w_em_T_em * self->before.T_em)
-        + (solved_coast_Gamma_w_em_T_br * self->before.T_br)
-        + (solved_coast_G_w_em_w_em * f_w_em) + (solved_coast_G_w_em_w_w * f_w_w);
+    const double predicted_w_em = (cal->solved.coast_Phi_w_em_theta_d * self->state.theta_d)
+        + (cal->solved.coast_Phi_w_em_w_em * self->state.w_em)
+        + (cal->solved.coast_Phi_w_em_w_w * self->state.w_w)
+        + (cal->solved.coast_Gamma_w_em_T_em * self->before.T_em)
+        + (cal->solved.coast_Gamma_w_em_T_br * self->before.T_br)
+        + (cal->solved.coast_G_w_em_w_em * f_w_em) + (cal->solved.coast_G_w_em_w_w * f_w_w);
     /* estimator_simple modes.coast.observer */
-    const double predicted_w_w = (solved_coast_Phi_w_w_theta_d * self->state.theta_d)
-        + (solved_coast_Phi_w_w_w_em * self->state.w_em)
-        + (solved_coast_Phi_w_w_w_w * self->state.w_w)
-        + (solved_coast_Gamma_w_w_T_em * self->before.T_em)
-        + (solved_coast_Gamma_w_w_T_br * self->before.T_br) + (solved_coast_G_w_w_w_em * f_w_em)
-        + (solved_coast_G_w_w_w_w * f_w_w);
+    const double predicted_w_w = (cal->solved.coast_Phi_w_w_theta_d * self->state.theta_d)
+        + (cal->solved.coast_Phi_w_w_w_em * self->state.w_em)
+        + (cal->solved.coast_Phi_w_w_w_w * self->state.w_w)
+        + (cal->solved.coast_Gamma_w_w_T_em * self->before.T_em)
+        + (cal->solved.coast_Gamma_w_w_T_br * self->before.T_br)
+        + (cal->solved.coast_G_w_w_w_em * f_w_em) + (cal->solved.coast_G_w_w_w_w * f_w_w);
     if (fabs(predicted_theta_d) <= 0.5) {
         self->state.theta_d = predicted_theta_d;
     } else {
@@ -260,29 +270,32 @@ static inline void predict_coast(estimator_simple_Self *self)
     }
 }
 
-static inline void correct_coast(estimator_simple_Self *self, const estimator_simple_In *in)
+static inline void correct_coast(estimator_simple_Self *self,
+    const volatile estimator_simple_Cal *cal, const estimator_simple_In *in)
 {
     self->innovation.y_em = in->is_new.y_em ? (self->latched.y_em - self->state.w_em) : 0.0;
     self->innovation.y_w = in->is_new.y_w ? (self->latched.y_w - self->state.w_w) : 0.0;
     const double new_theta_d =
-        self->state.theta_d + ((solved_coast_L_theta_d_y_em * self->innovation.y_em)
-        + (solved_coast_L_theta_d_y_w * self->innovation.y_w));
+        self->state.theta_d + ((cal->solved.coast_L_theta_d_y_em * self->innovation.y_em)
+        + (cal->solved.coast_L_theta_d_y_w * self->innovation.y_w));
     if (fabs(new_theta_d) <= 0.5) {
         self->state.theta_d = new_theta_d;
     } else {
         self->faults |= estimator_simple_FAULT_range_theta_d;
         self->state.theta_d = ha_clip(new_theta_d, -0.5, 0.5);
     }
-    const double new_w_em = self->state.w_em + ((solved_coast_L_w_em_y_em * self->innovation.y_em)
-        + (solved_coast_L_w_em_y_w * self->innovation.y_w));
+    const double new_w_em =
+        self->state.w_em + ((cal->solved.coast_L_w_em_y_em * self->innovation.y_em)
+        + (cal->solved.coast_L_w_em_y_w * self->innovation.y_w));
     if ((new_w_em >= (-400.0)) && (new_w_em <= 2400.0)) {
         self->state.w_em = new_w_em;
     } else {
         self->faults |= estimator_simple_FAULT_range_w_em;
         self->state.w_em = ha_clip(new_w_em, -400.0, 2400.0);
     }
-    const double new_w_w = self->state.w_w + ((solved_coast_L_w_w_y_em * self->innovation.y_em)
-        + (solved_coast_L_w_w_y_w * self->innovation.y_w));
+    const double new_w_w =
+        self->state.w_w + ((cal->solved.coast_L_w_w_y_em * self->innovation.y_em)
+        + (cal->solved.coast_L_w_w_y_w * self->innovation.y_w));
     if ((new_w_w >= (-50.0)) && (new_w_w <= 300.0)) {
         self->state.w_w = new_w_w;
     } else {
@@ -307,6 +320,8 @@ static inline void jump_drive(estimator_simple_Self *self)
         self->timer.drive_gap = 0U;
     } else if (self->timer.drive_gap < 2U) {
         self->timer.drive_gap++;
+    } else {
+        /* nothing to do */
     }
     if (self->timer.drive_gap > 1U) {
         self->timer.drive_gap = 0U;
@@ -331,11 +346,15 @@ static inline void jump_gap(estimator_simple_Self *self, Work *work)
         self->timer.gap_drive = 0U;
     } else if (self->timer.gap_drive < 2U) {
         self->timer.gap_drive++;
+    } else {
+        /* nothing to do */
     }
     if (!(self->latched.T_req < 0.0)) { /* estimator_simple modes.gap.transitions.coast.when */
         self->timer.gap_coast = 0U;
     } else if (self->timer.gap_coast < 2U) {
         self->timer.gap_coast++;
+    } else {
+        /* nothing to do */
     }
     if (self->timer.gap_drive > 1U) {
         /* estimator_simple modes.gap.transitions.drive.reset.theta_b */
@@ -411,6 +430,8 @@ static inline void jump_gap(estimator_simple_Self *self, Work *work)
         self->timer.gap_coast = 0U;
         self->mode = estimator_simple_MODE_coast;
         self->fired = 3U; /* estimator_simple modes.gap.transitions.coast */
+    } else {
+        /* nothing to do */
     }
 }
 
@@ -462,6 +483,8 @@ static inline void jump_coast(estimator_simple_Self *self)
         self->timer.coast_gap = 0U;
     } else if (self->timer.coast_gap < 2U) {
         self->timer.coast_gap++;
+    } else {
+        /* nothing to do */
     }
     if (self->timer.coast_gap > 1U) {
         self->timer.coast_gap = 0U;
@@ -470,9 +493,10 @@ static inline void jump_coast(estimator_simple_Self *self)
     }
 }
 
-static inline void compare_stamps(estimator_simple_Self *self, const estimator_simple_Cal *cal)
+static inline void compare_stamps(estimator_simple_Self *self,
+    const volatile estimator_simple_Cal *cal)
 {
-    if (cal->J_em != solved_stamp_J_em) {
+    if (cal->J_em != cal->solved.stamp_J_em) {
         self->faults |= estimator_simple_FAULT_stale_calibration;
     }
 }
@@ -498,7 +522,8 @@ static inline void remember(estimator_simple_Self *self)
     self->before.T_br = self->latched.T_br;
 }
 
-static inline void start(estimator_simple_Self *self, const estimator_simple_In *in)
+static inline void start(estimator_simple_Self *self, const volatile estimator_simple_Cal *cal,
+    const estimator_simple_In *in)
 {
     if (fabs(constant.alpha) <= 0.5) {
         self->state.theta_d = constant.alpha; /* estimator_simple states.theta_d.initial */
@@ -526,16 +551,16 @@ static inline void start(estimator_simple_Self *self, const estimator_simple_In 
     }
     self->mode = estimator_simple_MODE_drive;
     self->started = true;
-    correct_drive(self, in);
+    correct_drive(self, cal, in);
 }
 
-void estimator_simple_Derive(const estimator_simple_Cal *cal, estimator_simple_Derived *derived)
+void estimator_simple_Derive(const volatile estimator_simple_Cal *cal, estimator_simple_Derived *derived)
 {
     /* k_hs / R / J_em */
     derived->k_hs_per_R_per_J_em = constant.k_hs / constant.R / cal->J_em;
 }
 
-void estimator_simple_Init(estimator_simple_Self *self, const estimator_simple_Cal *cal)
+void estimator_simple_Init(estimator_simple_Self *self, const volatile estimator_simple_Cal *cal)
 {
     static const estimator_simple_Self zero; /* every member 0 or false */
 
@@ -552,19 +577,18 @@ void estimator_simple_Init(estimator_simple_Self *self, const estimator_simple_C
     compare_stamps(self, cal);
 }
 
-void estimator_simple_Calibrate(estimator_simple_Self *self, const estimator_simple_Cal *cal)
+void estimator_simple_Calibrate(estimator_simple_Self *self, const volatile estimator_simple_Cal *cal)
 {
     estimator_simple_Derive(cal, &self->derived);
     compare_stamps(self, cal);
 }
 
-void estimator_simple_Step(estimator_simple_Self *self, const estimator_simple_Cal *cal, const estimator_simple_In *in,
-    estimator_simple_Out *out)
+void estimator_simple_Step(estimator_simple_Self *self, const volatile estimator_simple_Cal *cal,
+    const estimator_simple_In *in, estimator_simple_Out *out)
 {
     Work scratch;
     Work *const work = &scratch;
 
-    (void)cal;
     self->fired = 0U;
     latch(self, in);
     self->innovation.y_em = 0.0;
@@ -572,18 +596,18 @@ void estimator_simple_Step(estimator_simple_Self *self, const estimator_simple_C
     if (self->started) {
         switch (self->mode) {
         case estimator_simple_MODE_drive:
-            predict_drive(self);
-            correct_drive(self, in);
+            predict_drive(self, cal);
+            correct_drive(self, cal, in);
             break;
         case estimator_simple_MODE_coast:
-            predict_coast(self);
-            correct_coast(self, in);
+            predict_coast(self, cal);
+            correct_coast(self, cal, in);
             break;
         default:
             break;
         }
     } else {
-        start(self, in);
+        start(self, cal, in);
     }
     switch (self->mode) {
     case estimator_simple_MODE_drive:

@@ -30,9 +30,68 @@ enum {
 #define estimator_simple_FAULT_range_w_w (1UL << 8)
 #define estimator_simple_FAULT_range_theta_b (1UL << 9)
 
-/* Tunable parameters */
+/* The calibration page: tunable parameters */
 typedef struct {
     double J_em; /* kg*m^2; driveline parameters.J_em; 0.01 to 0.2; motor and gears, at the motor */
+    struct {
+        double drive_Phi_theta_d_theta_d;
+        double drive_Phi_theta_d_w_em;
+        double drive_Phi_theta_d_w_w;
+        double drive_Phi_w_em_theta_d;
+        double drive_Phi_w_em_w_em;
+        double drive_Phi_w_em_w_w;
+        double drive_Phi_w_w_theta_d;
+        double drive_Phi_w_w_w_em;
+        double drive_Phi_w_w_w_w;
+        double drive_Gamma_theta_d_T_em;
+        double drive_Gamma_theta_d_T_br;
+        double drive_Gamma_w_em_T_em;
+        double drive_Gamma_w_em_T_br;
+        double drive_Gamma_w_w_T_em;
+        double drive_Gamma_w_w_T_br;
+        double drive_G_theta_d_w_em;
+        double drive_G_theta_d_w_w;
+        double drive_G_w_em_w_em;
+        double drive_G_w_em_w_w;
+        double drive_G_w_w_w_em;
+        double drive_G_w_w_w_w;
+        double drive_L_theta_d_y_em;
+        double drive_L_theta_d_y_w;
+        double drive_L_w_em_y_em;
+        double drive_L_w_em_y_w;
+        double drive_L_w_w_y_em;
+        double drive_L_w_w_y_w;
+        double drive_f_w_w;
+        double coast_Phi_theta_d_theta_d;
+        double coast_Phi_theta_d_w_em;
+        double coast_Phi_theta_d_w_w;
+        double coast_Phi_w_em_theta_d;
+        double coast_Phi_w_em_w_em;
+        double coast_Phi_w_em_w_w;
+        double coast_Phi_w_w_theta_d;
+        double coast_Phi_w_w_w_em;
+        double coast_Phi_w_w_w_w;
+        double coast_Gamma_theta_d_T_em;
+        double coast_Gamma_theta_d_T_br;
+        double coast_Gamma_w_em_T_em;
+        double coast_Gamma_w_em_T_br;
+        double coast_Gamma_w_w_T_em;
+        double coast_Gamma_w_w_T_br;
+        double coast_G_theta_d_w_em;
+        double coast_G_theta_d_w_w;
+        double coast_G_w_em_w_em;
+        double coast_G_w_em_w_w;
+        double coast_G_w_w_w_em;
+        double coast_G_w_w_w_w;
+        double coast_L_theta_d_y_em;
+        double coast_L_theta_d_y_w;
+        double coast_L_w_em_y_em;
+        double coast_L_w_em_y_w;
+        double coast_L_w_w_y_em;
+        double coast_L_w_w_y_w;
+        double coast_f_w_w;
+        double stamp_J_em;
+    } solved; /* matrix exponentials and gains for these values, stamps of the values */
 } estimator_simple_Cal;
 
 /* What follows from tunable parameters: estimator_simple_Derive */
@@ -102,18 +161,21 @@ typedef struct {
     estimator_simple_Derived derived;
 } estimator_simple_Self;
 
-/* Default values of the tunable parameters */
-extern const estimator_simple_Cal estimator_simple_default_cal;
+/* The digest of the Program, which a tool compares with that of its description */
+extern const char estimator_simple_Version[17];
+
+/* The page with default values, in a section of its own: estimator_simple_MemMap.h */
+extern const volatile estimator_simple_Cal estimator_simple_default_cal;
 
 /* Before the first step */
-void estimator_simple_Init(estimator_simple_Self *self, const estimator_simple_Cal *cal);
+void estimator_simple_Init(estimator_simple_Self *self, const volatile estimator_simple_Cal *cal);
 
 /* After a change of the calibration page: X_Derive, and a fault if solved numbers do not fit it */
-void estimator_simple_Calibrate(estimator_simple_Self *self, const estimator_simple_Cal *cal);
-void estimator_simple_Derive(const estimator_simple_Cal *cal, estimator_simple_Derived *derived);
+void estimator_simple_Calibrate(estimator_simple_Self *self, const volatile estimator_simple_Cal *cal);
+void estimator_simple_Derive(const volatile estimator_simple_Cal *cal, estimator_simple_Derived *derived);
 
 /* One tick of 1/100 s */
-void estimator_simple_Step(estimator_simple_Self *self, const estimator_simple_Cal *cal, const estimator_simple_In *in,
-    estimator_simple_Out *out);
+void estimator_simple_Step(estimator_simple_Self *self, const volatile estimator_simple_Cal *cal,
+    const estimator_simple_In *in, estimator_simple_Out *out);
 
 #endif

@@ -3,6 +3,7 @@
  * Program digest: 7ff3fa8704c82bfd
  */
 #include "estimator_written.h"
+#include "estimator_written_MemMap.h"
 
 #include <float.h>
 #include <math.h>
@@ -50,233 +51,235 @@ static const struct {
     .k_hs_per_c_hs = 342.85714285714283, /* k_hs / c_hs */
 };
 
-/* Numbers solved when the spec was checked: matrix exponentials, gains, stamps */
-static const double solved_drive_contact_A_w_w_w_w = -0.13190235116979385;
-static const double solved_drive_contact_A_w_w_w_em = 0.01601477935351768;
-static const double solved_drive_contact_A_w_w_theta_d = 44.47533009034052;
-static const double solved_drive_contact_A_w_w_theta_b = -44.47533009034052;
-static const double solved_drive_contact_A_w_em_w_w = 34.5679012345679;
-static const double solved_drive_contact_A_w_em_w_em = -4.307642127724432;
-static const double solved_drive_contact_A_w_em_theta_d = -11851.851851851852;
-static const double solved_drive_contact_A_w_em_theta_b = 11851.851851851852;
-static const double solved_drive_contact_A_theta_d_w_w = -1.0;
-static const double solved_drive_contact_A_theta_d_w_em = 0.1234567901234568;
-static const double solved_drive_contact_E_w_w_w_w = 0.9998462129618946;
-static const double solved_drive_contact_E_w_w_w_em = 1.871625595018408e-05;
-static const double solved_drive_contact_E_w_w_theta_d = 0.04436648883751279;
-static const double solved_drive_contact_E_w_w_theta_b = -0.044366488837512784;
-static const double solved_drive_contact_E_w_em_w_w = 0.040399038468472315;
-static const double solved_drive_contact_E_w_em_w_em = 0.9949725549629289;
-static const double solved_drive_contact_E_w_em_theta_d = -11.822623930043962;
-static const double solved_drive_contact_E_w_em_theta_b = 11.82262393004396;
-static const double solved_drive_contact_E_theta_d_w_w = -0.0009975527724559515;
-static const double solved_drive_contact_E_theta_d_w_em = 0.00012315233260462458;
-static const double solved_drive_contact_E_theta_d_theta_d = 0.9992473745748891;
-static const double solved_drive_contact_E_theta_d_theta_b = 0.0007526254251109057;
-static const double solved_drive_contact_E_theta_b_theta_b = 1.0;
-static const double solved_drive_contact_F_w_w_w_w = 0.000999926748171719;
-static const double solved_drive_contact_F_w_w_w_em = 8.90859545875239e-09;
-static const double solved_drive_contact_F_w_w_theta_d = 2.2202300472007347e-05;
-static const double solved_drive_contact_F_w_w_theta_b = -2.2202300472007347e-05;
-static const double solved_drive_contact_F_w_em_w_w = 1.9229203297717024e-05;
-static const double solved_drive_contact_F_w_em_w_em = 0.000997606053720675;
-static const double solved_drive_contact_F_w_em_theta_d = -0.0059164273095750775;
-static const double solved_drive_contact_F_w_em_theta_b = 0.0059164273095750775;
-static const double solved_drive_contact_F_theta_d_w_w = -4.992048496752902e-07;
-static const double solved_drive_contact_F_theta_d_w_em = 6.162945114140707e-08;
-static const double solved_drive_contact_F_theta_d_theta_d = 0.0009997490195295358;
-static const double solved_drive_contact_F_theta_d_theta_b = 2.5098047046427575e-07;
-static const double solved_drive_contact_F_theta_b_theta_b = 0.001;
-static const double solved_drive_contact_Eh_w_w_w_w = 0.9999285690504482;
-static const double solved_drive_contact_Eh_w_w_w_em = 8.683825085133594e-06;
-static const double solved_drive_contact_Eh_w_w_theta_d = 0.022211828830417918;
-static const double solved_drive_contact_Eh_w_w_theta_b = -0.022211828830417918;
-static const double solved_drive_contact_Eh_w_em_w_w = 0.01874403644626086;
-static const double solved_drive_contact_Eh_w_em_w_em = 0.9976659429366962;
-static const double solved_drive_contact_Eh_w_em_theta_d = -5.9189850706119405;
-static const double solved_drive_contact_Eh_w_em_theta_b = 5.9189850706119405;
-static const double solved_drive_contact_Eh_theta_d_w_w = -0.0004994190888589279;
-static const double solved_drive_contact_Eh_theta_d_w_em = 6.165609448554105e-05;
-static const double solved_drive_contact_Eh_theta_d_theta_d = 0.9998116868135607;
-static const double solved_drive_contact_Eh_theta_d_theta_b = 0.00018831318643927917;
-static const double solved_drive_contact_Eh_theta_b_theta_b = 1.0;
-static const double solved_drive_contact_Fh_w_w_w_w = 0.0004999825985617613;
-static const double solved_drive_contact_Fh_w_w_w_em = 2.1146298785966265e-09;
-static const double solved_drive_contact_Fh_w_w_theta_d = 5.555167574277176e-06;
-static const double solved_drive_contact_Fh_w_w_theta_b = -5.555167574277176e-06;
-static const double solved_drive_contact_Fh_w_em_w_w = 4.564428592950816e-06;
-static const double solved_drive_contact_Fh_w_em_w_em = 0.000499431493834899;
-static const double solved_drive_contact_Fh_w_em_theta_d = -0.001480339952806516;
-static const double solved_drive_contact_Fh_w_em_theta_b = 0.0014803399528065162;
-static const double solved_drive_contact_Fh_theta_d_w_w = -1.2490447092788836e-07;
-static const double solved_drive_contact_Fh_theta_d_w_em = 1.5420207841734543e-08;
-static const double solved_drive_contact_Fh_theta_d_theta_d = 0.0004999686082740045;
-static const double solved_drive_contact_Fh_theta_d_theta_b = 3.139172599561107e-08;
-static const double solved_drive_contact_Fh_theta_b_theta_b = 0.0005;
-static const double solved_no_contact_A_w_w_w_w = -0.002182638406300672;
-static const double solved_no_contact_A_w_em_w_em = -0.04;
-static const double solved_no_contact_A_theta_d_w_w = -1.0;
-static const double solved_no_contact_A_theta_d_w_em = 0.1234567901234568;
-static const double solved_no_contact_A_theta_b_w_w = -1.0;
-static const double solved_no_contact_A_theta_b_w_em = 0.1234567901234568;
-static const double solved_no_contact_A_theta_b_theta_d = 342.85714285714283;
-static const double solved_no_contact_A_theta_b_theta_b = -342.85714285714283;
-static const double solved_no_contact_E_w_w_w_w = 0.9999978173639756;
-static const double solved_no_contact_E_w_em_w_em = 0.9999600007999894;
-static const double solved_no_contact_E_theta_d_w_w = -0.000999998908681591;
-static const double solved_no_contact_E_theta_d_w_em = 0.00012345432102057582;
-static const double solved_no_contact_E_theta_d_theta_d = 1.0;
-static const double solved_no_contact_E_theta_b_w_w = -0.000999998908681591;
-static const double solved_no_contact_E_theta_b_w_em = 0.00012345432102057582;
-static const double solved_no_contact_E_theta_b_theta_d = 0.2902604043108745;
-static const double solved_no_contact_E_theta_b_theta_b = 0.7097395956891255;
-static const double solved_no_contact_F_w_w_w_w = 0.000999998908681591;
-static const double solved_no_contact_F_w_em_w_em = 0.000999980000266664;
-static const double solved_no_contact_F_theta_d_w_w = -4.999996362271308e-07;
-static const double solved_no_contact_F_theta_d_w_em = 6.172757202469129e-08;
-static const double solved_no_contact_F_theta_d_theta_d = 0.001;
-static const double solved_no_contact_F_theta_b_w_w = -4.999996362271308e-07;
-static const double solved_no_contact_F_theta_b_w_em = 6.172757202469129e-08;
-static const double solved_no_contact_F_theta_b_theta_d = 0.0001534071540932826;
-static const double solved_no_contact_F_theta_b_theta_b = 0.0008465928459067174;
-static const double solved_no_contact_Eh_w_w_w_w = 0.9999989086813923;
-static const double solved_no_contact_Eh_w_em_w_em = 0.9999800001999987;
-static const double solved_no_contact_Eh_theta_d_w_w = -0.0004999997271702985;
-static const double solved_no_contact_Eh_theta_d_w_em = 6.172777778189298e-05;
-static const double solved_no_contact_Eh_theta_d_theta_d = 1.0;
-static const double solved_no_contact_Eh_theta_b_w_w = -0.0004999997271702985;
-static const double solved_no_contact_Eh_theta_b_w_em = 6.172777778189298e-05;
-static const double solved_no_contact_Eh_theta_b_theta_d = 0.1575395583832286;
-static const double solved_no_contact_Eh_theta_b_theta_b = 0.8424604416167714;
-static const double solved_no_contact_Fh_w_w_w_w = 0.0004999997271702985;
-static const double solved_no_contact_Fh_w_em_w_em = 0.0004999950000333332;
-static const double solved_no_contact_Fh_theta_d_w_w = -1.2499995452837895e-07;
-static const double solved_no_contact_Fh_theta_d_w_em = 1.5431995885288063e-08;
-static const double solved_no_contact_Fh_theta_d_theta_d = 0.0005;
-static const double solved_no_contact_Fh_theta_b_w_w = -1.2499995452837895e-07;
-static const double solved_no_contact_Fh_theta_b_w_em = 1.5431995885288063e-08;
-static const double solved_no_contact_Fh_theta_b_theta_d = 4.0509621382249875e-05;
-static const double solved_no_contact_Fh_theta_b_theta_b = 0.0004594903786177501;
-static const double solved_coast_contact_A_w_w_w_w = -0.13190235116979385;
-static const double solved_coast_contact_A_w_w_w_em = 0.01601477935351768;
-static const double solved_coast_contact_A_w_w_theta_d = 44.47533009034052;
-static const double solved_coast_contact_A_w_w_theta_b = -44.47533009034052;
-static const double solved_coast_contact_A_w_em_w_w = 34.5679012345679;
-static const double solved_coast_contact_A_w_em_w_em = -4.307642127724432;
-static const double solved_coast_contact_A_w_em_theta_d = -11851.851851851852;
-static const double solved_coast_contact_A_w_em_theta_b = 11851.851851851852;
-static const double solved_coast_contact_A_theta_d_w_w = -1.0;
-static const double solved_coast_contact_A_theta_d_w_em = 0.1234567901234568;
-static const double solved_coast_contact_E_w_w_w_w = 0.9998462129618946;
-static const double solved_coast_contact_E_w_w_w_em = 1.871625595018408e-05;
-static const double solved_coast_contact_E_w_w_theta_d = 0.04436648883751279;
-static const double solved_coast_contact_E_w_w_theta_b = -0.044366488837512784;
-static const double solved_coast_contact_E_w_em_w_w = 0.040399038468472315;
-static const double solved_coast_contact_E_w_em_w_em = 0.9949725549629289;
-static const double solved_coast_contact_E_w_em_theta_d = -11.822623930043962;
-static const double solved_coast_contact_E_w_em_theta_b = 11.82262393004396;
-static const double solved_coast_contact_E_theta_d_w_w = -0.0009975527724559515;
-static const double solved_coast_contact_E_theta_d_w_em = 0.00012315233260462458;
-static const double solved_coast_contact_E_theta_d_theta_d = 0.9992473745748891;
-static const double solved_coast_contact_E_theta_d_theta_b = 0.0007526254251109057;
-static const double solved_coast_contact_E_theta_b_theta_b = 1.0;
-static const double solved_coast_contact_F_w_w_w_w = 0.000999926748171719;
-static const double solved_coast_contact_F_w_w_w_em = 8.90859545875239e-09;
-static const double solved_coast_contact_F_w_w_theta_d = 2.2202300472007347e-05;
-static const double solved_coast_contact_F_w_w_theta_b = -2.2202300472007347e-05;
-static const double solved_coast_contact_F_w_em_w_w = 1.9229203297717024e-05;
-static const double solved_coast_contact_F_w_em_w_em = 0.000997606053720675;
-static const double solved_coast_contact_F_w_em_theta_d = -0.0059164273095750775;
-static const double solved_coast_contact_F_w_em_theta_b = 0.0059164273095750775;
-static const double solved_coast_contact_F_theta_d_w_w = -4.992048496752902e-07;
-static const double solved_coast_contact_F_theta_d_w_em = 6.162945114140707e-08;
-static const double solved_coast_contact_F_theta_d_theta_d = 0.0009997490195295358;
-static const double solved_coast_contact_F_theta_d_theta_b = 2.5098047046427575e-07;
-static const double solved_coast_contact_F_theta_b_theta_b = 0.001;
-static const double solved_coast_contact_Eh_w_w_w_w = 0.9999285690504482;
-static const double solved_coast_contact_Eh_w_w_w_em = 8.683825085133594e-06;
-static const double solved_coast_contact_Eh_w_w_theta_d = 0.022211828830417918;
-static const double solved_coast_contact_Eh_w_w_theta_b = -0.022211828830417918;
-static const double solved_coast_contact_Eh_w_em_w_w = 0.01874403644626086;
-static const double solved_coast_contact_Eh_w_em_w_em = 0.9976659429366962;
-static const double solved_coast_contact_Eh_w_em_theta_d = -5.9189850706119405;
-static const double solved_coast_contact_Eh_w_em_theta_b = 5.9189850706119405;
-static const double solved_coast_contact_Eh_theta_d_w_w = -0.0004994190888589279;
-static const double solved_coast_contact_Eh_theta_d_w_em = 6.165609448554105e-05;
-static const double solved_coast_contact_Eh_theta_d_theta_d = 0.9998116868135607;
-static const double solved_coast_contact_Eh_theta_d_theta_b = 0.00018831318643927917;
-static const double solved_coast_contact_Eh_theta_b_theta_b = 1.0;
-static const double solved_coast_contact_Fh_w_w_w_w = 0.0004999825985617613;
-static const double solved_coast_contact_Fh_w_w_w_em = 2.1146298785966265e-09;
-static const double solved_coast_contact_Fh_w_w_theta_d = 5.555167574277176e-06;
-static const double solved_coast_contact_Fh_w_w_theta_b = -5.555167574277176e-06;
-static const double solved_coast_contact_Fh_w_em_w_w = 4.564428592950816e-06;
-static const double solved_coast_contact_Fh_w_em_w_em = 0.000499431493834899;
-static const double solved_coast_contact_Fh_w_em_theta_d = -0.001480339952806516;
-static const double solved_coast_contact_Fh_w_em_theta_b = 0.0014803399528065162;
-static const double solved_coast_contact_Fh_theta_d_w_w = -1.2490447092788836e-07;
-static const double solved_coast_contact_Fh_theta_d_w_em = 1.5420207841734543e-08;
-static const double solved_coast_contact_Fh_theta_d_theta_d = 0.0004999686082740045;
-static const double solved_coast_contact_Fh_theta_d_theta_b = 3.139172599561107e-08;
-static const double solved_coast_contact_Fh_theta_b_theta_b = 0.0005;
-static const double solved_drive_Phi_theta_d_theta_d = 0.9992473746251623;
-static const double solved_drive_Phi_theta_d_w_em = 0.0001231523326242793;
-static const double solved_drive_Phi_theta_d_w_w = -0.0009975493789574376;
-static const double solved_drive_Phi_w_em_theta_d = -11.822623931930814;
-static const double solved_drive_Phi_w_em_w_em = 0.9949725549621922;
-static const double solved_drive_Phi_w_em_w_w = 0.04039890775187352;
-static const double solved_drive_Phi_w_w_theta_d = 0.04436633791054622;
-static const double solved_drive_Phi_w_w_w_em = 1.871619539118533e-05;
-static const double solved_drive_Phi_w_w_w_w = 0.9998394158340677;
-static const double solved_drive_Gamma_theta_d_T_em = 1.2325890229249092e-06;
-static const double solved_drive_Gamma_theta_d_T_br = 4.625468779457229e-09;
-static const double solved_drive_Gamma_w_em_T_em = 0.01995212107440993;
-static const double solved_drive_Gamma_w_em_T_br = -1.7817151563953206e-07;
-static const double solved_drive_Gamma_w_w_T_em = 1.781715156395321e-07;
-static const double solved_drive_Gamma_w_w_T_br = -9.264983548109417e-06;
-static const double solved_drive_G_theta_d_w_em = 6.162945114624546e-08;
-static const double solved_drive_G_theta_d_w_w = -4.992037180229214e-07;
-static const double solved_drive_G_w_em_w_em = 0.0009976060537204964;
-static const double solved_drive_G_w_em_w_w = 1.9229160825396496e-05;
-static const double solved_drive_G_w_w_w_em = 8.908575781976606e-09;
-static const double solved_drive_G_w_w_w_w = 0.0009999233494297087;
-static const double solved_drive_L_theta_d_y_em = -0.0008191604945979323;
-static const double solved_drive_L_theta_d_y_w = 0.00023729042168805023;
-static const double solved_drive_L_w_em_y_em = 0.2236439500942211;
-static const double solved_drive_L_w_em_y_w = -0.011516663774099349;
-static const double solved_drive_L_w_w_y_em = -0.0003199073270583153;
-static const double solved_drive_L_w_w_y_w = 0.01774583938338994;
-static const double solved_coast_Phi_theta_d_theta_d = 0.9992473746251623;
-static const double solved_coast_Phi_theta_d_w_em = 0.0001231523326242793;
-static const double solved_coast_Phi_theta_d_w_w = -0.0009975493789574376;
-static const double solved_coast_Phi_w_em_theta_d = -11.822623931930814;
-static const double solved_coast_Phi_w_em_w_em = 0.9949725549621922;
-static const double solved_coast_Phi_w_em_w_w = 0.04039890775187352;
-static const double solved_coast_Phi_w_w_theta_d = 0.04436633791054622;
-static const double solved_coast_Phi_w_w_w_em = 1.871619539118533e-05;
-static const double solved_coast_Phi_w_w_w_w = 0.9998394158340677;
-static const double solved_coast_Gamma_theta_d_T_em = 1.2325890229249092e-06;
-static const double solved_coast_Gamma_theta_d_T_br = 4.625468779457229e-09;
-static const double solved_coast_Gamma_w_em_T_em = 0.01995212107440993;
-static const double solved_coast_Gamma_w_em_T_br = -1.7817151563953206e-07;
-static const double solved_coast_Gamma_w_w_T_em = 1.781715156395321e-07;
-static const double solved_coast_Gamma_w_w_T_br = -9.264983548109417e-06;
-static const double solved_coast_G_theta_d_w_em = 6.162945114624546e-08;
-static const double solved_coast_G_theta_d_w_w = -4.992037180229214e-07;
-static const double solved_coast_G_w_em_w_em = 0.0009976060537204964;
-static const double solved_coast_G_w_em_w_w = 1.9229160825396496e-05;
-static const double solved_coast_G_w_w_w_em = 8.908575781976606e-09;
-static const double solved_coast_G_w_w_w_w = 0.0009999233494297087;
-static const double solved_coast_L_theta_d_y_em = -0.0008191604945979323;
-static const double solved_coast_L_theta_d_y_w = 0.00023729042168805023;
-static const double solved_coast_L_w_em_y_em = 0.2236439500942211;
-static const double solved_coast_L_w_em_y_w = -0.011516663774099349;
-static const double solved_coast_L_w_w_y_em = -0.0003199073270583153;
-static const double solved_coast_L_w_w_y_w = 0.01774583938338994;
-static const double solved_stamp_J_em = 0.05;
+const char estimator_written_Version[] = estimator_written_DIGEST;
 
-const estimator_written_Cal estimator_written_default_cal = {
+estimator_written_CALIBRATION const volatile estimator_written_Cal estimator_written_default_cal = {
     .J_em = 0.05,
+    .solved = {
+        .drive_contact_A_w_w_w_w = -0.13190235116979385,
+        .drive_contact_A_w_w_w_em = 0.01601477935351768,
+        .drive_contact_A_w_w_theta_d = 44.47533009034052,
+        .drive_contact_A_w_w_theta_b = -44.47533009034052,
+        .drive_contact_A_w_em_w_w = 34.5679012345679,
+        .drive_contact_A_w_em_w_em = -4.307642127724432,
+        .drive_contact_A_w_em_theta_d = -11851.851851851852,
+        .drive_contact_A_w_em_theta_b = 11851.851851851852,
+        .drive_contact_A_theta_d_w_w = -1.0,
+        .drive_contact_A_theta_d_w_em = 0.1234567901234568,
+        .drive_contact_E_w_w_w_w = 0.9998462129618946,
+        .drive_contact_E_w_w_w_em = 1.871625595018408e-05,
+        .drive_contact_E_w_w_theta_d = 0.04436648883751279,
+        .drive_contact_E_w_w_theta_b = -0.044366488837512784,
+        .drive_contact_E_w_em_w_w = 0.040399038468472315,
+        .drive_contact_E_w_em_w_em = 0.9949725549629289,
+        .drive_contact_E_w_em_theta_d = -11.822623930043962,
+        .drive_contact_E_w_em_theta_b = 11.82262393004396,
+        .drive_contact_E_theta_d_w_w = -0.0009975527724559515,
+        .drive_contact_E_theta_d_w_em = 0.00012315233260462458,
+        .drive_contact_E_theta_d_theta_d = 0.9992473745748891,
+        .drive_contact_E_theta_d_theta_b = 0.0007526254251109057,
+        .drive_contact_E_theta_b_theta_b = 1.0,
+        .drive_contact_F_w_w_w_w = 0.000999926748171719,
+        .drive_contact_F_w_w_w_em = 8.90859545875239e-09,
+        .drive_contact_F_w_w_theta_d = 2.2202300472007347e-05,
+        .drive_contact_F_w_w_theta_b = -2.2202300472007347e-05,
+        .drive_contact_F_w_em_w_w = 1.9229203297717024e-05,
+        .drive_contact_F_w_em_w_em = 0.000997606053720675,
+        .drive_contact_F_w_em_theta_d = -0.0059164273095750775,
+        .drive_contact_F_w_em_theta_b = 0.0059164273095750775,
+        .drive_contact_F_theta_d_w_w = -4.992048496752902e-07,
+        .drive_contact_F_theta_d_w_em = 6.162945114140707e-08,
+        .drive_contact_F_theta_d_theta_d = 0.0009997490195295358,
+        .drive_contact_F_theta_d_theta_b = 2.5098047046427575e-07,
+        .drive_contact_F_theta_b_theta_b = 0.001,
+        .drive_contact_Eh_w_w_w_w = 0.9999285690504482,
+        .drive_contact_Eh_w_w_w_em = 8.683825085133594e-06,
+        .drive_contact_Eh_w_w_theta_d = 0.022211828830417918,
+        .drive_contact_Eh_w_w_theta_b = -0.022211828830417918,
+        .drive_contact_Eh_w_em_w_w = 0.01874403644626086,
+        .drive_contact_Eh_w_em_w_em = 0.9976659429366962,
+        .drive_contact_Eh_w_em_theta_d = -5.9189850706119405,
+        .drive_contact_Eh_w_em_theta_b = 5.9189850706119405,
+        .drive_contact_Eh_theta_d_w_w = -0.0004994190888589279,
+        .drive_contact_Eh_theta_d_w_em = 6.165609448554105e-05,
+        .drive_contact_Eh_theta_d_theta_d = 0.9998116868135607,
+        .drive_contact_Eh_theta_d_theta_b = 0.00018831318643927917,
+        .drive_contact_Eh_theta_b_theta_b = 1.0,
+        .drive_contact_Fh_w_w_w_w = 0.0004999825985617613,
+        .drive_contact_Fh_w_w_w_em = 2.1146298785966265e-09,
+        .drive_contact_Fh_w_w_theta_d = 5.555167574277176e-06,
+        .drive_contact_Fh_w_w_theta_b = -5.555167574277176e-06,
+        .drive_contact_Fh_w_em_w_w = 4.564428592950816e-06,
+        .drive_contact_Fh_w_em_w_em = 0.000499431493834899,
+        .drive_contact_Fh_w_em_theta_d = -0.001480339952806516,
+        .drive_contact_Fh_w_em_theta_b = 0.0014803399528065162,
+        .drive_contact_Fh_theta_d_w_w = -1.2490447092788836e-07,
+        .drive_contact_Fh_theta_d_w_em = 1.5420207841734543e-08,
+        .drive_contact_Fh_theta_d_theta_d = 0.0004999686082740045,
+        .drive_contact_Fh_theta_d_theta_b = 3.139172599561107e-08,
+        .drive_contact_Fh_theta_b_theta_b = 0.0005,
+        .no_contact_A_w_w_w_w = -0.002182638406300672,
+        .no_contact_A_w_em_w_em = -0.04,
+        .no_contact_A_theta_d_w_w = -1.0,
+        .no_contact_A_theta_d_w_em = 0.1234567901234568,
+        .no_contact_A_theta_b_w_w = -1.0,
+        .no_contact_A_theta_b_w_em = 0.1234567901234568,
+        .no_contact_A_theta_b_theta_d = 342.85714285714283,
+        .no_contact_A_theta_b_theta_b = -342.85714285714283,
+        .no_contact_E_w_w_w_w = 0.9999978173639756,
+        .no_contact_E_w_em_w_em = 0.9999600007999894,
+        .no_contact_E_theta_d_w_w = -0.000999998908681591,
+        .no_contact_E_theta_d_w_em = 0.00012345432102057582,
+        .no_contact_E_theta_d_theta_d = 1.0,
+        .no_contact_E_theta_b_w_w = -0.000999998908681591,
+        .no_contact_E_theta_b_w_em = 0.00012345432102057582,
+        .no_contact_E_theta_b_theta_d = 0.2902604043108745,
+        .no_contact_E_theta_b_theta_b = 0.7097395956891255,
+        .no_contact_F_w_w_w_w = 0.000999998908681591,
+        .no_contact_F_w_em_w_em = 0.000999980000266664,
+        .no_contact_F_theta_d_w_w = -4.999996362271308e-07,
+        .no_contact_F_theta_d_w_em = 6.172757202469129e-08,
+        .no_contact_F_theta_d_theta_d = 0.001,
+        .no_contact_F_theta_b_w_w = -4.999996362271308e-07,
+        .no_contact_F_theta_b_w_em = 6.172757202469129e-08,
+        .no_contact_F_theta_b_theta_d = 0.0001534071540932826,
+        .no_contact_F_theta_b_theta_b = 0.0008465928459067174,
+        .no_contact_Eh_w_w_w_w = 0.9999989086813923,
+        .no_contact_Eh_w_em_w_em = 0.9999800001999987,
+        .no_contact_Eh_theta_d_w_w = -0.0004999997271702985,
+        .no_contact_Eh_theta_d_w_em = 6.172777778189298e-05,
+        .no_contact_Eh_theta_d_theta_d = 1.0,
+        .no_contact_Eh_theta_b_w_w = -0.0004999997271702985,
+        .no_contact_Eh_theta_b_w_em = 6.172777778189298e-05,
+        .no_contact_Eh_theta_b_theta_d = 0.1575395583832286,
+        .no_contact_Eh_theta_b_theta_b = 0.8424604416167714,
+        .no_contact_Fh_w_w_w_w = 0.0004999997271702985,
+        .no_contact_Fh_w_em_w_em = 0.0004999950000333332,
+        .no_contact_Fh_theta_d_w_w = -1.2499995452837895e-07,
+        .no_contact_Fh_theta_d_w_em = 1.5431995885288063e-08,
+        .no_contact_Fh_theta_d_theta_d = 0.0005,
+        .no_contact_Fh_theta_b_w_w = -1.2499995452837895e-07,
+        .no_contact_Fh_theta_b_w_em = 1.5431995885288063e-08,
+        .no_contact_Fh_theta_b_theta_d = 4.0509621382249875e-05,
+        .no_contact_Fh_theta_b_theta_b = 0.0004594903786177501,
+        .coast_contact_A_w_w_w_w = -0.13190235116979385,
+        .coast_contact_A_w_w_w_em = 0.01601477935351768,
+        .coast_contact_A_w_w_theta_d = 44.47533009034052,
+        .coast_contact_A_w_w_theta_b = -44.47533009034052,
+        .coast_contact_A_w_em_w_w = 34.5679012345679,
+        .coast_contact_A_w_em_w_em = -4.307642127724432,
+        .coast_contact_A_w_em_theta_d = -11851.851851851852,
+        .coast_contact_A_w_em_theta_b = 11851.851851851852,
+        .coast_contact_A_theta_d_w_w = -1.0,
+        .coast_contact_A_theta_d_w_em = 0.1234567901234568,
+        .coast_contact_E_w_w_w_w = 0.9998462129618946,
+        .coast_contact_E_w_w_w_em = 1.871625595018408e-05,
+        .coast_contact_E_w_w_theta_d = 0.04436648883751279,
+        .coast_contact_E_w_w_theta_b = -0.044366488837512784,
+        .coast_contact_E_w_em_w_w = 0.040399038468472315,
+        .coast_contact_E_w_em_w_em = 0.9949725549629289,
+        .coast_contact_E_w_em_theta_d = -11.822623930043962,
+        .coast_contact_E_w_em_theta_b = 11.82262393004396,
+        .coast_contact_E_theta_d_w_w = -0.0009975527724559515,
+        .coast_contact_E_theta_d_w_em = 0.00012315233260462458,
+        .coast_contact_E_theta_d_theta_d = 0.9992473745748891,
+        .coast_contact_E_theta_d_theta_b = 0.0007526254251109057,
+        .coast_contact_E_theta_b_theta_b = 1.0,
+        .coast_contact_F_w_w_w_w = 0.000999926748171719,
+        .coast_contact_F_w_w_w_em = 8.90859545875239e-09,
+        .coast_contact_F_w_w_theta_d = 2.2202300472007347e-05,
+        .coast_contact_F_w_w_theta_b = -2.2202300472007347e-05,
+        .coast_contact_F_w_em_w_w = 1.9229203297717024e-05,
+        .coast_contact_F_w_em_w_em = 0.000997606053720675,
+        .coast_contact_F_w_em_theta_d = -0.0059164273095750775,
+        .coast_contact_F_w_em_theta_b = 0.0059164273095750775,
+        .coast_contact_F_theta_d_w_w = -4.992048496752902e-07,
+        .coast_contact_F_theta_d_w_em = 6.162945114140707e-08,
+        .coast_contact_F_theta_d_theta_d = 0.0009997490195295358,
+        .coast_contact_F_theta_d_theta_b = 2.5098047046427575e-07,
+        .coast_contact_F_theta_b_theta_b = 0.001,
+        .coast_contact_Eh_w_w_w_w = 0.9999285690504482,
+        .coast_contact_Eh_w_w_w_em = 8.683825085133594e-06,
+        .coast_contact_Eh_w_w_theta_d = 0.022211828830417918,
+        .coast_contact_Eh_w_w_theta_b = -0.022211828830417918,
+        .coast_contact_Eh_w_em_w_w = 0.01874403644626086,
+        .coast_contact_Eh_w_em_w_em = 0.9976659429366962,
+        .coast_contact_Eh_w_em_theta_d = -5.9189850706119405,
+        .coast_contact_Eh_w_em_theta_b = 5.9189850706119405,
+        .coast_contact_Eh_theta_d_w_w = -0.0004994190888589279,
+        .coast_contact_Eh_theta_d_w_em = 6.165609448554105e-05,
+        .coast_contact_Eh_theta_d_theta_d = 0.9998116868135607,
+        .coast_contact_Eh_theta_d_theta_b = 0.00018831318643927917,
+        .coast_contact_Eh_theta_b_theta_b = 1.0,
+        .coast_contact_Fh_w_w_w_w = 0.0004999825985617613,
+        .coast_contact_Fh_w_w_w_em = 2.1146298785966265e-09,
+        .coast_contact_Fh_w_w_theta_d = 5.555167574277176e-06,
+        .coast_contact_Fh_w_w_theta_b = -5.555167574277176e-06,
+        .coast_contact_Fh_w_em_w_w = 4.564428592950816e-06,
+        .coast_contact_Fh_w_em_w_em = 0.000499431493834899,
+        .coast_contact_Fh_w_em_theta_d = -0.001480339952806516,
+        .coast_contact_Fh_w_em_theta_b = 0.0014803399528065162,
+        .coast_contact_Fh_theta_d_w_w = -1.2490447092788836e-07,
+        .coast_contact_Fh_theta_d_w_em = 1.5420207841734543e-08,
+        .coast_contact_Fh_theta_d_theta_d = 0.0004999686082740045,
+        .coast_contact_Fh_theta_d_theta_b = 3.139172599561107e-08,
+        .coast_contact_Fh_theta_b_theta_b = 0.0005,
+        .drive_Phi_theta_d_theta_d = 0.9992473746251623,
+        .drive_Phi_theta_d_w_em = 0.0001231523326242793,
+        .drive_Phi_theta_d_w_w = -0.0009975493789574376,
+        .drive_Phi_w_em_theta_d = -11.822623931930814,
+        .drive_Phi_w_em_w_em = 0.9949725549621922,
+        .drive_Phi_w_em_w_w = 0.04039890775187352,
+        .drive_Phi_w_w_theta_d = 0.04436633791054622,
+        .drive_Phi_w_w_w_em = 1.871619539118533e-05,
+        .drive_Phi_w_w_w_w = 0.9998394158340677,
+        .drive_Gamma_theta_d_T_em = 1.2325890229249092e-06,
+        .drive_Gamma_theta_d_T_br = 4.625468779457229e-09,
+        .drive_Gamma_w_em_T_em = 0.01995212107440993,
+        .drive_Gamma_w_em_T_br = -1.7817151563953206e-07,
+        .drive_Gamma_w_w_T_em = 1.781715156395321e-07,
+        .drive_Gamma_w_w_T_br = -9.264983548109417e-06,
+        .drive_G_theta_d_w_em = 6.162945114624546e-08,
+        .drive_G_theta_d_w_w = -4.992037180229214e-07,
+        .drive_G_w_em_w_em = 0.0009976060537204964,
+        .drive_G_w_em_w_w = 1.9229160825396496e-05,
+        .drive_G_w_w_w_em = 8.908575781976606e-09,
+        .drive_G_w_w_w_w = 0.0009999233494297087,
+        .drive_L_theta_d_y_em = -0.0008191604945979323,
+        .drive_L_theta_d_y_w = 0.00023729042168805023,
+        .drive_L_w_em_y_em = 0.2236439500942211,
+        .drive_L_w_em_y_w = -0.011516663774099349,
+        .drive_L_w_w_y_em = -0.0003199073270583153,
+        .drive_L_w_w_y_w = 0.01774583938338994,
+        .coast_Phi_theta_d_theta_d = 0.9992473746251623,
+        .coast_Phi_theta_d_w_em = 0.0001231523326242793,
+        .coast_Phi_theta_d_w_w = -0.0009975493789574376,
+        .coast_Phi_w_em_theta_d = -11.822623931930814,
+        .coast_Phi_w_em_w_em = 0.9949725549621922,
+        .coast_Phi_w_em_w_w = 0.04039890775187352,
+        .coast_Phi_w_w_theta_d = 0.04436633791054622,
+        .coast_Phi_w_w_w_em = 1.871619539118533e-05,
+        .coast_Phi_w_w_w_w = 0.9998394158340677,
+        .coast_Gamma_theta_d_T_em = 1.2325890229249092e-06,
+        .coast_Gamma_theta_d_T_br = 4.625468779457229e-09,
+        .coast_Gamma_w_em_T_em = 0.01995212107440993,
+        .coast_Gamma_w_em_T_br = -1.7817151563953206e-07,
+        .coast_Gamma_w_w_T_em = 1.781715156395321e-07,
+        .coast_Gamma_w_w_T_br = -9.264983548109417e-06,
+        .coast_G_theta_d_w_em = 6.162945114624546e-08,
+        .coast_G_theta_d_w_w = -4.992037180229214e-07,
+        .coast_G_w_em_w_em = 0.0009976060537204964,
+        .coast_G_w_em_w_w = 1.9229160825396496e-05,
+        .coast_G_w_w_w_em = 8.908575781976606e-09,
+        .coast_G_w_w_w_w = 0.0009999233494297087,
+        .coast_L_theta_d_y_em = -0.0008191604945979323,
+        .coast_L_theta_d_y_w = 0.00023729042168805023,
+        .coast_L_w_em_y_em = 0.2236439500942211,
+        .coast_L_w_em_y_w = -0.011516663774099349,
+        .coast_L_w_w_y_em = -0.0003199073270583153,
+        .coast_L_w_w_y_w = 0.01774583938338994,
+        .stamp_J_em = 0.05,
+    },
 };
 
 /* Values that live within one step */
@@ -456,33 +459,36 @@ static inline void guards_coast_contact(Work *work)
     work->guard_0 = at_w_free > 0.0; /* driveline modes.coast_contact.transitions.no_contact.when */
 }
 
-static inline void series_drive_contact(const estimator_written_Self *self, Work *work)
+static inline void series_drive_contact(const estimator_written_Self *self,
+    const volatile estimator_written_Cal *cal, Work *work)
 {
     work->order = 1.0;
-    work->series_w_w[0] = (solved_drive_contact_A_w_w_w_w * self->state.w_w)
-        + (solved_drive_contact_A_w_w_w_em * self->state.w_em)
-        + (solved_drive_contact_A_w_w_theta_d * self->state.theta_d)
-        + (solved_drive_contact_A_w_w_theta_b * self->state.theta_b) + work->pull_w_w;
-    work->series_w_em[0] = (solved_drive_contact_A_w_em_w_w * self->state.w_w)
-        + (solved_drive_contact_A_w_em_w_em * self->state.w_em)
-        + (solved_drive_contact_A_w_em_theta_d * self->state.theta_d)
-        + (solved_drive_contact_A_w_em_theta_b * self->state.theta_b) + work->pull_w_em;
-    work->series_theta_d[0] = (solved_drive_contact_A_theta_d_w_w * self->state.w_w)
-        + (solved_drive_contact_A_theta_d_w_em * self->state.w_em) + work->pull_theta_d;
+    work->series_w_w[0] = (cal->solved.drive_contact_A_w_w_w_w * self->state.w_w)
+        + (cal->solved.drive_contact_A_w_w_w_em * self->state.w_em)
+        + (cal->solved.drive_contact_A_w_w_theta_d * self->state.theta_d)
+        + (cal->solved.drive_contact_A_w_w_theta_b * self->state.theta_b) + work->pull_w_w;
+    work->series_w_em[0] = (cal->solved.drive_contact_A_w_em_w_w * self->state.w_w)
+        + (cal->solved.drive_contact_A_w_em_w_em * self->state.w_em)
+        + (cal->solved.drive_contact_A_w_em_theta_d * self->state.theta_d)
+        + (cal->solved.drive_contact_A_w_em_theta_b * self->state.theta_b) + work->pull_w_em;
+    work->series_theta_d[0] = (cal->solved.drive_contact_A_theta_d_w_w * self->state.w_w)
+        + (cal->solved.drive_contact_A_theta_d_w_em * self->state.w_em) + work->pull_theta_d;
     work->series_theta_b[0] = work->pull_theta_b;
     for (int32_t term = 0; term < 26; term++) {
         work->order = work->order + 1.0;
-        work->series_w_w[term + 1] = ((solved_drive_contact_A_w_w_w_w * work->series_w_w[term])
-            + (solved_drive_contact_A_w_w_w_em * work->series_w_em[term])
-            + (solved_drive_contact_A_w_w_theta_d * work->series_theta_d[term])
-            + (solved_drive_contact_A_w_w_theta_b * work->series_theta_b[term])) / work->order;
-        work->series_w_em[term + 1] = ((solved_drive_contact_A_w_em_w_w * work->series_w_w[term])
-            + (solved_drive_contact_A_w_em_w_em * work->series_w_em[term])
-            + (solved_drive_contact_A_w_em_theta_d * work->series_theta_d[term])
-            + (solved_drive_contact_A_w_em_theta_b * work->series_theta_b[term])) / work->order;
+        work->series_w_w[term + 1] =
+            ((cal->solved.drive_contact_A_w_w_w_w * work->series_w_w[term])
+            + (cal->solved.drive_contact_A_w_w_w_em * work->series_w_em[term])
+            + (cal->solved.drive_contact_A_w_w_theta_d * work->series_theta_d[term])
+            + (cal->solved.drive_contact_A_w_w_theta_b * work->series_theta_b[term])) / work->order;
+        work->series_w_em[term + 1] =
+            ((cal->solved.drive_contact_A_w_em_w_w * work->series_w_w[term])
+            + (cal->solved.drive_contact_A_w_em_w_em * work->series_w_em[term])
+            + (cal->solved.drive_contact_A_w_em_theta_d * work->series_theta_d[term])
+            + (cal->solved.drive_contact_A_w_em_theta_b * work->series_theta_b[term])) / work->order;
         work->series_theta_d[term + 1] =
-            ((solved_drive_contact_A_theta_d_w_w * work->series_w_w[term])
-            + (solved_drive_contact_A_theta_d_w_em * work->series_w_em[term])) / work->order;
+            ((cal->solved.drive_contact_A_theta_d_w_w * work->series_w_w[term])
+            + (cal->solved.drive_contact_A_theta_d_w_em * work->series_w_em[term])) / work->order;
         work->series_theta_b[term + 1] = 0.0 / work->order;
     }
 }
@@ -505,97 +511,100 @@ static inline void point(const estimator_written_Self *self, Work *work)
     work->at_theta_b = self->state.theta_b + (work->s * work->sum_theta_b);
 }
 
-static inline void step_drive_contact(const estimator_written_Self *self, Work *work)
+static inline void step_drive_contact(const estimator_written_Self *self,
+    const volatile estimator_written_Cal *cal, Work *work)
 {
     work->at_w_w = self->state.w_w;
     work->at_w_em = self->state.w_em;
     work->at_theta_d = self->state.theta_d;
     work->at_theta_b = self->state.theta_b;
     rates_drive_contact(self, work);
-    work->pull_w_w = work->rate_w_w - ((solved_drive_contact_A_w_w_w_w * work->at_w_w)
-        + (solved_drive_contact_A_w_w_w_em * work->at_w_em)
-        + (solved_drive_contact_A_w_w_theta_d * work->at_theta_d)
-        + (solved_drive_contact_A_w_w_theta_b * work->at_theta_b));
-    work->pull_w_em = work->rate_w_em - ((solved_drive_contact_A_w_em_w_w * work->at_w_w)
-        + (solved_drive_contact_A_w_em_w_em * work->at_w_em)
-        + (solved_drive_contact_A_w_em_theta_d * work->at_theta_d)
-        + (solved_drive_contact_A_w_em_theta_b * work->at_theta_b));
-    work->pull_theta_d = work->rate_theta_d - ((solved_drive_contact_A_theta_d_w_w * work->at_w_w)
-        + (solved_drive_contact_A_theta_d_w_em * work->at_w_em));
+    work->pull_w_w = work->rate_w_w - ((cal->solved.drive_contact_A_w_w_w_w * work->at_w_w)
+        + (cal->solved.drive_contact_A_w_w_w_em * work->at_w_em)
+        + (cal->solved.drive_contact_A_w_w_theta_d * work->at_theta_d)
+        + (cal->solved.drive_contact_A_w_w_theta_b * work->at_theta_b));
+    work->pull_w_em = work->rate_w_em - ((cal->solved.drive_contact_A_w_em_w_w * work->at_w_w)
+        + (cal->solved.drive_contact_A_w_em_w_em * work->at_w_em)
+        + (cal->solved.drive_contact_A_w_em_theta_d * work->at_theta_d)
+        + (cal->solved.drive_contact_A_w_em_theta_b * work->at_theta_b));
+    work->pull_theta_d =
+        work->rate_theta_d - ((cal->solved.drive_contact_A_theta_d_w_w * work->at_w_w)
+        + (cal->solved.drive_contact_A_theta_d_w_em * work->at_w_em));
     work->pull_theta_b = work->rate_theta_b;
     if (work->h == 0.001) {
-        work->at_w_w = (solved_drive_contact_Eh_w_w_w_w * self->state.w_w)
-            + (solved_drive_contact_Eh_w_w_w_em * self->state.w_em)
-            + (solved_drive_contact_Eh_w_w_theta_d * self->state.theta_d)
-            + (solved_drive_contact_Eh_w_w_theta_b * self->state.theta_b)
-            + (solved_drive_contact_Fh_w_w_w_w * work->pull_w_w)
-            + (solved_drive_contact_Fh_w_w_w_em * work->pull_w_em)
-            + (solved_drive_contact_Fh_w_w_theta_d * work->pull_theta_d)
-            + (solved_drive_contact_Fh_w_w_theta_b * work->pull_theta_b);
-        work->at_w_em = (solved_drive_contact_Eh_w_em_w_w * self->state.w_w)
-            + (solved_drive_contact_Eh_w_em_w_em * self->state.w_em)
-            + (solved_drive_contact_Eh_w_em_theta_d * self->state.theta_d)
-            + (solved_drive_contact_Eh_w_em_theta_b * self->state.theta_b)
-            + (solved_drive_contact_Fh_w_em_w_w * work->pull_w_w)
-            + (solved_drive_contact_Fh_w_em_w_em * work->pull_w_em)
-            + (solved_drive_contact_Fh_w_em_theta_d * work->pull_theta_d)
-            + (solved_drive_contact_Fh_w_em_theta_b * work->pull_theta_b);
-        work->at_theta_d = (solved_drive_contact_Eh_theta_d_w_w * self->state.w_w)
-            + (solved_drive_contact_Eh_theta_d_w_em * self->state.w_em)
-            + (solved_drive_contact_Eh_theta_d_theta_d * self->state.theta_d)
-            + (solved_drive_contact_Eh_theta_d_theta_b * self->state.theta_b)
-            + (solved_drive_contact_Fh_theta_d_w_w * work->pull_w_w)
-            + (solved_drive_contact_Fh_theta_d_w_em * work->pull_w_em)
-            + (solved_drive_contact_Fh_theta_d_theta_d * work->pull_theta_d)
-            + (solved_drive_contact_Fh_theta_d_theta_b * work->pull_theta_b);
-        work->at_theta_b = (solved_drive_contact_Eh_theta_b_theta_b * self->state.theta_b)
-            + (solved_drive_contact_Fh_theta_b_theta_b * work->pull_theta_b);
+        work->at_w_w = (cal->solved.drive_contact_Eh_w_w_w_w * self->state.w_w)
+            + (cal->solved.drive_contact_Eh_w_w_w_em * self->state.w_em)
+            + (cal->solved.drive_contact_Eh_w_w_theta_d * self->state.theta_d)
+            + (cal->solved.drive_contact_Eh_w_w_theta_b * self->state.theta_b)
+            + (cal->solved.drive_contact_Fh_w_w_w_w * work->pull_w_w)
+            + (cal->solved.drive_contact_Fh_w_w_w_em * work->pull_w_em)
+            + (cal->solved.drive_contact_Fh_w_w_theta_d * work->pull_theta_d)
+            + (cal->solved.drive_contact_Fh_w_w_theta_b * work->pull_theta_b);
+        work->at_w_em = (cal->solved.drive_contact_Eh_w_em_w_w * self->state.w_w)
+            + (cal->solved.drive_contact_Eh_w_em_w_em * self->state.w_em)
+            + (cal->solved.drive_contact_Eh_w_em_theta_d * self->state.theta_d)
+            + (cal->solved.drive_contact_Eh_w_em_theta_b * self->state.theta_b)
+            + (cal->solved.drive_contact_Fh_w_em_w_w * work->pull_w_w)
+            + (cal->solved.drive_contact_Fh_w_em_w_em * work->pull_w_em)
+            + (cal->solved.drive_contact_Fh_w_em_theta_d * work->pull_theta_d)
+            + (cal->solved.drive_contact_Fh_w_em_theta_b * work->pull_theta_b);
+        work->at_theta_d = (cal->solved.drive_contact_Eh_theta_d_w_w * self->state.w_w)
+            + (cal->solved.drive_contact_Eh_theta_d_w_em * self->state.w_em)
+            + (cal->solved.drive_contact_Eh_theta_d_theta_d * self->state.theta_d)
+            + (cal->solved.drive_contact_Eh_theta_d_theta_b * self->state.theta_b)
+            + (cal->solved.drive_contact_Fh_theta_d_w_w * work->pull_w_w)
+            + (cal->solved.drive_contact_Fh_theta_d_w_em * work->pull_w_em)
+            + (cal->solved.drive_contact_Fh_theta_d_theta_d * work->pull_theta_d)
+            + (cal->solved.drive_contact_Fh_theta_d_theta_b * work->pull_theta_b);
+        work->at_theta_b = (cal->solved.drive_contact_Eh_theta_b_theta_b * self->state.theta_b)
+            + (cal->solved.drive_contact_Fh_theta_b_theta_b * work->pull_theta_b);
     } else {
-        series_drive_contact(self, work);
+        series_drive_contact(self, cal, work);
         work->s = 0.5 * work->h;
         point(self, work);
     }
     rates_drive_contact(self, work);
-    work->pull_w_w = work->rate_w_w - ((solved_drive_contact_A_w_w_w_w * work->at_w_w)
-        + (solved_drive_contact_A_w_w_w_em * work->at_w_em)
-        + (solved_drive_contact_A_w_w_theta_d * work->at_theta_d)
-        + (solved_drive_contact_A_w_w_theta_b * work->at_theta_b));
-    work->pull_w_em = work->rate_w_em - ((solved_drive_contact_A_w_em_w_w * work->at_w_w)
-        + (solved_drive_contact_A_w_em_w_em * work->at_w_em)
-        + (solved_drive_contact_A_w_em_theta_d * work->at_theta_d)
-        + (solved_drive_contact_A_w_em_theta_b * work->at_theta_b));
-    work->pull_theta_d = work->rate_theta_d - ((solved_drive_contact_A_theta_d_w_w * work->at_w_w)
-        + (solved_drive_contact_A_theta_d_w_em * work->at_w_em));
+    work->pull_w_w = work->rate_w_w - ((cal->solved.drive_contact_A_w_w_w_w * work->at_w_w)
+        + (cal->solved.drive_contact_A_w_w_w_em * work->at_w_em)
+        + (cal->solved.drive_contact_A_w_w_theta_d * work->at_theta_d)
+        + (cal->solved.drive_contact_A_w_w_theta_b * work->at_theta_b));
+    work->pull_w_em = work->rate_w_em - ((cal->solved.drive_contact_A_w_em_w_w * work->at_w_w)
+        + (cal->solved.drive_contact_A_w_em_w_em * work->at_w_em)
+        + (cal->solved.drive_contact_A_w_em_theta_d * work->at_theta_d)
+        + (cal->solved.drive_contact_A_w_em_theta_b * work->at_theta_b));
+    work->pull_theta_d =
+        work->rate_theta_d - ((cal->solved.drive_contact_A_theta_d_w_w * work->at_w_w)
+        + (cal->solved.drive_contact_A_theta_d_w_em * work->at_w_em));
     work->pull_theta_b = work->rate_theta_b;
     if (work->h == 0.001) {
-        work->end_w_w = (solved_drive_contact_E_w_w_w_w * self->state.w_w)
-            + (solved_drive_contact_E_w_w_w_em * self->state.w_em)
-            + (solved_drive_contact_E_w_w_theta_d * self->state.theta_d)
-            + (solved_drive_contact_E_w_w_theta_b * self->state.theta_b)
-            + (solved_drive_contact_F_w_w_w_w * work->pull_w_w)
-            + (solved_drive_contact_F_w_w_w_em * work->pull_w_em)
-            + (solved_drive_contact_F_w_w_theta_d * work->pull_theta_d)
-            + (solved_drive_contact_F_w_w_theta_b * work->pull_theta_b);
-        work->end_w_em = (solved_drive_contact_E_w_em_w_w * self->state.w_w)
-            + (solved_drive_contact_E_w_em_w_em * self->state.w_em)
-            + (solved_drive_contact_E_w_em_theta_d * self->state.theta_d)
-            + (solved_drive_contact_E_w_em_theta_b * self->state.theta_b)
-            + (solved_drive_contact_F_w_em_w_w * work->pull_w_w)
-            + (solved_drive_contact_F_w_em_w_em * work->pull_w_em)
-            + (solved_drive_contact_F_w_em_theta_d * work->pull_theta_d)
-            + (solved_drive_contact_F_w_em_theta_b * work->pull_theta_b);
-        work->end_theta_d = (solved_drive_contact_E_theta_d_w_w * self->state.w_w)
-            + (solved_drive_contact_E_theta_d_w_em * self->state.w_em)
-            + (solved_drive_contact_E_theta_d_theta_d * self->state.theta_d)
-            + (solved_drive_contact_E_theta_d_theta_b * self->state.theta_b)
-            + (solved_drive_contact_F_theta_d_w_w * work->pull_w_w)
-            + (solved_drive_contact_F_theta_d_w_em * work->pull_w_em)
-            + (solved_drive_contact_F_theta_d_theta_d * work->pull_theta_d)
-            + (solved_drive_contact_F_theta_d_theta_b * work->pull_theta_b);
-        work->end_theta_b = (solved_drive_contact_E_theta_b_theta_b * self->state.theta_b)
-            + (solved_drive_contact_F_theta_b_theta_b * work->pull_theta_b);
+        work->end_w_w = (cal->solved.drive_contact_E_w_w_w_w * self->state.w_w)
+            + (cal->solved.drive_contact_E_w_w_w_em * self->state.w_em)
+            + (cal->solved.drive_contact_E_w_w_theta_d * self->state.theta_d)
+            + (cal->solved.drive_contact_E_w_w_theta_b * self->state.theta_b)
+            + (cal->solved.drive_contact_F_w_w_w_w * work->pull_w_w)
+            + (cal->solved.drive_contact_F_w_w_w_em * work->pull_w_em)
+            + (cal->solved.drive_contact_F_w_w_theta_d * work->pull_theta_d)
+            + (cal->solved.drive_contact_F_w_w_theta_b * work->pull_theta_b);
+        work->end_w_em = (cal->solved.drive_contact_E_w_em_w_w * self->state.w_w)
+            + (cal->solved.drive_contact_E_w_em_w_em * self->state.w_em)
+            + (cal->solved.drive_contact_E_w_em_theta_d * self->state.theta_d)
+            + (cal->solved.drive_contact_E_w_em_theta_b * self->state.theta_b)
+            + (cal->solved.drive_contact_F_w_em_w_w * work->pull_w_w)
+            + (cal->solved.drive_contact_F_w_em_w_em * work->pull_w_em)
+            + (cal->solved.drive_contact_F_w_em_theta_d * work->pull_theta_d)
+            + (cal->solved.drive_contact_F_w_em_theta_b * work->pull_theta_b);
+        work->end_theta_d = (cal->solved.drive_contact_E_theta_d_w_w * self->state.w_w)
+            + (cal->solved.drive_contact_E_theta_d_w_em * self->state.w_em)
+            + (cal->solved.drive_contact_E_theta_d_theta_d * self->state.theta_d)
+            + (cal->solved.drive_contact_E_theta_d_theta_b * self->state.theta_b)
+            + (cal->solved.drive_contact_F_theta_d_w_w * work->pull_w_w)
+            + (cal->solved.drive_contact_F_theta_d_w_em * work->pull_w_em)
+            + (cal->solved.drive_contact_F_theta_d_theta_d * work->pull_theta_d)
+            + (cal->solved.drive_contact_F_theta_d_theta_b * work->pull_theta_b);
+        work->end_theta_b = (cal->solved.drive_contact_E_theta_b_theta_b * self->state.theta_b)
+            + (cal->solved.drive_contact_F_theta_b_theta_b * work->pull_theta_b);
     } else {
-        series_drive_contact(self, work);
+        series_drive_contact(self, cal, work);
         work->s = work->h;
         point(self, work);
         work->end_w_w = work->at_w_w;
@@ -605,103 +614,110 @@ static inline void step_drive_contact(const estimator_written_Self *self, Work *
     }
 }
 
-static inline void series_no_contact(const estimator_written_Self *self, Work *work)
+static inline void series_no_contact(const estimator_written_Self *self,
+    const volatile estimator_written_Cal *cal, Work *work)
 {
     work->order = 1.0;
-    work->series_w_w[0] = (solved_no_contact_A_w_w_w_w * self->state.w_w) + work->pull_w_w;
-    work->series_w_em[0] = (solved_no_contact_A_w_em_w_em * self->state.w_em) + work->pull_w_em;
-    work->series_theta_d[0] = (solved_no_contact_A_theta_d_w_w * self->state.w_w)
-        + (solved_no_contact_A_theta_d_w_em * self->state.w_em) + work->pull_theta_d;
-    work->series_theta_b[0] = (solved_no_contact_A_theta_b_w_w * self->state.w_w)
-        + (solved_no_contact_A_theta_b_w_em * self->state.w_em)
-        + (solved_no_contact_A_theta_b_theta_d * self->state.theta_d)
-        + (solved_no_contact_A_theta_b_theta_b * self->state.theta_b) + work->pull_theta_b;
+    work->series_w_w[0] = (cal->solved.no_contact_A_w_w_w_w * self->state.w_w) + work->pull_w_w;
+    work->series_w_em[0] =
+        (cal->solved.no_contact_A_w_em_w_em * self->state.w_em) + work->pull_w_em;
+    work->series_theta_d[0] = (cal->solved.no_contact_A_theta_d_w_w * self->state.w_w)
+        + (cal->solved.no_contact_A_theta_d_w_em * self->state.w_em) + work->pull_theta_d;
+    work->series_theta_b[0] = (cal->solved.no_contact_A_theta_b_w_w * self->state.w_w)
+        + (cal->solved.no_contact_A_theta_b_w_em * self->state.w_em)
+        + (cal->solved.no_contact_A_theta_b_theta_d * self->state.theta_d)
+        + (cal->solved.no_contact_A_theta_b_theta_b * self->state.theta_b) + work->pull_theta_b;
     for (int32_t term = 0; term < 26; term++) {
         work->order = work->order + 1.0;
         work->series_w_w[term + 1] =
-            solved_no_contact_A_w_w_w_w * work->series_w_w[term] / work->order;
+            cal->solved.no_contact_A_w_w_w_w * work->series_w_w[term] / work->order;
         work->series_w_em[term + 1] =
-            solved_no_contact_A_w_em_w_em * work->series_w_em[term] / work->order;
+            cal->solved.no_contact_A_w_em_w_em * work->series_w_em[term] / work->order;
         work->series_theta_d[term + 1] =
-            ((solved_no_contact_A_theta_d_w_w * work->series_w_w[term])
-            + (solved_no_contact_A_theta_d_w_em * work->series_w_em[term])) / work->order;
+            ((cal->solved.no_contact_A_theta_d_w_w * work->series_w_w[term])
+            + (cal->solved.no_contact_A_theta_d_w_em * work->series_w_em[term])) / work->order;
         work->series_theta_b[term + 1] =
-            ((solved_no_contact_A_theta_b_w_w * work->series_w_w[term])
-            + (solved_no_contact_A_theta_b_w_em * work->series_w_em[term])
-            + (solved_no_contact_A_theta_b_theta_d * work->series_theta_d[term])
-            + (solved_no_contact_A_theta_b_theta_b * work->series_theta_b[term])) / work->order;
+            ((cal->solved.no_contact_A_theta_b_w_w * work->series_w_w[term])
+            + (cal->solved.no_contact_A_theta_b_w_em * work->series_w_em[term])
+            + (cal->solved.no_contact_A_theta_b_theta_d * work->series_theta_d[term])
+            + (cal->solved.no_contact_A_theta_b_theta_b * work->series_theta_b[term])) / work->order;
     }
 }
 
-static inline void step_no_contact(const estimator_written_Self *self, Work *work)
+static inline void step_no_contact(const estimator_written_Self *self,
+    const volatile estimator_written_Cal *cal, Work *work)
 {
     work->at_w_w = self->state.w_w;
     work->at_w_em = self->state.w_em;
     work->at_theta_d = self->state.theta_d;
     work->at_theta_b = self->state.theta_b;
     rates_no_contact(self, work);
-    work->pull_w_w = work->rate_w_w - (solved_no_contact_A_w_w_w_w * work->at_w_w);
-    work->pull_w_em = work->rate_w_em - (solved_no_contact_A_w_em_w_em * work->at_w_em);
-    work->pull_theta_d = work->rate_theta_d - ((solved_no_contact_A_theta_d_w_w * work->at_w_w)
-        + (solved_no_contact_A_theta_d_w_em * work->at_w_em));
-    work->pull_theta_b = work->rate_theta_b - ((solved_no_contact_A_theta_b_w_w * work->at_w_w)
-        + (solved_no_contact_A_theta_b_w_em * work->at_w_em)
-        + (solved_no_contact_A_theta_b_theta_d * work->at_theta_d)
-        + (solved_no_contact_A_theta_b_theta_b * work->at_theta_b));
+    work->pull_w_w = work->rate_w_w - (cal->solved.no_contact_A_w_w_w_w * work->at_w_w);
+    work->pull_w_em = work->rate_w_em - (cal->solved.no_contact_A_w_em_w_em * work->at_w_em);
+    work->pull_theta_d =
+        work->rate_theta_d - ((cal->solved.no_contact_A_theta_d_w_w * work->at_w_w)
+        + (cal->solved.no_contact_A_theta_d_w_em * work->at_w_em));
+    work->pull_theta_b =
+        work->rate_theta_b - ((cal->solved.no_contact_A_theta_b_w_w * work->at_w_w)
+        + (cal->solved.no_contact_A_theta_b_w_em * work->at_w_em)
+        + (cal->solved.no_contact_A_theta_b_theta_d * work->at_theta_d)
+        + (cal->solved.no_contact_A_theta_b_theta_b * work->at_theta_b));
     if (work->h == 0.001) {
-        work->at_w_w = (solved_no_contact_Eh_w_w_w_w * self->state.w_w)
-            + (solved_no_contact_Fh_w_w_w_w * work->pull_w_w);
-        work->at_w_em = (solved_no_contact_Eh_w_em_w_em * self->state.w_em)
-            + (solved_no_contact_Fh_w_em_w_em * work->pull_w_em);
-        work->at_theta_d = (solved_no_contact_Eh_theta_d_w_w * self->state.w_w)
-            + (solved_no_contact_Eh_theta_d_w_em * self->state.w_em)
-            + (solved_no_contact_Eh_theta_d_theta_d * self->state.theta_d)
-            + (solved_no_contact_Fh_theta_d_w_w * work->pull_w_w)
-            + (solved_no_contact_Fh_theta_d_w_em * work->pull_w_em)
-            + (solved_no_contact_Fh_theta_d_theta_d * work->pull_theta_d);
-        work->at_theta_b = (solved_no_contact_Eh_theta_b_w_w * self->state.w_w)
-            + (solved_no_contact_Eh_theta_b_w_em * self->state.w_em)
-            + (solved_no_contact_Eh_theta_b_theta_d * self->state.theta_d)
-            + (solved_no_contact_Eh_theta_b_theta_b * self->state.theta_b)
-            + (solved_no_contact_Fh_theta_b_w_w * work->pull_w_w)
-            + (solved_no_contact_Fh_theta_b_w_em * work->pull_w_em)
-            + (solved_no_contact_Fh_theta_b_theta_d * work->pull_theta_d)
-            + (solved_no_contact_Fh_theta_b_theta_b * work->pull_theta_b);
+        work->at_w_w = (cal->solved.no_contact_Eh_w_w_w_w * self->state.w_w)
+            + (cal->solved.no_contact_Fh_w_w_w_w * work->pull_w_w);
+        work->at_w_em = (cal->solved.no_contact_Eh_w_em_w_em * self->state.w_em)
+            + (cal->solved.no_contact_Fh_w_em_w_em * work->pull_w_em);
+        work->at_theta_d = (cal->solved.no_contact_Eh_theta_d_w_w * self->state.w_w)
+            + (cal->solved.no_contact_Eh_theta_d_w_em * self->state.w_em)
+            + (cal->solved.no_contact_Eh_theta_d_theta_d * self->state.theta_d)
+            + (cal->solved.no_contact_Fh_theta_d_w_w * work->pull_w_w)
+            + (cal->solved.no_contact_Fh_theta_d_w_em * work->pull_w_em)
+            + (cal->solved.no_contact_Fh_theta_d_theta_d * work->pull_theta_d);
+        work->at_theta_b = (cal->solved.no_contact_Eh_theta_b_w_w * self->state.w_w)
+            + (cal->solved.no_contact_Eh_theta_b_w_em * self->state.w_em)
+            + (cal->solved.no_contact_Eh_theta_b_theta_d * self->state.theta_d)
+            + (cal->solved.no_contact_Eh_theta_b_theta_b * self->state.theta_b)
+            + (cal->solved.no_contact_Fh_theta_b_w_w * work->pull_w_w)
+            + (cal->solved.no_contact_Fh_theta_b_w_em * work->pull_w_em)
+            + (cal->solved.no_contact_Fh_theta_b_theta_d * work->pull_theta_d)
+            + (cal->solved.no_contact_Fh_theta_b_theta_b * work->pull_theta_b);
     } else {
-        series_no_contact(self, work);
+        series_no_contact(self, cal, work);
         work->s = 0.5 * work->h;
         point(self, work);
     }
     rates_no_contact(self, work);
-    work->pull_w_w = work->rate_w_w - (solved_no_contact_A_w_w_w_w * work->at_w_w);
-    work->pull_w_em = work->rate_w_em - (solved_no_contact_A_w_em_w_em * work->at_w_em);
-    work->pull_theta_d = work->rate_theta_d - ((solved_no_contact_A_theta_d_w_w * work->at_w_w)
-        + (solved_no_contact_A_theta_d_w_em * work->at_w_em));
-    work->pull_theta_b = work->rate_theta_b - ((solved_no_contact_A_theta_b_w_w * work->at_w_w)
-        + (solved_no_contact_A_theta_b_w_em * work->at_w_em)
-        + (solved_no_contact_A_theta_b_theta_d * work->at_theta_d)
-        + (solved_no_contact_A_theta_b_theta_b * work->at_theta_b));
+    work->pull_w_w = work->rate_w_w - (cal->solved.no_contact_A_w_w_w_w * work->at_w_w);
+    work->pull_w_em = work->rate_w_em - (cal->solved.no_contact_A_w_em_w_em * work->at_w_em);
+    work->pull_theta_d =
+        work->rate_theta_d - ((cal->solved.no_contact_A_theta_d_w_w * work->at_w_w)
+        + (cal->solved.no_contact_A_theta_d_w_em * work->at_w_em));
+    work->pull_theta_b =
+        work->rate_theta_b - ((cal->solved.no_contact_A_theta_b_w_w * work->at_w_w)
+        + (cal->solved.no_contact_A_theta_b_w_em * work->at_w_em)
+        + (cal->solved.no_contact_A_theta_b_theta_d * work->at_theta_d)
+        + (cal->solved.no_contact_A_theta_b_theta_b * work->at_theta_b));
     if (work->h == 0.001) {
-        work->end_w_w = (solved_no_contact_E_w_w_w_w * self->state.w_w)
-            + (solved_no_contact_F_w_w_w_w * work->pull_w_w);
-        work->end_w_em = (solved_no_contact_E_w_em_w_em * self->state.w_em)
-            + (solved_no_contact_F_w_em_w_em * work->pull_w_em);
-        work->end_theta_d = (solved_no_contact_E_theta_d_w_w * self->state.w_w)
-            + (solved_no_contact_E_theta_d_w_em * self->state.w_em)
-            + (solved_no_contact_E_theta_d_theta_d * self->state.theta_d)
-            + (solved_no_contact_F_theta_d_w_w * work->pull_w_w)
-            + (solved_no_contact_F_theta_d_w_em * work->pull_w_em)
-            + (solved_no_contact_F_theta_d_theta_d * work->pull_theta_d);
-        work->end_theta_b = (solved_no_contact_E_theta_b_w_w * self->state.w_w)
-            + (solved_no_contact_E_theta_b_w_em * self->state.w_em)
-            + (solved_no_contact_E_theta_b_theta_d * self->state.theta_d)
-            + (solved_no_contact_E_theta_b_theta_b * self->state.theta_b)
-            + (solved_no_contact_F_theta_b_w_w * work->pull_w_w)
-            + (solved_no_contact_F_theta_b_w_em * work->pull_w_em)
-            + (solved_no_contact_F_theta_b_theta_d * work->pull_theta_d)
-            + (solved_no_contact_F_theta_b_theta_b * work->pull_theta_b);
+        work->end_w_w = (cal->solved.no_contact_E_w_w_w_w * self->state.w_w)
+            + (cal->solved.no_contact_F_w_w_w_w * work->pull_w_w);
+        work->end_w_em = (cal->solved.no_contact_E_w_em_w_em * self->state.w_em)
+            + (cal->solved.no_contact_F_w_em_w_em * work->pull_w_em);
+        work->end_theta_d = (cal->solved.no_contact_E_theta_d_w_w * self->state.w_w)
+            + (cal->solved.no_contact_E_theta_d_w_em * self->state.w_em)
+            + (cal->solved.no_contact_E_theta_d_theta_d * self->state.theta_d)
+            + (cal->solved.no_contact_F_theta_d_w_w * work->pull_w_w)
+            + (cal->solved.no_contact_F_theta_d_w_em * work->pull_w_em)
+            + (cal->solved.no_contact_F_theta_d_theta_d * work->pull_theta_d);
+        work->end_theta_b = (cal->solved.no_contact_E_theta_b_w_w * self->state.w_w)
+            + (cal->solved.no_contact_E_theta_b_w_em * self->state.w_em)
+            + (cal->solved.no_contact_E_theta_b_theta_d * self->state.theta_d)
+            + (cal->solved.no_contact_E_theta_b_theta_b * self->state.theta_b)
+            + (cal->solved.no_contact_F_theta_b_w_w * work->pull_w_w)
+            + (cal->solved.no_contact_F_theta_b_w_em * work->pull_w_em)
+            + (cal->solved.no_contact_F_theta_b_theta_d * work->pull_theta_d)
+            + (cal->solved.no_contact_F_theta_b_theta_b * work->pull_theta_b);
     } else {
-        series_no_contact(self, work);
+        series_no_contact(self, cal, work);
         work->s = work->h;
         point(self, work);
         work->end_w_w = work->at_w_w;
@@ -711,128 +727,134 @@ static inline void step_no_contact(const estimator_written_Self *self, Work *wor
     }
 }
 
-static inline void series_coast_contact(const estimator_written_Self *self, Work *work)
+static inline void series_coast_contact(const estimator_written_Self *self,
+    const volatile estimator_written_Cal *cal, Work *work)
 {
     work->order = 1.0;
-    work->series_w_w[0] = (solved_coast_contact_A_w_w_w_w * self->state.w_w)
-        + (solved_coast_contact_A_w_w_w_em * self->state.w_em)
-        + (solved_coast_contact_A_w_w_theta_d * self->state.theta_d)
-        + (solved_coast_contact_A_w_w_theta_b * self->state.theta_b) + work->pull_w_w;
-    work->series_w_em[0] = (solved_coast_contact_A_w_em_w_w * self->state.w_w)
-        + (solved_coast_contact_A_w_em_w_em * self->state.w_em)
-        + (solved_coast_contact_A_w_em_theta_d * self->state.theta_d)
-        + (solved_coast_contact_A_w_em_theta_b * self->state.theta_b) + work->pull_w_em;
-    work->series_theta_d[0] = (solved_coast_contact_A_theta_d_w_w * self->state.w_w)
-        + (solved_coast_contact_A_theta_d_w_em * self->state.w_em) + work->pull_theta_d;
+    work->series_w_w[0] = (cal->solved.coast_contact_A_w_w_w_w * self->state.w_w)
+        + (cal->solved.coast_contact_A_w_w_w_em * self->state.w_em)
+        + (cal->solved.coast_contact_A_w_w_theta_d * self->state.theta_d)
+        + (cal->solved.coast_contact_A_w_w_theta_b * self->state.theta_b) + work->pull_w_w;
+    work->series_w_em[0] = (cal->solved.coast_contact_A_w_em_w_w * self->state.w_w)
+        + (cal->solved.coast_contact_A_w_em_w_em * self->state.w_em)
+        + (cal->solved.coast_contact_A_w_em_theta_d * self->state.theta_d)
+        + (cal->solved.coast_contact_A_w_em_theta_b * self->state.theta_b) + work->pull_w_em;
+    work->series_theta_d[0] = (cal->solved.coast_contact_A_theta_d_w_w * self->state.w_w)
+        + (cal->solved.coast_contact_A_theta_d_w_em * self->state.w_em) + work->pull_theta_d;
     work->series_theta_b[0] = work->pull_theta_b;
     for (int32_t term = 0; term < 26; term++) {
         work->order = work->order + 1.0;
-        work->series_w_w[term + 1] = ((solved_coast_contact_A_w_w_w_w * work->series_w_w[term])
-            + (solved_coast_contact_A_w_w_w_em * work->series_w_em[term])
-            + (solved_coast_contact_A_w_w_theta_d * work->series_theta_d[term])
-            + (solved_coast_contact_A_w_w_theta_b * work->series_theta_b[term])) / work->order;
-        work->series_w_em[term + 1] = ((solved_coast_contact_A_w_em_w_w * work->series_w_w[term])
-            + (solved_coast_contact_A_w_em_w_em * work->series_w_em[term])
-            + (solved_coast_contact_A_w_em_theta_d * work->series_theta_d[term])
-            + (solved_coast_contact_A_w_em_theta_b * work->series_theta_b[term])) / work->order;
+        work->series_w_w[term + 1] =
+            ((cal->solved.coast_contact_A_w_w_w_w * work->series_w_w[term])
+            + (cal->solved.coast_contact_A_w_w_w_em * work->series_w_em[term])
+            + (cal->solved.coast_contact_A_w_w_theta_d * work->series_theta_d[term])
+            + (cal->solved.coast_contact_A_w_w_theta_b * work->series_theta_b[term])) / work->order;
+        work->series_w_em[term + 1] =
+            ((cal->solved.coast_contact_A_w_em_w_w * work->series_w_w[term])
+            + (cal->solved.coast_contact_A_w_em_w_em * work->series_w_em[term])
+            + (cal->solved.coast_contact_A_w_em_theta_d * work->series_theta_d[term])
+            + (cal->solved.coast_contact_A_w_em_theta_b * work->series_theta_b[term])) / work->order;
         work->series_theta_d[term + 1] =
-            ((solved_coast_contact_A_theta_d_w_w * work->series_w_w[term])
-            + (solved_coast_contact_A_theta_d_w_em * work->series_w_em[term])) / work->order;
+            ((cal->solved.coast_contact_A_theta_d_w_w * work->series_w_w[term])
+            + (cal->solved.coast_contact_A_theta_d_w_em * work->series_w_em[term])) / work->order;
         work->series_theta_b[term + 1] = 0.0 / work->order;
     }
 }
 
-static inline void step_coast_contact(const estimator_written_Self *self, Work *work)
+static inline void step_coast_contact(const estimator_written_Self *self,
+    const volatile estimator_written_Cal *cal, Work *work)
 {
     work->at_w_w = self->state.w_w;
     work->at_w_em = self->state.w_em;
     work->at_theta_d = self->state.theta_d;
     work->at_theta_b = self->state.theta_b;
     rates_coast_contact(self, work);
-    work->pull_w_w = work->rate_w_w - ((solved_coast_contact_A_w_w_w_w * work->at_w_w)
-        + (solved_coast_contact_A_w_w_w_em * work->at_w_em)
-        + (solved_coast_contact_A_w_w_theta_d * work->at_theta_d)
-        + (solved_coast_contact_A_w_w_theta_b * work->at_theta_b));
-    work->pull_w_em = work->rate_w_em - ((solved_coast_contact_A_w_em_w_w * work->at_w_w)
-        + (solved_coast_contact_A_w_em_w_em * work->at_w_em)
-        + (solved_coast_contact_A_w_em_theta_d * work->at_theta_d)
-        + (solved_coast_contact_A_w_em_theta_b * work->at_theta_b));
-    work->pull_theta_d = work->rate_theta_d - ((solved_coast_contact_A_theta_d_w_w * work->at_w_w)
-        + (solved_coast_contact_A_theta_d_w_em * work->at_w_em));
+    work->pull_w_w = work->rate_w_w - ((cal->solved.coast_contact_A_w_w_w_w * work->at_w_w)
+        + (cal->solved.coast_contact_A_w_w_w_em * work->at_w_em)
+        + (cal->solved.coast_contact_A_w_w_theta_d * work->at_theta_d)
+        + (cal->solved.coast_contact_A_w_w_theta_b * work->at_theta_b));
+    work->pull_w_em = work->rate_w_em - ((cal->solved.coast_contact_A_w_em_w_w * work->at_w_w)
+        + (cal->solved.coast_contact_A_w_em_w_em * work->at_w_em)
+        + (cal->solved.coast_contact_A_w_em_theta_d * work->at_theta_d)
+        + (cal->solved.coast_contact_A_w_em_theta_b * work->at_theta_b));
+    work->pull_theta_d =
+        work->rate_theta_d - ((cal->solved.coast_contact_A_theta_d_w_w * work->at_w_w)
+        + (cal->solved.coast_contact_A_theta_d_w_em * work->at_w_em));
     work->pull_theta_b = work->rate_theta_b;
     if (work->h == 0.001) {
-        work->at_w_w = (solved_coast_contact_Eh_w_w_w_w * self->state.w_w)
-            + (solved_coast_contact_Eh_w_w_w_em * self->state.w_em)
-            + (solved_coast_contact_Eh_w_w_theta_d * self->state.theta_d)
-            + (solved_coast_contact_Eh_w_w_theta_b * self->state.theta_b)
-            + (solved_coast_contact_Fh_w_w_w_w * work->pull_w_w)
-            + (solved_coast_contact_Fh_w_w_w_em * work->pull_w_em)
-            + (solved_coast_contact_Fh_w_w_theta_d * work->pull_theta_d)
-            + (solved_coast_contact_Fh_w_w_theta_b * work->pull_theta_b);
-        work->at_w_em = (solved_coast_contact_Eh_w_em_w_w * self->state.w_w)
-            + (solved_coast_contact_Eh_w_em_w_em * self->state.w_em)
-            + (solved_coast_contact_Eh_w_em_theta_d * self->state.theta_d)
-            + (solved_coast_contact_Eh_w_em_theta_b * self->state.theta_b)
-            + (solved_coast_contact_Fh_w_em_w_w * work->pull_w_w)
-            + (solved_coast_contact_Fh_w_em_w_em * work->pull_w_em)
-            + (solved_coast_contact_Fh_w_em_theta_d * work->pull_theta_d)
-            + (solved_coast_contact_Fh_w_em_theta_b * work->pull_theta_b);
-        work->at_theta_d = (solved_coast_contact_Eh_theta_d_w_w * self->state.w_w)
-            + (solved_coast_contact_Eh_theta_d_w_em * self->state.w_em)
-            + (solved_coast_contact_Eh_theta_d_theta_d * self->state.theta_d)
-            + (solved_coast_contact_Eh_theta_d_theta_b * self->state.theta_b)
-            + (solved_coast_contact_Fh_theta_d_w_w * work->pull_w_w)
-            + (solved_coast_contact_Fh_theta_d_w_em * work->pull_w_em)
-            + (solved_coast_contact_Fh_theta_d_theta_d * work->pull_theta_d)
-            + (solved_coast_contact_Fh_theta_d_theta_b * work->pull_theta_b);
-        work->at_theta_b = (solved_coast_contact_Eh_theta_b_theta_b * self->state.theta_b)
-            + (solved_coast_contact_Fh_theta_b_theta_b * work->pull_theta_b);
+        work->at_w_w = (cal->solved.coast_contact_Eh_w_w_w_w * self->state.w_w)
+            + (cal->solved.coast_contact_Eh_w_w_w_em * self->state.w_em)
+            + (cal->solved.coast_contact_Eh_w_w_theta_d * self->state.theta_d)
+            + (cal->solved.coast_contact_Eh_w_w_theta_b * self->state.theta_b)
+            + (cal->solved.coast_contact_Fh_w_w_w_w * work->pull_w_w)
+            + (cal->solved.coast_contact_Fh_w_w_w_em * work->pull_w_em)
+            + (cal->solved.coast_contact_Fh_w_w_theta_d * work->pull_theta_d)
+            + (cal->solved.coast_contact_Fh_w_w_theta_b * work->pull_theta_b);
+        work->at_w_em = (cal->solved.coast_contact_Eh_w_em_w_w * self->state.w_w)
+            + (cal->solved.coast_contact_Eh_w_em_w_em * self->state.w_em)
+            + (cal->solved.coast_contact_Eh_w_em_theta_d * self->state.theta_d)
+            + (cal->solved.coast_contact_Eh_w_em_theta_b * self->state.theta_b)
+            + (cal->solved.coast_contact_Fh_w_em_w_w * work->pull_w_w)
+            + (cal->solved.coast_contact_Fh_w_em_w_em * work->pull_w_em)
+            + (cal->solved.coast_contact_Fh_w_em_theta_d * work->pull_theta_d)
+            + (cal->solved.coast_contact_Fh_w_em_theta_b * work->pull_theta_b);
+        work->at_theta_d = (cal->solved.coast_contact_Eh_theta_d_w_w * self->state.w_w)
+            + (cal->solved.coast_contact_Eh_theta_d_w_em * self->state.w_em)
+            + (cal->solved.coast_contact_Eh_theta_d_theta_d * self->state.theta_d)
+            + (cal->solved.coast_contact_Eh_theta_d_theta_b * self->state.theta_b)
+            + (cal->solved.coast_contact_Fh_theta_d_w_w * work->pull_w_w)
+            + (cal->solved.coast_contact_Fh_theta_d_w_em * work->pull_w_em)
+            + (cal->solved.coast_contact_Fh_theta_d_theta_d * work->pull_theta_d)
+            + (cal->solved.coast_contact_Fh_theta_d_theta_b * work->pull_theta_b);
+        work->at_theta_b = (cal->solved.coast_contact_Eh_theta_b_theta_b * self->state.theta_b)
+            + (cal->solved.coast_contact_Fh_theta_b_theta_b * work->pull_theta_b);
     } else {
-        series_coast_contact(self, work);
+        series_coast_contact(self, cal, work);
         work->s = 0.5 * work->h;
         point(self, work);
     }
     rates_coast_contact(self, work);
-    work->pull_w_w = work->rate_w_w - ((solved_coast_contact_A_w_w_w_w * work->at_w_w)
-        + (solved_coast_contact_A_w_w_w_em * work->at_w_em)
-        + (solved_coast_contact_A_w_w_theta_d * work->at_theta_d)
-        + (solved_coast_contact_A_w_w_theta_b * work->at_theta_b));
-    work->pull_w_em = work->rate_w_em - ((solved_coast_contact_A_w_em_w_w * work->at_w_w)
-        + (solved_coast_contact_A_w_em_w_em * work->at_w_em)
-        + (solved_coast_contact_A_w_em_theta_d * work->at_theta_d)
-        + (solved_coast_contact_A_w_em_theta_b * work->at_theta_b));
-    work->pull_theta_d = work->rate_theta_d - ((solved_coast_contact_A_theta_d_w_w * work->at_w_w)
-        + (solved_coast_contact_A_theta_d_w_em * work->at_w_em));
+    work->pull_w_w = work->rate_w_w - ((cal->solved.coast_contact_A_w_w_w_w * work->at_w_w)
+        + (cal->solved.coast_contact_A_w_w_w_em * work->at_w_em)
+        + (cal->solved.coast_contact_A_w_w_theta_d * work->at_theta_d)
+        + (cal->solved.coast_contact_A_w_w_theta_b * work->at_theta_b));
+    work->pull_w_em = work->rate_w_em - ((cal->solved.coast_contact_A_w_em_w_w * work->at_w_w)
+        + (cal->solved.coast_contact_A_w_em_w_em * work->at_w_em)
+        + (cal->solved.coast_contact_A_w_em_theta_d * work->at_theta_d)
+        + (cal->solved.coast_contact_A_w_em_theta_b * work->at_theta_b));
+    work->pull_theta_d =
+        work->rate_theta_d - ((cal->solved.coast_contact_A_theta_d_w_w * work->at_w_w)
+        + (cal->solved.coast_contact_A_theta_d_w_em * work->at_w_em));
     work->pull_theta_b = work->rate_theta_b;
     if (work->h == 0.001) {
-        work->end_w_w = (solved_coast_contact_E_w_w_w_w * self->state.w_w)
-            + (solved_coast_contact_E_w_w_w_em * self->state.w_em)
-            + (solved_coast_contact_E_w_w_theta_d * self->state.theta_d)
-            + (solved_coast_contact_E_w_w_theta_b * self->state.theta_b)
-            + (solved_coast_contact_F_w_w_w_w * work->pull_w_w)
-            + (solved_coast_contact_F_w_w_w_em * work->pull_w_em)
-            + (solved_coast_contact_F_w_w_theta_d * work->pull_theta_d)
-            + (solved_coast_contact_F_w_w_theta_b * work->pull_theta_b);
-        work->end_w_em = (solved_coast_contact_E_w_em_w_w * self->state.w_w)
-            + (solved_coast_contact_E_w_em_w_em * self->state.w_em)
-            + (solved_coast_contact_E_w_em_theta_d * self->state.theta_d)
-            + (solved_coast_contact_E_w_em_theta_b * self->state.theta_b)
-            + (solved_coast_contact_F_w_em_w_w * work->pull_w_w)
-            + (solved_coast_contact_F_w_em_w_em * work->pull_w_em)
-            + (solved_coast_contact_F_w_em_theta_d * work->pull_theta_d)
-            + (solved_coast_contact_F_w_em_theta_b * work->pull_theta_b);
-        work->end_theta_d = (solved_coast_contact_E_theta_d_w_w * self->state.w_w)
-            + (solved_coast_contact_E_theta_d_w_em * self->state.w_em)
-            + (solved_coast_contact_E_theta_d_theta_d * self->state.theta_d)
-            + (solved_coast_contact_E_theta_d_theta_b * self->state.theta_b)
-            + (solved_coast_contact_F_theta_d_w_w * work->pull_w_w)
-            + (solved_coast_contact_F_theta_d_w_em * work->pull_w_em)
-            + (solved_coast_contact_F_theta_d_theta_d * work->pull_theta_d)
-            + (solved_coast_contact_F_theta_d_theta_b * work->pull_theta_b);
-        work->end_theta_b = (solved_coast_contact_E_theta_b_theta_b * self->state.theta_b)
-            + (solved_coast_contact_F_theta_b_theta_b * work->pull_theta_b);
+        work->end_w_w = (cal->solved.coast_contact_E_w_w_w_w * self->state.w_w)
+            + (cal->solved.coast_contact_E_w_w_w_em * self->state.w_em)
+            + (cal->solved.coast_contact_E_w_w_theta_d * self->state.theta_d)
+            + (cal->solved.coast_contact_E_w_w_theta_b * self->state.theta_b)
+            + (cal->solved.coast_contact_F_w_w_w_w * work->pull_w_w)
+            + (cal->solved.coast_contact_F_w_w_w_em * work->pull_w_em)
+            + (cal->solved.coast_contact_F_w_w_theta_d * work->pull_theta_d)
+            + (cal->solved.coast_contact_F_w_w_theta_b * work->pull_theta_b);
+        work->end_w_em = (cal->solved.coast_contact_E_w_em_w_w * self->state.w_w)
+            + (cal->solved.coast_contact_E_w_em_w_em * self->state.w_em)
+            + (cal->solved.coast_contact_E_w_em_theta_d * self->state.theta_d)
+            + (cal->solved.coast_contact_E_w_em_theta_b * self->state.theta_b)
+            + (cal->solved.coast_contact_F_w_em_w_w * work->pull_w_w)
+            + (cal->solved.coast_contact_F_w_em_w_em * work->pull_w_em)
+            + (cal->solved.coast_contact_F_w_em_theta_d * work->pull_theta_d)
+            + (cal->solved.coast_contact_F_w_em_theta_b * work->pull_theta_b);
+        work->end_theta_d = (cal->solved.coast_contact_E_theta_d_w_w * self->state.w_w)
+            + (cal->solved.coast_contact_E_theta_d_w_em * self->state.w_em)
+            + (cal->solved.coast_contact_E_theta_d_theta_d * self->state.theta_d)
+            + (cal->solved.coast_contact_E_theta_d_theta_b * self->state.theta_b)
+            + (cal->solved.coast_contact_F_theta_d_w_w * work->pull_w_w)
+            + (cal->solved.coast_contact_F_theta_d_w_em * work->pull_w_em)
+            + (cal->solved.coast_contact_F_theta_d_theta_d * work->pull_theta_d)
+            + (cal->solved.coast_contact_F_theta_d_theta_b * work->pull_theta_b);
+        work->end_theta_b = (cal->solved.coast_contact_E_theta_b_theta_b * self->state.theta_b)
+            + (cal->solved.coast_contact_F_theta_b_theta_b * work->pull_theta_b);
     } else {
-        series_coast_contact(self, work);
+        series_coast_contact(self, cal, work);
         work->s = work->h;
         point(self, work);
         work->end_w_w = work->at_w_w;
@@ -863,9 +885,10 @@ static inline void locate_drive_contact(const estimator_written_Self *self, Work
     work->elapsed = ha_min(work->high, work->h);
 }
 
-static inline void move_drive_contact(estimator_written_Self *self, Work *work)
+static inline void move_drive_contact(estimator_written_Self *self,
+    const volatile estimator_written_Cal *cal, Work *work)
 {
-    step_drive_contact(self, work);
+    step_drive_contact(self, cal, work);
     work->elapsed = work->h;
     work->at_w_w = work->end_w_w;
     work->at_w_em = work->end_w_em;
@@ -874,7 +897,7 @@ static inline void move_drive_contact(estimator_written_Self *self, Work *work)
     guards_drive_contact(work);
     work->crossed = work->guard_0;
     if (work->crossed) {
-        series_drive_contact(self, work);
+        series_drive_contact(self, cal, work);
         locate_drive_contact(self, work);
     }
     self->state.w_w = work->end_w_w;
@@ -919,9 +942,10 @@ static inline void locate_no_contact(const estimator_written_Self *self, Work *w
     work->elapsed = ha_min(work->high, work->h);
 }
 
-static inline void move_no_contact(estimator_written_Self *self, Work *work)
+static inline void move_no_contact(estimator_written_Self *self,
+    const volatile estimator_written_Cal *cal, Work *work)
 {
-    step_no_contact(self, work);
+    step_no_contact(self, cal, work);
     work->elapsed = work->h;
     work->at_w_w = work->end_w_w;
     work->at_w_em = work->end_w_em;
@@ -930,7 +954,7 @@ static inline void move_no_contact(estimator_written_Self *self, Work *work)
     guards_no_contact(work);
     work->crossed = work->guard_0 || work->guard_1;
     if (work->crossed) {
-        series_no_contact(self, work);
+        series_no_contact(self, cal, work);
         locate_no_contact(self, work);
     }
     self->state.w_w = work->end_w_w;
@@ -960,9 +984,10 @@ static inline void locate_coast_contact(const estimator_written_Self *self, Work
     work->elapsed = ha_min(work->high, work->h);
 }
 
-static inline void move_coast_contact(estimator_written_Self *self, Work *work)
+static inline void move_coast_contact(estimator_written_Self *self,
+    const volatile estimator_written_Cal *cal, Work *work)
 {
-    step_coast_contact(self, work);
+    step_coast_contact(self, cal, work);
     work->elapsed = work->h;
     work->at_w_w = work->end_w_w;
     work->at_w_em = work->end_w_em;
@@ -971,7 +996,7 @@ static inline void move_coast_contact(estimator_written_Self *self, Work *work)
     guards_coast_contact(work);
     work->crossed = work->guard_0;
     if (work->crossed) {
-        series_coast_contact(self, work);
+        series_coast_contact(self, cal, work);
         locate_coast_contact(self, work);
     }
     self->state.w_w = work->end_w_w;
@@ -997,6 +1022,8 @@ static inline void switch_no_contact(estimator_written_Self *self, const Work *w
         /* driveline modes.no_contact.transitions.coast_contact.reset.theta_b */
         self->state.theta_b = -constant.alpha;
         self->run_mode = estimator_written_RUN_coast_contact;
+    } else {
+        /* nothing to do */
     }
 }
 
@@ -1007,7 +1034,8 @@ static inline void switch_coast_contact(estimator_written_Self *self, const Work
     }
 }
 
-static inline void predict_drive(estimator_written_Self *self)
+static inline void predict_drive(estimator_written_Self *self,
+    const volatile estimator_written_Cal *cal)
 {
     const double k_hs_theta_b = constant.k_hs * self->state.theta_b; /* k_hs * theta_b */
     /* estimator_written modes.drive.observer.f.w_em */
@@ -1015,26 +1043,27 @@ static inline void predict_drive(estimator_written_Self *self)
     /* estimator_written modes.drive.observer.f.w_w */
     const double f_w_w = (-(k_hs_theta_b + constant.b_0)) * constant.per_J_v;
     /* estimator_written modes.drive.observer */
-    const double predicted_theta_d = (solved_drive_Phi_theta_d_theta_d * self->state.theta_d)
-        + (solved_drive_Phi_theta_d_w_em * self->state.w_em)
-        + (solved_drive_Phi_theta_d_w_w * self->state.w_w)
-        + (solved_drive_Gamma_theta_d_T_em * self->before.T_em)
-        + (solved_drive_Gamma_theta_d_T_br * self->before.T_br)
-        + (solved_drive_G_theta_d_w_em * f_w_em) + (solved_drive_G_theta_d_w_w * f_w_w);
+    const double predicted_theta_d = (cal->solved.drive_Phi_theta_d_theta_d * self->state.theta_d)
+        + (cal->solved.drive_Phi_theta_d_w_em * self->state.w_em)
+        + (cal->solved.drive_Phi_theta_d_w_w * self->state.w_w)
+        + (cal->solved.drive_Gamma_theta_d_T_em * self->before.T_em)
+        + (cal->solved.drive_Gamma_theta_d_T_br * self->before.T_br)
+        + (cal->solved.drive_G_theta_d_w_em * f_w_em)
+        + (cal->solved.drive_G_theta_d_w_w * f_w_w);
     /* estimator_written modes.drive.observer */
-    const double predicted_w_em = (solved_drive_Phi_w_em_theta_d * self->state.theta_d)
-        + (solved_drive_Phi_w_em_w_em * self->state.w_em)
-        + (solved_drive_Phi_w_em_w_w * self->state.w_w)
-        + (solved_drive_Gamma_w_em_T_em * self->before.T_em)
-        + (solved_drive_Gamma_w_em_T_br * self->before.T_br)
-        + (solved_drive_G_w_em_w_em * f_w_em) + (solved_drive_G_w_em_w_w * f_w_w);
+    const double predicted_w_em = (cal->solved.drive_Phi_w_em_theta_d * self->state.theta_d)
+        + (cal->solved.drive_Phi_w_em_w_em * self->state.w_em)
+        + (cal->solved.drive_Phi_w_em_w_w * self->state.w_w)
+        + (cal->solved.drive_Gamma_w_em_T_em * self->before.T_em)
+        + (cal->solved.drive_Gamma_w_em_T_br * self->before.T_br)
+        + (cal->solved.drive_G_w_em_w_em * f_w_em) + (cal->solved.drive_G_w_em_w_w * f_w_w);
     /* estimator_written modes.drive.observer */
-    const double predicted_w_w = (solved_drive_Phi_w_w_theta_d * self->state.theta_d)
-        + (solved_drive_Phi_w_w_w_em * self->state.w_em)
-        + (solved_drive_Phi_w_w_w_w * self->state.w_w)
-        + (solved_drive_Gamma_w_w_T_em * self->before.T_em)
-        + (solved_drive_Gamma_w_w_T_br * self->before.T_br) + (solved_drive_G_w_w_w_em * f_w_em)
-        + (solved_drive_G_w_w_w_w * f_w_w);
+    const double predicted_w_w = (cal->solved.drive_Phi_w_w_theta_d * self->state.theta_d)
+        + (cal->solved.drive_Phi_w_w_w_em * self->state.w_em)
+        + (cal->solved.drive_Phi_w_w_w_w * self->state.w_w)
+        + (cal->solved.drive_Gamma_w_w_T_em * self->before.T_em)
+        + (cal->solved.drive_Gamma_w_w_T_br * self->before.T_br)
+        + (cal->solved.drive_G_w_w_w_em * f_w_em) + (cal->solved.drive_G_w_w_w_w * f_w_w);
     if (fabs(predicted_theta_d) <= 0.5) {
         self->state.theta_d = predicted_theta_d;
     } else {
@@ -1055,29 +1084,32 @@ static inline void predict_drive(estimator_written_Self *self)
     }
 }
 
-static inline void correct_drive(estimator_written_Self *self, const estimator_written_In *in)
+static inline void correct_drive(estimator_written_Self *self,
+    const volatile estimator_written_Cal *cal, const estimator_written_In *in)
 {
     self->innovation.y_em = in->is_new.y_em ? (self->latched.y_em - self->state.w_em) : 0.0;
     self->innovation.y_w = in->is_new.y_w ? (self->latched.y_w - self->state.w_w) : 0.0;
     const double new_theta_d =
-        self->state.theta_d + ((solved_drive_L_theta_d_y_em * self->innovation.y_em)
-        + (solved_drive_L_theta_d_y_w * self->innovation.y_w));
+        self->state.theta_d + ((cal->solved.drive_L_theta_d_y_em * self->innovation.y_em)
+        + (cal->solved.drive_L_theta_d_y_w * self->innovation.y_w));
     if (fabs(new_theta_d) <= 0.5) {
         self->state.theta_d = new_theta_d;
     } else {
         self->faults |= estimator_written_FAULT_range_theta_d;
         self->state.theta_d = ha_clip(new_theta_d, -0.5, 0.5);
     }
-    const double new_w_em = self->state.w_em + ((solved_drive_L_w_em_y_em * self->innovation.y_em)
-        + (solved_drive_L_w_em_y_w * self->innovation.y_w));
+    const double new_w_em =
+        self->state.w_em + ((cal->solved.drive_L_w_em_y_em * self->innovation.y_em)
+        + (cal->solved.drive_L_w_em_y_w * self->innovation.y_w));
     if ((new_w_em >= (-400.0)) && (new_w_em <= 2400.0)) {
         self->state.w_em = new_w_em;
     } else {
         self->faults |= estimator_written_FAULT_range_w_em;
         self->state.w_em = ha_clip(new_w_em, -400.0, 2400.0);
     }
-    const double new_w_w = self->state.w_w + ((solved_drive_L_w_w_y_em * self->innovation.y_em)
-        + (solved_drive_L_w_w_y_w * self->innovation.y_w));
+    const double new_w_w =
+        self->state.w_w + ((cal->solved.drive_L_w_w_y_em * self->innovation.y_em)
+        + (cal->solved.drive_L_w_w_y_w * self->innovation.y_w));
     if ((new_w_w >= (-50.0)) && (new_w_w <= 300.0)) {
         self->state.w_w = new_w_w;
     } else {
@@ -1086,20 +1118,21 @@ static inline void correct_drive(estimator_written_Self *self, const estimator_w
     }
 }
 
-static inline void run_gap(estimator_written_Self *self, Work *work)
+static inline void run_gap(estimator_written_Self *self, const volatile estimator_written_Cal *cal,
+    Work *work)
 {
     work->left = 0.001; /* estimator_written modes.gap.runs */
     for (int32_t event = 0; (event < 5) && (work->left > 0.0); event++) {
         work->h = work->left;
         switch (self->run_mode) {
         case estimator_written_RUN_drive_contact:
-            move_drive_contact(self, work);
+            move_drive_contact(self, cal, work);
             break;
         case estimator_written_RUN_no_contact:
-            move_no_contact(self, work);
+            move_no_contact(self, cal, work);
             break;
         case estimator_written_RUN_coast_contact:
-            move_coast_contact(self, work);
+            move_coast_contact(self, cal, work);
             break;
         default:
             break;
@@ -1156,7 +1189,8 @@ static inline void run_gap(estimator_written_Self *self, Work *work)
     }
 }
 
-static inline void predict_coast(estimator_written_Self *self)
+static inline void predict_coast(estimator_written_Self *self,
+    const volatile estimator_written_Cal *cal)
 {
     const double k_hs_theta_b = constant.k_hs * self->state.theta_b; /* k_hs * theta_b */
     /* estimator_written modes.coast.observer.f.w_em */
@@ -1164,26 +1198,27 @@ static inline void predict_coast(estimator_written_Self *self)
     /* estimator_written modes.coast.observer.f.w_w */
     const double f_w_w = (-(k_hs_theta_b + constant.b_0)) * constant.per_J_v;
     /* estimator_written modes.coast.observer */
-    const double predicted_theta_d = (solved_coast_Phi_theta_d_theta_d * self->state.theta_d)
-        + (solved_coast_Phi_theta_d_w_em * self->state.w_em)
-        + (solved_coast_Phi_theta_d_w_w * self->state.w_w)
-        + (solved_coast_Gamma_theta_d_T_em * self->before.T_em)
-        + (solved_coast_Gamma_theta_d_T_br * self->before.T_br)
-        + (solved_coast_G_theta_d_w_em * f_w_em) + (solved_coast_G_theta_d_w_w * f_w_w);
+    const double predicted_theta_d = (cal->solved.coast_Phi_theta_d_theta_d * self->state.theta_d)
+        + (cal->solved.coast_Phi_theta_d_w_em * self->state.w_em)
+        + (cal->solved.coast_Phi_theta_d_w_w * self->state.w_w)
+        + (cal->solved.coast_Gamma_theta_d_T_em * self->before.T_em)
+        + (cal->solved.coast_Gamma_theta_d_T_br * self->before.T_br)
+        + (cal->solved.coast_G_theta_d_w_em * f_w_em)
+        + (cal->solved.coast_G_theta_d_w_w * f_w_w);
     /* estimator_written modes.coast.observer */
-    const double predicted_w_em = (solved_coast_Phi_w_em_theta_d * self->state.theta_d)
-        + (solved_coast_Phi_w_em_w_em * self->state.w_em)
-        + (solved_coast_Phi_w_em_w_w * self->state.w_w)
-        + (solved_coast_Gamma_w_em_T_em * self->before.T_em)
-        + (solved_coast_Gamma_w_em_T_br * self->before.T_br)
-        + (solved_coast_G_w_em_w_em * f_w_em) + (solved_coast_G_w_em_w_w * f_w_w);
+    const double predicted_w_em = (cal->solved.coast_Phi_w_em_theta_d * self->state.theta_d)
+        + (cal->solved.coast_Phi_w_em_w_em * self->state.w_em)
+        + (cal->solved.coast_Phi_w_em_w_w * self->state.w_w)
+        + (cal->solved.coast_Gamma_w_em_T_em * self->before.T_em)
+        + (cal->solved.coast_Gamma_w_em_T_br * self->before.T_br)
+        + (cal->solved.coast_G_w_em_w_em * f_w_em) + (cal->solved.coast_G_w_em_w_w * f_w_w);
     /* estimator_written modes.coast.observer */
-    const double predicted_w_w = (solved_coast_Phi_w_w_theta_d * self->state.theta_d)
-        + (solved_coast_Phi_w_w_w_em * self->state.w_em)
-        + (solved_coast_Phi_w_w_w_w * self->state.w_w)
-        + (solved_coast_Gamma_w_w_T_em * self->before.T_em)
-        + (solved_coast_Gamma_w_w_T_br * self->before.T_br) + (solved_coast_G_w_w_w_em * f_w_em)
-        + (solved_coast_G_w_w_w_w * f_w_w);
+    const double predicted_w_w = (cal->solved.coast_Phi_w_w_theta_d * self->state.theta_d)
+        + (cal->solved.coast_Phi_w_w_w_em * self->state.w_em)
+        + (cal->solved.coast_Phi_w_w_w_w * self->state.w_w)
+        + (cal->solved.coast_Gamma_w_w_T_em * self->before.T_em)
+        + (cal->solved.coast_Gamma_w_w_T_br * self->before.T_br)
+        + (cal->solved.coast_G_w_w_w_em * f_w_em) + (cal->solved.coast_G_w_w_w_w * f_w_w);
     if (fabs(predicted_theta_d) <= 0.5) {
         self->state.theta_d = predicted_theta_d;
     } else {
@@ -1204,29 +1239,32 @@ static inline void predict_coast(estimator_written_Self *self)
     }
 }
 
-static inline void correct_coast(estimator_written_Self *self, const estimator_written_In *in)
+static inline void correct_coast(estimator_written_Self *self,
+    const volatile estimator_written_Cal *cal, const estimator_written_In *in)
 {
     self->innovation.y_em = in->is_new.y_em ? (self->latched.y_em - self->state.w_em) : 0.0;
     self->innovation.y_w = in->is_new.y_w ? (self->latched.y_w - self->state.w_w) : 0.0;
     const double new_theta_d =
-        self->state.theta_d + ((solved_coast_L_theta_d_y_em * self->innovation.y_em)
-        + (solved_coast_L_theta_d_y_w * self->innovation.y_w));
+        self->state.theta_d + ((cal->solved.coast_L_theta_d_y_em * self->innovation.y_em)
+        + (cal->solved.coast_L_theta_d_y_w * self->innovation.y_w));
     if (fabs(new_theta_d) <= 0.5) {
         self->state.theta_d = new_theta_d;
     } else {
         self->faults |= estimator_written_FAULT_range_theta_d;
         self->state.theta_d = ha_clip(new_theta_d, -0.5, 0.5);
     }
-    const double new_w_em = self->state.w_em + ((solved_coast_L_w_em_y_em * self->innovation.y_em)
-        + (solved_coast_L_w_em_y_w * self->innovation.y_w));
+    const double new_w_em =
+        self->state.w_em + ((cal->solved.coast_L_w_em_y_em * self->innovation.y_em)
+        + (cal->solved.coast_L_w_em_y_w * self->innovation.y_w));
     if ((new_w_em >= (-400.0)) && (new_w_em <= 2400.0)) {
         self->state.w_em = new_w_em;
     } else {
         self->faults |= estimator_written_FAULT_range_w_em;
         self->state.w_em = ha_clip(new_w_em, -400.0, 2400.0);
     }
-    const double new_w_w = self->state.w_w + ((solved_coast_L_w_w_y_em * self->innovation.y_em)
-        + (solved_coast_L_w_w_y_w * self->innovation.y_w));
+    const double new_w_w =
+        self->state.w_w + ((cal->solved.coast_L_w_w_y_em * self->innovation.y_em)
+        + (cal->solved.coast_L_w_w_y_w * self->innovation.y_w));
     if ((new_w_w >= (-50.0)) && (new_w_w <= 300.0)) {
         self->state.w_w = new_w_w;
     } else {
@@ -1251,6 +1289,8 @@ static inline void jump_drive(estimator_written_Self *self)
         self->timer.drive_gap = 0U;
     } else if (self->timer.drive_gap < 2U) {
         self->timer.drive_gap++;
+    } else {
+        /* nothing to do */
     }
     if (self->timer.drive_gap > 1U) {
         self->timer.drive_gap = 0U;
@@ -1282,12 +1322,16 @@ static inline void jump_gap(estimator_written_Self *self)
         self->timer.gap_drive = 0U;
     } else if (self->timer.gap_drive < 2U) {
         self->timer.gap_drive++;
+    } else {
+        /* nothing to do */
     }
     /* estimator_written modes.gap.transitions.coast.when */
     if (self->run_mode != estimator_written_RUN_coast_contact) {
         self->timer.gap_coast = 0U;
     } else if (self->timer.gap_coast < 2U) {
         self->timer.gap_coast++;
+    } else {
+        /* nothing to do */
     }
     if (self->timer.gap_drive > 1U) {
         self->timer.gap_drive = 0U;
@@ -1299,6 +1343,8 @@ static inline void jump_gap(estimator_written_Self *self)
         self->timer.gap_coast = 0U;
         self->mode = estimator_written_MODE_coast;
         self->fired = 3U; /* estimator_written modes.gap.transitions.coast */
+    } else {
+        /* nothing to do */
     }
 }
 
@@ -1318,6 +1364,8 @@ static inline void jump_coast(estimator_written_Self *self)
         self->timer.coast_gap = 0U;
     } else if (self->timer.coast_gap < 2U) {
         self->timer.coast_gap++;
+    } else {
+        /* nothing to do */
     }
     if (self->timer.coast_gap > 1U) {
         self->timer.coast_gap = 0U;
@@ -1327,9 +1375,10 @@ static inline void jump_coast(estimator_written_Self *self)
     }
 }
 
-static inline void compare_stamps(estimator_written_Self *self, const estimator_written_Cal *cal)
+static inline void compare_stamps(estimator_written_Self *self,
+    const volatile estimator_written_Cal *cal)
 {
-    if (cal->J_em != solved_stamp_J_em) {
+    if (cal->J_em != cal->solved.stamp_J_em) {
         self->faults |= estimator_written_FAULT_stale_calibration;
     }
 }
@@ -1354,7 +1403,8 @@ static inline void remember(estimator_written_Self *self)
     self->before.T_br = self->latched.T_br;
 }
 
-static inline void start(estimator_written_Self *self, const estimator_written_In *in)
+static inline void start(estimator_written_Self *self, const volatile estimator_written_Cal *cal,
+    const estimator_written_In *in)
 {
     if (fabs(constant.alpha) <= 0.5) {
         self->state.theta_d = constant.alpha; /* estimator_written states.theta_d.initial */
@@ -1382,16 +1432,16 @@ static inline void start(estimator_written_Self *self, const estimator_written_I
     }
     self->mode = estimator_written_MODE_drive;
     self->started = true;
-    correct_drive(self, in);
+    correct_drive(self, cal, in);
 }
 
-void estimator_written_Derive(const estimator_written_Cal *cal, estimator_written_Derived *derived)
+void estimator_written_Derive(const volatile estimator_written_Cal *cal, estimator_written_Derived *derived)
 {
     derived->per_J_em = 1.0 / cal->J_em; /* 1 / J_em */
     derived->per_J_em_R = 1.0 / (cal->J_em * constant.R); /* 1 / (J_em * R) */
 }
 
-void estimator_written_Init(estimator_written_Self *self, const estimator_written_Cal *cal)
+void estimator_written_Init(estimator_written_Self *self, const volatile estimator_written_Cal *cal)
 {
     static const estimator_written_Self zero; /* every member 0 or false */
 
@@ -1407,19 +1457,18 @@ void estimator_written_Init(estimator_written_Self *self, const estimator_writte
     compare_stamps(self, cal);
 }
 
-void estimator_written_Calibrate(estimator_written_Self *self, const estimator_written_Cal *cal)
+void estimator_written_Calibrate(estimator_written_Self *self, const volatile estimator_written_Cal *cal)
 {
     estimator_written_Derive(cal, &self->derived);
     compare_stamps(self, cal);
 }
 
-void estimator_written_Step(estimator_written_Self *self, const estimator_written_Cal *cal, const estimator_written_In *in,
-    estimator_written_Out *out)
+void estimator_written_Step(estimator_written_Self *self, const volatile estimator_written_Cal *cal,
+    const estimator_written_In *in, estimator_written_Out *out)
 {
     Work scratch = {0};
     Work *const work = &scratch;
 
-    (void)cal;
     self->fired = 0U;
     latch(self, in);
     self->innovation.y_em = 0.0;
@@ -1427,21 +1476,21 @@ void estimator_written_Step(estimator_written_Self *self, const estimator_writte
     if (self->started) {
         switch (self->mode) {
         case estimator_written_MODE_drive:
-            predict_drive(self);
-            correct_drive(self, in);
+            predict_drive(self, cal);
+            correct_drive(self, cal, in);
             break;
         case estimator_written_MODE_gap:
-            run_gap(self, work);
+            run_gap(self, cal, work);
             break;
         case estimator_written_MODE_coast:
-            predict_coast(self);
-            correct_coast(self, in);
+            predict_coast(self, cal);
+            correct_coast(self, cal, in);
             break;
         default:
             break;
         }
     } else {
-        start(self, in);
+        start(self, cal, in);
     }
     switch (self->mode) {
     case estimator_written_MODE_drive:

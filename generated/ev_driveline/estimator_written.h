@@ -37,9 +37,234 @@ enum {
 #define estimator_written_FAULT_range_w_w (1UL << 8)
 #define estimator_written_FAULT_range_theta_b (1UL << 9)
 
-/* Tunable parameters */
+/* The calibration page: tunable parameters */
 typedef struct {
     double J_em; /* kg*m^2; driveline parameters.J_em; 0.01 to 0.2; motor and gears, at the motor */
+    struct {
+        double drive_contact_A_w_w_w_w;
+        double drive_contact_A_w_w_w_em;
+        double drive_contact_A_w_w_theta_d;
+        double drive_contact_A_w_w_theta_b;
+        double drive_contact_A_w_em_w_w;
+        double drive_contact_A_w_em_w_em;
+        double drive_contact_A_w_em_theta_d;
+        double drive_contact_A_w_em_theta_b;
+        double drive_contact_A_theta_d_w_w;
+        double drive_contact_A_theta_d_w_em;
+        double drive_contact_E_w_w_w_w;
+        double drive_contact_E_w_w_w_em;
+        double drive_contact_E_w_w_theta_d;
+        double drive_contact_E_w_w_theta_b;
+        double drive_contact_E_w_em_w_w;
+        double drive_contact_E_w_em_w_em;
+        double drive_contact_E_w_em_theta_d;
+        double drive_contact_E_w_em_theta_b;
+        double drive_contact_E_theta_d_w_w;
+        double drive_contact_E_theta_d_w_em;
+        double drive_contact_E_theta_d_theta_d;
+        double drive_contact_E_theta_d_theta_b;
+        double drive_contact_E_theta_b_theta_b;
+        double drive_contact_F_w_w_w_w;
+        double drive_contact_F_w_w_w_em;
+        double drive_contact_F_w_w_theta_d;
+        double drive_contact_F_w_w_theta_b;
+        double drive_contact_F_w_em_w_w;
+        double drive_contact_F_w_em_w_em;
+        double drive_contact_F_w_em_theta_d;
+        double drive_contact_F_w_em_theta_b;
+        double drive_contact_F_theta_d_w_w;
+        double drive_contact_F_theta_d_w_em;
+        double drive_contact_F_theta_d_theta_d;
+        double drive_contact_F_theta_d_theta_b;
+        double drive_contact_F_theta_b_theta_b;
+        double drive_contact_Eh_w_w_w_w;
+        double drive_contact_Eh_w_w_w_em;
+        double drive_contact_Eh_w_w_theta_d;
+        double drive_contact_Eh_w_w_theta_b;
+        double drive_contact_Eh_w_em_w_w;
+        double drive_contact_Eh_w_em_w_em;
+        double drive_contact_Eh_w_em_theta_d;
+        double drive_contact_Eh_w_em_theta_b;
+        double drive_contact_Eh_theta_d_w_w;
+        double drive_contact_Eh_theta_d_w_em;
+        double drive_contact_Eh_theta_d_theta_d;
+        double drive_contact_Eh_theta_d_theta_b;
+        double drive_contact_Eh_theta_b_theta_b;
+        double drive_contact_Fh_w_w_w_w;
+        double drive_contact_Fh_w_w_w_em;
+        double drive_contact_Fh_w_w_theta_d;
+        double drive_contact_Fh_w_w_theta_b;
+        double drive_contact_Fh_w_em_w_w;
+        double drive_contact_Fh_w_em_w_em;
+        double drive_contact_Fh_w_em_theta_d;
+        double drive_contact_Fh_w_em_theta_b;
+        double drive_contact_Fh_theta_d_w_w;
+        double drive_contact_Fh_theta_d_w_em;
+        double drive_contact_Fh_theta_d_theta_d;
+        double drive_contact_Fh_theta_d_theta_b;
+        double drive_contact_Fh_theta_b_theta_b;
+        double no_contact_A_w_w_w_w;
+        double no_contact_A_w_em_w_em;
+        double no_contact_A_theta_d_w_w;
+        double no_contact_A_theta_d_w_em;
+        double no_contact_A_theta_b_w_w;
+        double no_contact_A_theta_b_w_em;
+        double no_contact_A_theta_b_theta_d;
+        double no_contact_A_theta_b_theta_b;
+        double no_contact_E_w_w_w_w;
+        double no_contact_E_w_em_w_em;
+        double no_contact_E_theta_d_w_w;
+        double no_contact_E_theta_d_w_em;
+        double no_contact_E_theta_d_theta_d;
+        double no_contact_E_theta_b_w_w;
+        double no_contact_E_theta_b_w_em;
+        double no_contact_E_theta_b_theta_d;
+        double no_contact_E_theta_b_theta_b;
+        double no_contact_F_w_w_w_w;
+        double no_contact_F_w_em_w_em;
+        double no_contact_F_theta_d_w_w;
+        double no_contact_F_theta_d_w_em;
+        double no_contact_F_theta_d_theta_d;
+        double no_contact_F_theta_b_w_w;
+        double no_contact_F_theta_b_w_em;
+        double no_contact_F_theta_b_theta_d;
+        double no_contact_F_theta_b_theta_b;
+        double no_contact_Eh_w_w_w_w;
+        double no_contact_Eh_w_em_w_em;
+        double no_contact_Eh_theta_d_w_w;
+        double no_contact_Eh_theta_d_w_em;
+        double no_contact_Eh_theta_d_theta_d;
+        double no_contact_Eh_theta_b_w_w;
+        double no_contact_Eh_theta_b_w_em;
+        double no_contact_Eh_theta_b_theta_d;
+        double no_contact_Eh_theta_b_theta_b;
+        double no_contact_Fh_w_w_w_w;
+        double no_contact_Fh_w_em_w_em;
+        double no_contact_Fh_theta_d_w_w;
+        double no_contact_Fh_theta_d_w_em;
+        double no_contact_Fh_theta_d_theta_d;
+        double no_contact_Fh_theta_b_w_w;
+        double no_contact_Fh_theta_b_w_em;
+        double no_contact_Fh_theta_b_theta_d;
+        double no_contact_Fh_theta_b_theta_b;
+        double coast_contact_A_w_w_w_w;
+        double coast_contact_A_w_w_w_em;
+        double coast_contact_A_w_w_theta_d;
+        double coast_contact_A_w_w_theta_b;
+        double coast_contact_A_w_em_w_w;
+        double coast_contact_A_w_em_w_em;
+        double coast_contact_A_w_em_theta_d;
+        double coast_contact_A_w_em_theta_b;
+        double coast_contact_A_theta_d_w_w;
+        double coast_contact_A_theta_d_w_em;
+        double coast_contact_E_w_w_w_w;
+        double coast_contact_E_w_w_w_em;
+        double coast_contact_E_w_w_theta_d;
+        double coast_contact_E_w_w_theta_b;
+        double coast_contact_E_w_em_w_w;
+        double coast_contact_E_w_em_w_em;
+        double coast_contact_E_w_em_theta_d;
+        double coast_contact_E_w_em_theta_b;
+        double coast_contact_E_theta_d_w_w;
+        double coast_contact_E_theta_d_w_em;
+        double coast_contact_E_theta_d_theta_d;
+        double coast_contact_E_theta_d_theta_b;
+        double coast_contact_E_theta_b_theta_b;
+        double coast_contact_F_w_w_w_w;
+        double coast_contact_F_w_w_w_em;
+        double coast_contact_F_w_w_theta_d;
+        double coast_contact_F_w_w_theta_b;
+        double coast_contact_F_w_em_w_w;
+        double coast_contact_F_w_em_w_em;
+        double coast_contact_F_w_em_theta_d;
+        double coast_contact_F_w_em_theta_b;
+        double coast_contact_F_theta_d_w_w;
+        double coast_contact_F_theta_d_w_em;
+        double coast_contact_F_theta_d_theta_d;
+        double coast_contact_F_theta_d_theta_b;
+        double coast_contact_F_theta_b_theta_b;
+        double coast_contact_Eh_w_w_w_w;
+        double coast_contact_Eh_w_w_w_em;
+        double coast_contact_Eh_w_w_theta_d;
+        double coast_contact_Eh_w_w_theta_b;
+        double coast_contact_Eh_w_em_w_w;
+        double coast_contact_Eh_w_em_w_em;
+        double coast_contact_Eh_w_em_theta_d;
+        double coast_contact_Eh_w_em_theta_b;
+        double coast_contact_Eh_theta_d_w_w;
+        double coast_contact_Eh_theta_d_w_em;
+        double coast_contact_Eh_theta_d_theta_d;
+        double coast_contact_Eh_theta_d_theta_b;
+        double coast_contact_Eh_theta_b_theta_b;
+        double coast_contact_Fh_w_w_w_w;
+        double coast_contact_Fh_w_w_w_em;
+        double coast_contact_Fh_w_w_theta_d;
+        double coast_contact_Fh_w_w_theta_b;
+        double coast_contact_Fh_w_em_w_w;
+        double coast_contact_Fh_w_em_w_em;
+        double coast_contact_Fh_w_em_theta_d;
+        double coast_contact_Fh_w_em_theta_b;
+        double coast_contact_Fh_theta_d_w_w;
+        double coast_contact_Fh_theta_d_w_em;
+        double coast_contact_Fh_theta_d_theta_d;
+        double coast_contact_Fh_theta_d_theta_b;
+        double coast_contact_Fh_theta_b_theta_b;
+        double drive_Phi_theta_d_theta_d;
+        double drive_Phi_theta_d_w_em;
+        double drive_Phi_theta_d_w_w;
+        double drive_Phi_w_em_theta_d;
+        double drive_Phi_w_em_w_em;
+        double drive_Phi_w_em_w_w;
+        double drive_Phi_w_w_theta_d;
+        double drive_Phi_w_w_w_em;
+        double drive_Phi_w_w_w_w;
+        double drive_Gamma_theta_d_T_em;
+        double drive_Gamma_theta_d_T_br;
+        double drive_Gamma_w_em_T_em;
+        double drive_Gamma_w_em_T_br;
+        double drive_Gamma_w_w_T_em;
+        double drive_Gamma_w_w_T_br;
+        double drive_G_theta_d_w_em;
+        double drive_G_theta_d_w_w;
+        double drive_G_w_em_w_em;
+        double drive_G_w_em_w_w;
+        double drive_G_w_w_w_em;
+        double drive_G_w_w_w_w;
+        double drive_L_theta_d_y_em;
+        double drive_L_theta_d_y_w;
+        double drive_L_w_em_y_em;
+        double drive_L_w_em_y_w;
+        double drive_L_w_w_y_em;
+        double drive_L_w_w_y_w;
+        double coast_Phi_theta_d_theta_d;
+        double coast_Phi_theta_d_w_em;
+        double coast_Phi_theta_d_w_w;
+        double coast_Phi_w_em_theta_d;
+        double coast_Phi_w_em_w_em;
+        double coast_Phi_w_em_w_w;
+        double coast_Phi_w_w_theta_d;
+        double coast_Phi_w_w_w_em;
+        double coast_Phi_w_w_w_w;
+        double coast_Gamma_theta_d_T_em;
+        double coast_Gamma_theta_d_T_br;
+        double coast_Gamma_w_em_T_em;
+        double coast_Gamma_w_em_T_br;
+        double coast_Gamma_w_w_T_em;
+        double coast_Gamma_w_w_T_br;
+        double coast_G_theta_d_w_em;
+        double coast_G_theta_d_w_w;
+        double coast_G_w_em_w_em;
+        double coast_G_w_em_w_w;
+        double coast_G_w_w_w_em;
+        double coast_G_w_w_w_w;
+        double coast_L_theta_d_y_em;
+        double coast_L_theta_d_y_w;
+        double coast_L_w_em_y_em;
+        double coast_L_w_em_y_w;
+        double coast_L_w_w_y_em;
+        double coast_L_w_w_y_w;
+        double stamp_J_em;
+    } solved; /* matrix exponentials and gains for these values, stamps of the values */
 } estimator_written_Cal;
 
 /* What follows from tunable parameters: estimator_written_Derive */
@@ -109,18 +334,21 @@ typedef struct {
     estimator_written_Derived derived;
 } estimator_written_Self;
 
-/* Default values of the tunable parameters */
-extern const estimator_written_Cal estimator_written_default_cal;
+/* The digest of the Program, which a tool compares with that of its description */
+extern const char estimator_written_Version[17];
+
+/* The page with default values, in a section of its own: estimator_written_MemMap.h */
+extern const volatile estimator_written_Cal estimator_written_default_cal;
 
 /* Before the first step */
-void estimator_written_Init(estimator_written_Self *self, const estimator_written_Cal *cal);
+void estimator_written_Init(estimator_written_Self *self, const volatile estimator_written_Cal *cal);
 
 /* After a change of the calibration page: X_Derive, and a fault if solved numbers do not fit it */
-void estimator_written_Calibrate(estimator_written_Self *self, const estimator_written_Cal *cal);
-void estimator_written_Derive(const estimator_written_Cal *cal, estimator_written_Derived *derived);
+void estimator_written_Calibrate(estimator_written_Self *self, const volatile estimator_written_Cal *cal);
+void estimator_written_Derive(const volatile estimator_written_Cal *cal, estimator_written_Derived *derived);
 
 /* One tick of 1/1000 s */
-void estimator_written_Step(estimator_written_Self *self, const estimator_written_Cal *cal, const estimator_written_In *in,
-    estimator_written_Out *out);
+void estimator_written_Step(estimator_written_Self *self, const volatile estimator_written_Cal *cal,
+    const estimator_written_In *in, estimator_written_Out *out);
 
 #endif

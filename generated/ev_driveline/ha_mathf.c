@@ -17,7 +17,8 @@ float ha_pow2f(float k)
     float result = k;
 
     if ((k >= -126.0F) && (k <= 127.0F)) {
-        const uint32_t bits = (uint32_t)((int32_t)k + 127) << 23;
+        const int32_t exponent = (int32_t)k + 127;
+        const uint32_t bits = (uint32_t)exponent << 23;
         (void)memcpy(&result, &bits, sizeof result);
     }
     return result;
@@ -26,7 +27,14 @@ float ha_pow2f(float k)
 /* sine; |x| <= 1000 rad, clamped; error < 0.85 ULP */
 float ha_sinf(float x)
 {
-    const float bounded = (x > 1000.0F) ? 1000.0F : ((x < (-1000.0F)) ? (-1000.0F) : x);
+    float bounded;
+    if (x > 1000.0F) {
+        bounded = 1000.0F;
+    } else if (x < (-1000.0F)) {
+        bounded = -1000.0F;
+    } else {
+        bounded = x;
+    }
     const float quarters = (bounded * 0.63661975F) + 12582912.0F - 12582912.0F;
     const float turns = (0.25F * quarters) - 0.375F + 12582912.0F - 12582912.0F;
     const float quadrant = quarters - (4.0F * turns);
@@ -48,14 +56,32 @@ float ha_sinf(float x)
         0.041666646F + (square * ((-0.0013887289F) + (square * 2.4428207e-05F)));
     const float cosine =
         crest + (1.0F - crest - half + ((square * square * cosine_series) - (head * tail)));
-    return (fabsf(x) < 0.00012207031F) ? x : ((quadrant < 0.5F) ? sine : ((quadrant < 1.5F) ?
-        cosine : ((quadrant < 2.5F) ? (-sine) : (-cosine))));
+    float y;
+    if (fabsf(x) < 0.00012207031F) {
+        y = x;
+    } else if (quadrant < 0.5F) {
+        y = sine;
+    } else if (quadrant < 1.5F) {
+        y = cosine;
+    } else if (quadrant < 2.5F) {
+        y = -sine;
+    } else {
+        y = -cosine;
+    }
+    return y;
 }
 
 /* cosine; |x| <= 1000 rad, clamped; error < 0.85 ULP */
 float ha_cosf(float x)
 {
-    const float bounded = (x > 1000.0F) ? 1000.0F : ((x < (-1000.0F)) ? (-1000.0F) : x);
+    float bounded;
+    if (x > 1000.0F) {
+        bounded = 1000.0F;
+    } else if (x < (-1000.0F)) {
+        bounded = -1000.0F;
+    } else {
+        bounded = x;
+    }
     const float quarters = (bounded * 0.63661975F) + 12582912.0F - 12582912.0F;
     const float turns = (0.25F * quarters) - 0.375F + 12582912.0F - 12582912.0F;
     const float quadrant = quarters - (4.0F * turns);
@@ -77,14 +103,30 @@ float ha_cosf(float x)
         0.041666646F + (square * ((-0.0013887289F) + (square * 2.4428207e-05F)));
     const float cosine =
         crest + (1.0F - crest - half + ((square * square * cosine_series) - (head * tail)));
-    return (quadrant < 0.5F) ? cosine : ((quadrant < 1.5F) ? (-sine) : ((quadrant < 2.5F) ?
-        (-cosine) : sine));
+    float y;
+    if (quadrant < 0.5F) {
+        y = cosine;
+    } else if (quadrant < 1.5F) {
+        y = -sine;
+    } else if (quadrant < 2.5F) {
+        y = -cosine;
+    } else {
+        y = sine;
+    }
+    return y;
 }
 
 /* e^x; -87 <= x <= 88, clamped; error < 0.95 ULP */
 float ha_expf(float x)
 {
-    const float bounded = (x > 88.0F) ? 88.0F : ((x < (-87.0F)) ? (-87.0F) : x);
+    float bounded;
+    if (x > 88.0F) {
+        bounded = 88.0F;
+    } else if (x < (-87.0F)) {
+        bounded = -87.0F;
+    } else {
+        bounded = x;
+    }
     const float exponent =
         (bounded > (-87.0F)) ? ((bounded * 1.442695F) + 12582912.0F - 12582912.0F) : (-126.0F);
     const float head = bounded - (exponent * 0.69314575F);
@@ -107,13 +149,28 @@ float ha_tanhf(float x)
     const float magnitude =
         (bounded < 0.625F) ? (bounded - (bounded * square * above / below)) : (1.0F
         - (2.0F / (ha_expf(bounded + bounded) + 1.0F)));
-    return (size < 0.00012207031F) ? x : ((x < 0.0F) ? (-magnitude) : magnitude);
+    float y;
+    if (size < 0.00012207031F) {
+        y = x;
+    } else if (x < 0.0F) {
+        y = -magnitude;
+    } else {
+        y = magnitude;
+    }
+    return y;
 }
 
 /* tangent; |x| <= 1000 rad, clamped; error < 2.4 ULP */
 float ha_tanf(float x)
 {
-    const float bounded = (x > 1000.0F) ? 1000.0F : ((x < (-1000.0F)) ? (-1000.0F) : x);
+    float bounded;
+    if (x > 1000.0F) {
+        bounded = 1000.0F;
+    } else if (x < (-1000.0F)) {
+        bounded = -1000.0F;
+    } else {
+        bounded = x;
+    }
     const float quarters = (bounded * 0.63661975F) + 12582912.0F - 12582912.0F;
     const float turns = (0.25F * quarters) - 0.375F + 12582912.0F - 12582912.0F;
     const float quadrant = quarters - (4.0F * turns);
@@ -135,9 +192,19 @@ float ha_tanf(float x)
         0.041666646F + (square * ((-0.0013887289F) + (square * 2.4428207e-05F)));
     const float cosine =
         crest + (1.0F - crest - half + ((square * square * cosine_series) - (head * tail)));
-    return (fabsf(x) < 0.00012207031F) ? x : ((quadrant < 0.5F) ? (sine / cosine) :
-        ((quadrant < 1.5F) ? (-(cosine / sine)) : ((quadrant < 2.5F) ? (sine / cosine) :
-        (-(cosine / sine)))));
+    float y;
+    if (fabsf(x) < 0.00012207031F) {
+        y = x;
+    } else if (quadrant < 0.5F) {
+        y = sine / cosine;
+    } else if (quadrant < 1.5F) {
+        y = -(cosine / sine);
+    } else if (quadrant < 2.5F) {
+        y = sine / cosine;
+    } else {
+        y = -(cosine / sine);
+    }
+    return y;
 }
 
 /* angle of (run, rise), in (-pi, pi] rad; error < 1.5 ULP */
@@ -148,16 +215,33 @@ float ha_atan2f(float rise, float run)
     const float least = (up > along) ? along : up;
     const float most = (up > along) ? up : along;
     const float factor = (most > 1.329228e+36F) ? 9.536743e-07F : 1.0F;
-    const float low =
-        (most > 3.4028235e+38F) ? ((least > 3.4028235e+38F) ? 1.0F : (least * 0.0F)) :
-        (least * factor);
+    float low;
+    if (most > 3.4028235e+38F) {
+        if (least > 3.4028235e+38F) {
+            low = 1.0F;
+        } else {
+            low = least * 0.0F;
+        }
+    } else {
+        low = least * factor;
+    }
     const float high = (most > 3.4028235e+38F) ? 1.0F : (most * factor);
-    const float top =
-        ((16.0F * low) < (7.0F * high)) ? low : (((16.0F * low) < (11.0F * high)) ? (low + low
-        - high) : (low - high));
-    const float below =
-        ((16.0F * low) < (7.0F * high)) ? high : (((16.0F * low) < (11.0F * high)) ? (high
-        + high + low) : (high + low));
+    float top;
+    if ((16.0F * low) < (7.0F * high)) {
+        top = low;
+    } else if ((16.0F * low) < (11.0F * high)) {
+        top = low + low - high;
+    } else {
+        top = low - high;
+    }
+    float below;
+    if ((16.0F * low) < (7.0F * high)) {
+        below = high;
+    } else if ((16.0F * low) < (11.0F * high)) {
+        below = high + high + low;
+    } else {
+        below = high + low;
+    }
     const float r = top / ((high <= 0.0F) ? 1.0F : below);
     const float square = r * r;
     const float centre = -0.057816543F;
@@ -166,24 +250,84 @@ float ha_atan2f(float rise, float run)
     const float core = r + (r * square * series);
     const float turn = (up > along) ? (-core) : core;
     const float arc = (run < 0.0F) ? (-turn) : turn;
-    const float first =
-        (up > along) ? ((run < 0.0F) ? (((16.0F * low) < (7.0F * high)) ? 1.5707964F :
-        (((16.0F * low) < (11.0F * high)) ? 2.0344439F : 2.3561945F)) :
-        (((16.0F * low) < (7.0F * high)) ? 1.5707964F : (((16.0F * low) < (11.0F * high)) ?
-        1.1071488F : 0.7853982F))) : ((run < 0.0F) ? (((16.0F * low) < (7.0F * high)) ?
-        3.1415927F : (((16.0F * low) < (11.0F * high)) ? 2.6779451F : 2.3561945F)) :
-        (((16.0F * low) < (7.0F * high)) ? 0.0F : (((16.0F * low) < (11.0F * high)) ? 0.4636476F
-        : 0.7853982F)));
-    const float rest =
-        (up > along) ? ((run < 0.0F) ? (((16.0F * low) < (7.0F * high)) ? (-4.371139e-08F) :
-        (((16.0F * low) < (11.0F * high)) ? 8.0510056e-08F : (-5.9624403e-09F))) :
-        (((16.0F * low) < (7.0F * high)) ? (-4.371139e-08F) : (((16.0F * low) < (11.0F * high))
-        ? (-4.872355e-08F) : (-2.1855694e-08F)))) : ((run < 0.0F) ?
-        (((16.0F * low) < (7.0F * high)) ? (-8.742278e-08F) : (((16.0F * low) < (11.0F * high))
-        ? (-9.243494e-08F) : (-5.9624403e-09F))) : (((16.0F * low) < (7.0F * high)) ? 0.0F :
-        (((16.0F * low) < (11.0F * high)) ? 5.0121587e-09F : (-2.1855694e-08F))));
+    float first;
+    if (up > along) {
+        if (run < 0.0F) {
+            if ((16.0F * low) < (7.0F * high)) {
+                first = 1.5707964F;
+            } else if ((16.0F * low) < (11.0F * high)) {
+                first = 2.0344439F;
+            } else {
+                first = 2.3561945F;
+            }
+        } else if ((16.0F * low) < (7.0F * high)) {
+            first = 1.5707964F;
+        } else if ((16.0F * low) < (11.0F * high)) {
+            first = 1.1071488F;
+        } else {
+            first = 0.7853982F;
+        }
+    } else if (run < 0.0F) {
+        if ((16.0F * low) < (7.0F * high)) {
+            first = 3.1415927F;
+        } else if ((16.0F * low) < (11.0F * high)) {
+            first = 2.6779451F;
+        } else {
+            first = 2.3561945F;
+        }
+    } else if ((16.0F * low) < (7.0F * high)) {
+        first = 0.0F;
+    } else if ((16.0F * low) < (11.0F * high)) {
+        first = 0.4636476F;
+    } else {
+        first = 0.7853982F;
+    }
+    float rest;
+    if (up > along) {
+        if (run < 0.0F) {
+            if ((16.0F * low) < (7.0F * high)) {
+                rest = -4.371139e-08F;
+            } else if ((16.0F * low) < (11.0F * high)) {
+                rest = 8.0510056e-08F;
+            } else {
+                rest = -5.9624403e-09F;
+            }
+        } else if ((16.0F * low) < (7.0F * high)) {
+            rest = -4.371139e-08F;
+        } else if ((16.0F * low) < (11.0F * high)) {
+            rest = -4.872355e-08F;
+        } else {
+            rest = -2.1855694e-08F;
+        }
+    } else if (run < 0.0F) {
+        if ((16.0F * low) < (7.0F * high)) {
+            rest = -8.742278e-08F;
+        } else if ((16.0F * low) < (11.0F * high)) {
+            rest = -9.243494e-08F;
+        } else {
+            rest = -5.9624403e-09F;
+        }
+    } else if ((16.0F * low) < (7.0F * high)) {
+        rest = 0.0F;
+    } else if ((16.0F * low) < (11.0F * high)) {
+        rest = 5.0121587e-09F;
+    } else {
+        rest = -2.1855694e-08F;
+    }
     const float size = first + (rest + arc);
-    return (up <= 0.0F) ? ((run >= 0.0F) ? rise : size) : ((rise < 0.0F) ? (-size) : size);
+    float y;
+    if (up <= 0.0F) {
+        if (run >= 0.0F) {
+            y = rise;
+        } else {
+            y = size;
+        }
+    } else if (rise < 0.0F) {
+        y = -size;
+    } else {
+        y = size;
+    }
+    return y;
 }
 
 /* The interval of an axis that x is in, and the part of it before x: 0 or 1 outside */
@@ -194,21 +338,20 @@ static int32_t cell(const float *axis, int32_t size, float x, float *part)
 
     if (x <= axis[low]) {
         *part = 0.0F;
-        return low;
-    }
-    if (x >= axis[high]) {
+    } else if (x >= axis[high]) {
         *part = 1.0F;
-        return high - 1;
-    }
-    while ((high - low) > 1) {
-        const int32_t middle = low + ((high - low) / 2);
-        if (x < axis[middle]) {
-            high = middle;
-        } else {
-            low = middle;
+        low = high - 1;
+    } else {
+        while ((high - low) > 1) {
+            const int32_t middle = low + ((high - low) / 2);
+            if (x < axis[middle]) {
+                high = middle;
+            } else {
+                low = middle;
+            }
         }
+        *part = (x - axis[low]) / (axis[high] - axis[low]);
     }
-    *part = (x - axis[low]) / (axis[high] - axis[low]);
     return low;
 }
 

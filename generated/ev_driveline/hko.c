@@ -3,6 +3,7 @@
  * Program digest: 7e93ef0ba99e1a74
  */
 #include "hko.h"
+#include "hko_MemMap.h"
 
 #include <float.h>
 #include <math.h>
@@ -58,154 +59,156 @@ static const struct {
     .k_hs_per_c_hs = 342.85714285714283, /* k_hs / c_hs */
 };
 
-/* Numbers solved when the spec was checked: matrix exponentials, gains, stamps */
-static const double solved_drive_R_y_em = 0.09;
-static const double solved_drive_R_y_w = 0.0025000000000000005;
-static const double solved_drive_P_theta_d_theta_d = 2.10016318473752e-06;
-static const double solved_drive_P_theta_d_w_em = -9.462304675745666e-05;
-static const double solved_drive_P_theta_d_w_w = 8.868302949317712e-07;
-static const double solved_drive_P_theta_d_T_l = 0.0003678421355827657;
-static const double solved_drive_P_w_em_w_em = 0.025905800047335517;
-static const double solved_drive_P_w_em_w_w = -5.2436046698383656e-05;
-static const double solved_drive_P_w_em_T_l = -0.022291061406585308;
-static const double solved_drive_P_w_w_w_w = 2.8909287958503004e-05;
-static const double solved_drive_P_w_w_T_l = -0.015547780145638113;
-static const double solved_drive_P_T_l_T_l = 20.07219056434681;
-static const double solved_drive_drive_contact_Phi_theta_d_theta_d = 0.9992473746251623;
-static const double solved_drive_drive_contact_Phi_theta_d_w_em = 0.0001231523326242793;
-static const double solved_drive_drive_contact_Phi_theta_d_w_w = -0.0009975493789574376;
-static const double solved_drive_drive_contact_Phi_theta_d_T_l = 4.62546877945723e-09;
-static const double solved_drive_drive_contact_Phi_w_em_theta_d = -11.822623931930815;
-static const double solved_drive_drive_contact_Phi_w_em_w_em = 0.9949725549621922;
-static const double solved_drive_drive_contact_Phi_w_em_w_w = 0.04039890775187352;
-static const double solved_drive_drive_contact_Phi_w_em_T_l = -1.7817151563953206e-07;
-static const double solved_drive_drive_contact_Phi_w_w_theta_d = 0.04436633791054622;
-static const double solved_drive_drive_contact_Phi_w_w_w_em = 1.871619539118533e-05;
-static const double solved_drive_drive_contact_Phi_w_w_w_w = 0.9998394158340677;
-static const double solved_drive_drive_contact_Phi_w_w_T_l = -9.264983548109417e-06;
-static const double solved_drive_drive_contact_Qd_theta_d_theta_d = 9.99498152441463e-08;
-static const double solved_drive_drive_contact_Qd_theta_d_w_em = -5.914200883676695e-07;
-static const double solved_drive_drive_contact_Qd_theta_d_w_w = 2.2193884418695318e-09;
-static const double solved_drive_drive_contact_Qd_theta_d_T_l = 1.542466406274555e-10;
-static const double solved_drive_drive_contact_Qd_w_em_w_em = 4.66525635318809e-06;
-static const double solved_drive_drive_contact_Qd_w_em_w_w = -1.750703216256494e-08;
-static const double solved_drive_drive_contact_Qd_w_em_T_l = -5.789064867870356e-09;
-static const double solved_drive_drive_contact_Qd_w_w_w_w = 6.855935638453007e-11;
-static const double solved_drive_drive_contact_Qd_w_w_T_l = -4.6326157731212675e-07;
-static const double solved_drive_drive_contact_Qd_T_l_T_l = 0.1;
-static const double solved_drive_drive_contact_N_w_em_theta_d_theta_d = 5.062127118678659e-12;
-static const double solved_drive_drive_contact_N_w_em_theta_d_w_em = 6.143031603152763e-08;
-static const double solved_drive_drive_contact_N_w_em_theta_d_w_w = 7.411181213656004e-13;
-static const double solved_drive_drive_contact_N_w_em_w_em_w_em = 0.0009952199477509882;
-static const double solved_drive_drive_contact_N_w_em_w_em_w_w = 8.879396413843692e-09;
-static const double solved_drive_drive_contact_N_w_em_w_w_w_w = 1.0859718235577926e-13;
-static const double solved_gap_R_y_em = 0.09;
-static const double solved_gap_R_y_w = 0.0025000000000000005;
-static const double solved_gap_drive_contact_Phi_theta_d_theta_d = 0.9992473746251623;
-static const double solved_gap_drive_contact_Phi_theta_d_w_em = 0.0001231523326242793;
-static const double solved_gap_drive_contact_Phi_theta_d_w_w = -0.0009975493789574376;
-static const double solved_gap_drive_contact_Phi_theta_d_T_l = 4.62546877945723e-09;
-static const double solved_gap_drive_contact_Phi_w_em_theta_d = -11.822623931930815;
-static const double solved_gap_drive_contact_Phi_w_em_w_em = 0.9949725549621922;
-static const double solved_gap_drive_contact_Phi_w_em_w_w = 0.04039890775187352;
-static const double solved_gap_drive_contact_Phi_w_em_T_l = -1.7817151563953206e-07;
-static const double solved_gap_drive_contact_Phi_w_w_theta_d = 0.04436633791054622;
-static const double solved_gap_drive_contact_Phi_w_w_w_em = 1.871619539118533e-05;
-static const double solved_gap_drive_contact_Phi_w_w_w_w = 0.9998394158340677;
-static const double solved_gap_drive_contact_Phi_w_w_T_l = -9.264983548109417e-06;
-static const double solved_gap_drive_contact_Qd_theta_d_theta_d = 9.99498152441463e-08;
-static const double solved_gap_drive_contact_Qd_theta_d_w_em = -5.914200883676695e-07;
-static const double solved_gap_drive_contact_Qd_theta_d_w_w = 2.2193884418695318e-09;
-static const double solved_gap_drive_contact_Qd_theta_d_T_l = 1.542466406274555e-10;
-static const double solved_gap_drive_contact_Qd_w_em_w_em = 4.66525635318809e-06;
-static const double solved_gap_drive_contact_Qd_w_em_w_w = -1.750703216256494e-08;
-static const double solved_gap_drive_contact_Qd_w_em_T_l = -5.789064867870356e-09;
-static const double solved_gap_drive_contact_Qd_w_w_w_w = 6.855935638453007e-11;
-static const double solved_gap_drive_contact_Qd_w_w_T_l = -4.6326157731212675e-07;
-static const double solved_gap_drive_contact_Qd_T_l_T_l = 0.1;
-static const double solved_gap_drive_contact_N_w_em_theta_d_theta_d = 5.062127118678659e-12;
-static const double solved_gap_drive_contact_N_w_em_theta_d_w_em = 6.143031603152763e-08;
-static const double solved_gap_drive_contact_N_w_em_theta_d_w_w = 7.411181213656004e-13;
-static const double solved_gap_drive_contact_N_w_em_w_em_w_em = 0.0009952199477509882;
-static const double solved_gap_drive_contact_N_w_em_w_em_w_w = 8.879396413843692e-09;
-static const double solved_gap_drive_contact_N_w_em_w_w_w_w = 1.0859718235577926e-13;
-static const double solved_gap_no_contact_Phi_theta_d_w_em = 0.00012345432102057582;
-static const double solved_gap_no_contact_Phi_theta_d_w_w = -0.0009999955096208087;
-static const double solved_gap_no_contact_Phi_theta_d_T_l = 4.632833015573926e-09;
-static const double solved_gap_no_contact_Phi_w_em_w_em = 0.9999600007999894;
-static const double solved_gap_no_contact_Phi_w_w_w_w = 0.9999910192550596;
-static const double solved_gap_no_contact_Phi_w_w_T_l = -9.265652162342449e-06;
-static const double solved_gap_no_contact_Qd_theta_d_theta_d = 1.0000000000042927e-07;
-static const double solved_gap_no_contact_Qd_theta_d_w_w = -1.0731570875095902e-15;
-static const double solved_gap_no_contact_Qd_theta_d_T_l = 1.5442788275927974e-10;
-static const double solved_gap_no_contact_Qd_w_w_w_w = 2.861750091630896e-12;
-static const double solved_gap_no_contact_Qd_w_w_T_l = -4.6328330155739274e-07;
-static const double solved_gap_no_contact_Qd_T_l_T_l = 0.1;
-static const double solved_gap_no_contact_N_w_em_theta_d_theta_d = 5.080373929583864e-12;
-static const double solved_gap_no_contact_N_w_em_theta_d_w_em = 6.172592598353812e-08;
-static const double solved_gap_no_contact_N_w_em_w_em_w_em = 0.0009999600010666453;
-static const double solved_gap_coast_contact_Phi_theta_d_theta_d = 0.9992473746251623;
-static const double solved_gap_coast_contact_Phi_theta_d_w_em = 0.0001231523326242793;
-static const double solved_gap_coast_contact_Phi_theta_d_w_w = -0.0009975493789574376;
-static const double solved_gap_coast_contact_Phi_theta_d_T_l = 4.62546877945723e-09;
-static const double solved_gap_coast_contact_Phi_w_em_theta_d = -11.822623931930815;
-static const double solved_gap_coast_contact_Phi_w_em_w_em = 0.9949725549621922;
-static const double solved_gap_coast_contact_Phi_w_em_w_w = 0.04039890775187352;
-static const double solved_gap_coast_contact_Phi_w_em_T_l = -1.7817151563953206e-07;
-static const double solved_gap_coast_contact_Phi_w_w_theta_d = 0.04436633791054622;
-static const double solved_gap_coast_contact_Phi_w_w_w_em = 1.871619539118533e-05;
-static const double solved_gap_coast_contact_Phi_w_w_w_w = 0.9998394158340677;
-static const double solved_gap_coast_contact_Phi_w_w_T_l = -9.264983548109417e-06;
-static const double solved_gap_coast_contact_Qd_theta_d_theta_d = 9.99498152441463e-08;
-static const double solved_gap_coast_contact_Qd_theta_d_w_em = -5.914200883676695e-07;
-static const double solved_gap_coast_contact_Qd_theta_d_w_w = 2.2193884418695318e-09;
-static const double solved_gap_coast_contact_Qd_theta_d_T_l = 1.542466406274555e-10;
-static const double solved_gap_coast_contact_Qd_w_em_w_em = 4.66525635318809e-06;
-static const double solved_gap_coast_contact_Qd_w_em_w_w = -1.750703216256494e-08;
-static const double solved_gap_coast_contact_Qd_w_em_T_l = -5.789064867870356e-09;
-static const double solved_gap_coast_contact_Qd_w_w_w_w = 6.855935638453007e-11;
-static const double solved_gap_coast_contact_Qd_w_w_T_l = -4.6326157731212675e-07;
-static const double solved_gap_coast_contact_Qd_T_l_T_l = 0.1;
-static const double solved_gap_coast_contact_N_w_em_theta_d_theta_d = 5.062127118678659e-12;
-static const double solved_gap_coast_contact_N_w_em_theta_d_w_em = 6.143031603152763e-08;
-static const double solved_gap_coast_contact_N_w_em_theta_d_w_w = 7.411181213656004e-13;
-static const double solved_gap_coast_contact_N_w_em_w_em_w_em = 0.0009952199477509882;
-static const double solved_gap_coast_contact_N_w_em_w_em_w_w = 8.879396413843692e-09;
-static const double solved_gap_coast_contact_N_w_em_w_w_w_w = 1.0859718235577926e-13;
-static const double solved_coast_R_y_em = 0.09;
-static const double solved_coast_R_y_w = 0.0025000000000000005;
-static const double solved_coast_coast_contact_Phi_theta_d_theta_d = 0.9992473746251623;
-static const double solved_coast_coast_contact_Phi_theta_d_w_em = 0.0001231523326242793;
-static const double solved_coast_coast_contact_Phi_theta_d_w_w = -0.0009975493789574376;
-static const double solved_coast_coast_contact_Phi_theta_d_T_l = 4.62546877945723e-09;
-static const double solved_coast_coast_contact_Phi_w_em_theta_d = -11.822623931930815;
-static const double solved_coast_coast_contact_Phi_w_em_w_em = 0.9949725549621922;
-static const double solved_coast_coast_contact_Phi_w_em_w_w = 0.04039890775187352;
-static const double solved_coast_coast_contact_Phi_w_em_T_l = -1.7817151563953206e-07;
-static const double solved_coast_coast_contact_Phi_w_w_theta_d = 0.04436633791054622;
-static const double solved_coast_coast_contact_Phi_w_w_w_em = 1.871619539118533e-05;
-static const double solved_coast_coast_contact_Phi_w_w_w_w = 0.9998394158340677;
-static const double solved_coast_coast_contact_Phi_w_w_T_l = -9.264983548109417e-06;
-static const double solved_coast_coast_contact_Qd_theta_d_theta_d = 9.99498152441463e-08;
-static const double solved_coast_coast_contact_Qd_theta_d_w_em = -5.914200883676695e-07;
-static const double solved_coast_coast_contact_Qd_theta_d_w_w = 2.2193884418695318e-09;
-static const double solved_coast_coast_contact_Qd_theta_d_T_l = 1.542466406274555e-10;
-static const double solved_coast_coast_contact_Qd_w_em_w_em = 4.66525635318809e-06;
-static const double solved_coast_coast_contact_Qd_w_em_w_w = -1.750703216256494e-08;
-static const double solved_coast_coast_contact_Qd_w_em_T_l = -5.789064867870356e-09;
-static const double solved_coast_coast_contact_Qd_w_w_w_w = 6.855935638453007e-11;
-static const double solved_coast_coast_contact_Qd_w_w_T_l = -4.6326157731212675e-07;
-static const double solved_coast_coast_contact_Qd_T_l_T_l = 0.1;
-static const double solved_coast_coast_contact_N_w_em_theta_d_theta_d = 5.062127118678659e-12;
-static const double solved_coast_coast_contact_N_w_em_theta_d_w_em = 6.143031603152763e-08;
-static const double solved_coast_coast_contact_N_w_em_theta_d_w_w = 7.411181213656004e-13;
-static const double solved_coast_coast_contact_N_w_em_w_em_w_em = 0.0009952199477509882;
-static const double solved_coast_coast_contact_N_w_em_w_em_w_w = 8.879396413843692e-09;
-static const double solved_coast_coast_contact_N_w_em_w_w_w_w = 1.0859718235577926e-13;
-static const double solved_stamp_J_em = 0.05;
+const char hko_Version[] = hko_DIGEST;
 
-const hko_Cal hko_default_cal = {
+hko_CALIBRATION const volatile hko_Cal hko_default_cal = {
     .J_em = 0.05,
+    .solved = {
+        .drive_R_y_em = 0.09,
+        .drive_R_y_w = 0.0025000000000000005,
+        .drive_P_theta_d_theta_d = 2.10016318473752e-06,
+        .drive_P_theta_d_w_em = -9.462304675745666e-05,
+        .drive_P_theta_d_w_w = 8.868302949317712e-07,
+        .drive_P_theta_d_T_l = 0.0003678421355827657,
+        .drive_P_w_em_w_em = 0.025905800047335517,
+        .drive_P_w_em_w_w = -5.2436046698383656e-05,
+        .drive_P_w_em_T_l = -0.022291061406585308,
+        .drive_P_w_w_w_w = 2.8909287958503004e-05,
+        .drive_P_w_w_T_l = -0.015547780145638113,
+        .drive_P_T_l_T_l = 20.07219056434681,
+        .drive_drive_contact_Phi_theta_d_theta_d = 0.9992473746251623,
+        .drive_drive_contact_Phi_theta_d_w_em = 0.0001231523326242793,
+        .drive_drive_contact_Phi_theta_d_w_w = -0.0009975493789574376,
+        .drive_drive_contact_Phi_theta_d_T_l = 4.62546877945723e-09,
+        .drive_drive_contact_Phi_w_em_theta_d = -11.822623931930815,
+        .drive_drive_contact_Phi_w_em_w_em = 0.9949725549621922,
+        .drive_drive_contact_Phi_w_em_w_w = 0.04039890775187352,
+        .drive_drive_contact_Phi_w_em_T_l = -1.7817151563953206e-07,
+        .drive_drive_contact_Phi_w_w_theta_d = 0.04436633791054622,
+        .drive_drive_contact_Phi_w_w_w_em = 1.871619539118533e-05,
+        .drive_drive_contact_Phi_w_w_w_w = 0.9998394158340677,
+        .drive_drive_contact_Phi_w_w_T_l = -9.264983548109417e-06,
+        .drive_drive_contact_Qd_theta_d_theta_d = 9.99498152441463e-08,
+        .drive_drive_contact_Qd_theta_d_w_em = -5.914200883676695e-07,
+        .drive_drive_contact_Qd_theta_d_w_w = 2.2193884418695318e-09,
+        .drive_drive_contact_Qd_theta_d_T_l = 1.542466406274555e-10,
+        .drive_drive_contact_Qd_w_em_w_em = 4.66525635318809e-06,
+        .drive_drive_contact_Qd_w_em_w_w = -1.750703216256494e-08,
+        .drive_drive_contact_Qd_w_em_T_l = -5.789064867870356e-09,
+        .drive_drive_contact_Qd_w_w_w_w = 6.855935638453007e-11,
+        .drive_drive_contact_Qd_w_w_T_l = -4.6326157731212675e-07,
+        .drive_drive_contact_Qd_T_l_T_l = 0.1,
+        .drive_drive_contact_N_w_em_theta_d_theta_d = 5.062127118678659e-12,
+        .drive_drive_contact_N_w_em_theta_d_w_em = 6.143031603152763e-08,
+        .drive_drive_contact_N_w_em_theta_d_w_w = 7.411181213656004e-13,
+        .drive_drive_contact_N_w_em_w_em_w_em = 0.0009952199477509882,
+        .drive_drive_contact_N_w_em_w_em_w_w = 8.879396413843692e-09,
+        .drive_drive_contact_N_w_em_w_w_w_w = 1.0859718235577926e-13,
+        .gap_R_y_em = 0.09,
+        .gap_R_y_w = 0.0025000000000000005,
+        .gap_drive_contact_Phi_theta_d_theta_d = 0.9992473746251623,
+        .gap_drive_contact_Phi_theta_d_w_em = 0.0001231523326242793,
+        .gap_drive_contact_Phi_theta_d_w_w = -0.0009975493789574376,
+        .gap_drive_contact_Phi_theta_d_T_l = 4.62546877945723e-09,
+        .gap_drive_contact_Phi_w_em_theta_d = -11.822623931930815,
+        .gap_drive_contact_Phi_w_em_w_em = 0.9949725549621922,
+        .gap_drive_contact_Phi_w_em_w_w = 0.04039890775187352,
+        .gap_drive_contact_Phi_w_em_T_l = -1.7817151563953206e-07,
+        .gap_drive_contact_Phi_w_w_theta_d = 0.04436633791054622,
+        .gap_drive_contact_Phi_w_w_w_em = 1.871619539118533e-05,
+        .gap_drive_contact_Phi_w_w_w_w = 0.9998394158340677,
+        .gap_drive_contact_Phi_w_w_T_l = -9.264983548109417e-06,
+        .gap_drive_contact_Qd_theta_d_theta_d = 9.99498152441463e-08,
+        .gap_drive_contact_Qd_theta_d_w_em = -5.914200883676695e-07,
+        .gap_drive_contact_Qd_theta_d_w_w = 2.2193884418695318e-09,
+        .gap_drive_contact_Qd_theta_d_T_l = 1.542466406274555e-10,
+        .gap_drive_contact_Qd_w_em_w_em = 4.66525635318809e-06,
+        .gap_drive_contact_Qd_w_em_w_w = -1.750703216256494e-08,
+        .gap_drive_contact_Qd_w_em_T_l = -5.789064867870356e-09,
+        .gap_drive_contact_Qd_w_w_w_w = 6.855935638453007e-11,
+        .gap_drive_contact_Qd_w_w_T_l = -4.6326157731212675e-07,
+        .gap_drive_contact_Qd_T_l_T_l = 0.1,
+        .gap_drive_contact_N_w_em_theta_d_theta_d = 5.062127118678659e-12,
+        .gap_drive_contact_N_w_em_theta_d_w_em = 6.143031603152763e-08,
+        .gap_drive_contact_N_w_em_theta_d_w_w = 7.411181213656004e-13,
+        .gap_drive_contact_N_w_em_w_em_w_em = 0.0009952199477509882,
+        .gap_drive_contact_N_w_em_w_em_w_w = 8.879396413843692e-09,
+        .gap_drive_contact_N_w_em_w_w_w_w = 1.0859718235577926e-13,
+        .gap_no_contact_Phi_theta_d_w_em = 0.00012345432102057582,
+        .gap_no_contact_Phi_theta_d_w_w = -0.0009999955096208087,
+        .gap_no_contact_Phi_theta_d_T_l = 4.632833015573926e-09,
+        .gap_no_contact_Phi_w_em_w_em = 0.9999600007999894,
+        .gap_no_contact_Phi_w_w_w_w = 0.9999910192550596,
+        .gap_no_contact_Phi_w_w_T_l = -9.265652162342449e-06,
+        .gap_no_contact_Qd_theta_d_theta_d = 1.0000000000042927e-07,
+        .gap_no_contact_Qd_theta_d_w_w = -1.0731570875095902e-15,
+        .gap_no_contact_Qd_theta_d_T_l = 1.5442788275927974e-10,
+        .gap_no_contact_Qd_w_w_w_w = 2.861750091630896e-12,
+        .gap_no_contact_Qd_w_w_T_l = -4.6328330155739274e-07,
+        .gap_no_contact_Qd_T_l_T_l = 0.1,
+        .gap_no_contact_N_w_em_theta_d_theta_d = 5.080373929583864e-12,
+        .gap_no_contact_N_w_em_theta_d_w_em = 6.172592598353812e-08,
+        .gap_no_contact_N_w_em_w_em_w_em = 0.0009999600010666453,
+        .gap_coast_contact_Phi_theta_d_theta_d = 0.9992473746251623,
+        .gap_coast_contact_Phi_theta_d_w_em = 0.0001231523326242793,
+        .gap_coast_contact_Phi_theta_d_w_w = -0.0009975493789574376,
+        .gap_coast_contact_Phi_theta_d_T_l = 4.62546877945723e-09,
+        .gap_coast_contact_Phi_w_em_theta_d = -11.822623931930815,
+        .gap_coast_contact_Phi_w_em_w_em = 0.9949725549621922,
+        .gap_coast_contact_Phi_w_em_w_w = 0.04039890775187352,
+        .gap_coast_contact_Phi_w_em_T_l = -1.7817151563953206e-07,
+        .gap_coast_contact_Phi_w_w_theta_d = 0.04436633791054622,
+        .gap_coast_contact_Phi_w_w_w_em = 1.871619539118533e-05,
+        .gap_coast_contact_Phi_w_w_w_w = 0.9998394158340677,
+        .gap_coast_contact_Phi_w_w_T_l = -9.264983548109417e-06,
+        .gap_coast_contact_Qd_theta_d_theta_d = 9.99498152441463e-08,
+        .gap_coast_contact_Qd_theta_d_w_em = -5.914200883676695e-07,
+        .gap_coast_contact_Qd_theta_d_w_w = 2.2193884418695318e-09,
+        .gap_coast_contact_Qd_theta_d_T_l = 1.542466406274555e-10,
+        .gap_coast_contact_Qd_w_em_w_em = 4.66525635318809e-06,
+        .gap_coast_contact_Qd_w_em_w_w = -1.750703216256494e-08,
+        .gap_coast_contact_Qd_w_em_T_l = -5.789064867870356e-09,
+        .gap_coast_contact_Qd_w_w_w_w = 6.855935638453007e-11,
+        .gap_coast_contact_Qd_w_w_T_l = -4.6326157731212675e-07,
+        .gap_coast_contact_Qd_T_l_T_l = 0.1,
+        .gap_coast_contact_N_w_em_theta_d_theta_d = 5.062127118678659e-12,
+        .gap_coast_contact_N_w_em_theta_d_w_em = 6.143031603152763e-08,
+        .gap_coast_contact_N_w_em_theta_d_w_w = 7.411181213656004e-13,
+        .gap_coast_contact_N_w_em_w_em_w_em = 0.0009952199477509882,
+        .gap_coast_contact_N_w_em_w_em_w_w = 8.879396413843692e-09,
+        .gap_coast_contact_N_w_em_w_w_w_w = 1.0859718235577926e-13,
+        .coast_R_y_em = 0.09,
+        .coast_R_y_w = 0.0025000000000000005,
+        .coast_coast_contact_Phi_theta_d_theta_d = 0.9992473746251623,
+        .coast_coast_contact_Phi_theta_d_w_em = 0.0001231523326242793,
+        .coast_coast_contact_Phi_theta_d_w_w = -0.0009975493789574376,
+        .coast_coast_contact_Phi_theta_d_T_l = 4.62546877945723e-09,
+        .coast_coast_contact_Phi_w_em_theta_d = -11.822623931930815,
+        .coast_coast_contact_Phi_w_em_w_em = 0.9949725549621922,
+        .coast_coast_contact_Phi_w_em_w_w = 0.04039890775187352,
+        .coast_coast_contact_Phi_w_em_T_l = -1.7817151563953206e-07,
+        .coast_coast_contact_Phi_w_w_theta_d = 0.04436633791054622,
+        .coast_coast_contact_Phi_w_w_w_em = 1.871619539118533e-05,
+        .coast_coast_contact_Phi_w_w_w_w = 0.9998394158340677,
+        .coast_coast_contact_Phi_w_w_T_l = -9.264983548109417e-06,
+        .coast_coast_contact_Qd_theta_d_theta_d = 9.99498152441463e-08,
+        .coast_coast_contact_Qd_theta_d_w_em = -5.914200883676695e-07,
+        .coast_coast_contact_Qd_theta_d_w_w = 2.2193884418695318e-09,
+        .coast_coast_contact_Qd_theta_d_T_l = 1.542466406274555e-10,
+        .coast_coast_contact_Qd_w_em_w_em = 4.66525635318809e-06,
+        .coast_coast_contact_Qd_w_em_w_w = -1.750703216256494e-08,
+        .coast_coast_contact_Qd_w_em_T_l = -5.789064867870356e-09,
+        .coast_coast_contact_Qd_w_w_w_w = 6.855935638453007e-11,
+        .coast_coast_contact_Qd_w_w_T_l = -4.6326157731212675e-07,
+        .coast_coast_contact_Qd_T_l_T_l = 0.1,
+        .coast_coast_contact_N_w_em_theta_d_theta_d = 5.062127118678659e-12,
+        .coast_coast_contact_N_w_em_theta_d_w_em = 6.143031603152763e-08,
+        .coast_coast_contact_N_w_em_theta_d_w_w = 7.411181213656004e-13,
+        .coast_coast_contact_N_w_em_w_em_w_em = 0.0009952199477509882,
+        .coast_coast_contact_N_w_em_w_em_w_w = 8.879396413843692e-09,
+        .coast_coast_contact_N_w_em_w_w_w_w = 1.0859718235577926e-13,
+        .stamp_J_em = 0.05,
+    },
 };
 
 /* Values that live within one step */
@@ -920,6 +923,8 @@ static inline void switch_no_contact(hko_Self *self, const Work *work)
         /* driveline_load modes.no_contact.transitions.coast_contact.reset.theta_b */
         self->state.theta_b = -constant.alpha;
         self->run_mode = hko_RUN_coast_contact;
+    } else {
+        /* nothing to do */
     }
 }
 
@@ -976,7 +981,7 @@ static inline void run_drive(hko_Self *self, Work *work)
     }
 }
 
-static inline void predict_drive(hko_Self *self, Work *work)
+static inline void predict_drive(hko_Self *self, const volatile hko_Cal *cal, Work *work)
 {
     /* hko modes.drive.observer.process_noise.w_em */
     work->density_w_em =
@@ -985,106 +990,111 @@ static inline void predict_drive(hko_Self *self, Work *work)
         - (self->kept ? self->delay_2 :
         self->latched.T_em)) * self->derived.per_J_em) / 12.0)) * constant.t_hold;
     work->t_theta_d__theta_d =
-        (solved_drive_drive_contact_Phi_theta_d_theta_d * self->P_theta_d__theta_d)
-        + (solved_drive_drive_contact_Phi_theta_d_w_em * self->P_theta_d__w_em)
-        + (solved_drive_drive_contact_Phi_theta_d_w_w * self->P_theta_d__w_w)
-        + (solved_drive_drive_contact_Phi_theta_d_T_l * self->P_theta_d__T_l);
+        (cal->solved.drive_drive_contact_Phi_theta_d_theta_d * self->P_theta_d__theta_d)
+        + (cal->solved.drive_drive_contact_Phi_theta_d_w_em * self->P_theta_d__w_em)
+        + (cal->solved.drive_drive_contact_Phi_theta_d_w_w * self->P_theta_d__w_w)
+        + (cal->solved.drive_drive_contact_Phi_theta_d_T_l * self->P_theta_d__T_l);
     work->t_theta_d__w_em =
-        (solved_drive_drive_contact_Phi_theta_d_theta_d * self->P_theta_d__w_em)
-        + (solved_drive_drive_contact_Phi_theta_d_w_em * self->P_w_em__w_em)
-        + (solved_drive_drive_contact_Phi_theta_d_w_w * self->P_w_em__w_w)
-        + (solved_drive_drive_contact_Phi_theta_d_T_l * self->P_w_em__T_l);
-    work->t_theta_d__w_w = (solved_drive_drive_contact_Phi_theta_d_theta_d * self->P_theta_d__w_w)
-        + (solved_drive_drive_contact_Phi_theta_d_w_em * self->P_w_em__w_w)
-        + (solved_drive_drive_contact_Phi_theta_d_w_w * self->P_w_w__w_w)
-        + (solved_drive_drive_contact_Phi_theta_d_T_l * self->P_w_w__T_l);
-    work->t_theta_d__T_l = (solved_drive_drive_contact_Phi_theta_d_theta_d * self->P_theta_d__T_l)
-        + (solved_drive_drive_contact_Phi_theta_d_w_em * self->P_w_em__T_l)
-        + (solved_drive_drive_contact_Phi_theta_d_w_w * self->P_w_w__T_l)
-        + (solved_drive_drive_contact_Phi_theta_d_T_l * self->P_T_l__T_l);
+        (cal->solved.drive_drive_contact_Phi_theta_d_theta_d * self->P_theta_d__w_em)
+        + (cal->solved.drive_drive_contact_Phi_theta_d_w_em * self->P_w_em__w_em)
+        + (cal->solved.drive_drive_contact_Phi_theta_d_w_w * self->P_w_em__w_w)
+        + (cal->solved.drive_drive_contact_Phi_theta_d_T_l * self->P_w_em__T_l);
+    work->t_theta_d__w_w =
+        (cal->solved.drive_drive_contact_Phi_theta_d_theta_d * self->P_theta_d__w_w)
+        + (cal->solved.drive_drive_contact_Phi_theta_d_w_em * self->P_w_em__w_w)
+        + (cal->solved.drive_drive_contact_Phi_theta_d_w_w * self->P_w_w__w_w)
+        + (cal->solved.drive_drive_contact_Phi_theta_d_T_l * self->P_w_w__T_l);
+    work->t_theta_d__T_l =
+        (cal->solved.drive_drive_contact_Phi_theta_d_theta_d * self->P_theta_d__T_l)
+        + (cal->solved.drive_drive_contact_Phi_theta_d_w_em * self->P_w_em__T_l)
+        + (cal->solved.drive_drive_contact_Phi_theta_d_w_w * self->P_w_w__T_l)
+        + (cal->solved.drive_drive_contact_Phi_theta_d_T_l * self->P_T_l__T_l);
     work->t_w_em__theta_d =
-        (solved_drive_drive_contact_Phi_w_em_theta_d * self->P_theta_d__theta_d)
-        + (solved_drive_drive_contact_Phi_w_em_w_em * self->P_theta_d__w_em)
-        + (solved_drive_drive_contact_Phi_w_em_w_w * self->P_theta_d__w_w)
-        + (solved_drive_drive_contact_Phi_w_em_T_l * self->P_theta_d__T_l);
-    work->t_w_em__w_em = (solved_drive_drive_contact_Phi_w_em_theta_d * self->P_theta_d__w_em)
-        + (solved_drive_drive_contact_Phi_w_em_w_em * self->P_w_em__w_em)
-        + (solved_drive_drive_contact_Phi_w_em_w_w * self->P_w_em__w_w)
-        + (solved_drive_drive_contact_Phi_w_em_T_l * self->P_w_em__T_l);
-    work->t_w_em__w_w = (solved_drive_drive_contact_Phi_w_em_theta_d * self->P_theta_d__w_w)
-        + (solved_drive_drive_contact_Phi_w_em_w_em * self->P_w_em__w_w)
-        + (solved_drive_drive_contact_Phi_w_em_w_w * self->P_w_w__w_w)
-        + (solved_drive_drive_contact_Phi_w_em_T_l * self->P_w_w__T_l);
-    work->t_w_em__T_l = (solved_drive_drive_contact_Phi_w_em_theta_d * self->P_theta_d__T_l)
-        + (solved_drive_drive_contact_Phi_w_em_w_em * self->P_w_em__T_l)
-        + (solved_drive_drive_contact_Phi_w_em_w_w * self->P_w_w__T_l)
-        + (solved_drive_drive_contact_Phi_w_em_T_l * self->P_T_l__T_l);
-    work->t_w_w__theta_d = (solved_drive_drive_contact_Phi_w_w_theta_d * self->P_theta_d__theta_d)
-        + (solved_drive_drive_contact_Phi_w_w_w_em * self->P_theta_d__w_em)
-        + (solved_drive_drive_contact_Phi_w_w_w_w * self->P_theta_d__w_w)
-        + (solved_drive_drive_contact_Phi_w_w_T_l * self->P_theta_d__T_l);
-    work->t_w_w__w_em = (solved_drive_drive_contact_Phi_w_w_theta_d * self->P_theta_d__w_em)
-        + (solved_drive_drive_contact_Phi_w_w_w_em * self->P_w_em__w_em)
-        + (solved_drive_drive_contact_Phi_w_w_w_w * self->P_w_em__w_w)
-        + (solved_drive_drive_contact_Phi_w_w_T_l * self->P_w_em__T_l);
-    work->t_w_w__w_w = (solved_drive_drive_contact_Phi_w_w_theta_d * self->P_theta_d__w_w)
-        + (solved_drive_drive_contact_Phi_w_w_w_em * self->P_w_em__w_w)
-        + (solved_drive_drive_contact_Phi_w_w_w_w * self->P_w_w__w_w)
-        + (solved_drive_drive_contact_Phi_w_w_T_l * self->P_w_w__T_l);
-    work->t_w_w__T_l = (solved_drive_drive_contact_Phi_w_w_theta_d * self->P_theta_d__T_l)
-        + (solved_drive_drive_contact_Phi_w_w_w_em * self->P_w_em__T_l)
-        + (solved_drive_drive_contact_Phi_w_w_w_w * self->P_w_w__T_l)
-        + (solved_drive_drive_contact_Phi_w_w_T_l * self->P_T_l__T_l);
+        (cal->solved.drive_drive_contact_Phi_w_em_theta_d * self->P_theta_d__theta_d)
+        + (cal->solved.drive_drive_contact_Phi_w_em_w_em * self->P_theta_d__w_em)
+        + (cal->solved.drive_drive_contact_Phi_w_em_w_w * self->P_theta_d__w_w)
+        + (cal->solved.drive_drive_contact_Phi_w_em_T_l * self->P_theta_d__T_l);
+    work->t_w_em__w_em = (cal->solved.drive_drive_contact_Phi_w_em_theta_d * self->P_theta_d__w_em)
+        + (cal->solved.drive_drive_contact_Phi_w_em_w_em * self->P_w_em__w_em)
+        + (cal->solved.drive_drive_contact_Phi_w_em_w_w * self->P_w_em__w_w)
+        + (cal->solved.drive_drive_contact_Phi_w_em_T_l * self->P_w_em__T_l);
+    work->t_w_em__w_w = (cal->solved.drive_drive_contact_Phi_w_em_theta_d * self->P_theta_d__w_w)
+        + (cal->solved.drive_drive_contact_Phi_w_em_w_em * self->P_w_em__w_w)
+        + (cal->solved.drive_drive_contact_Phi_w_em_w_w * self->P_w_w__w_w)
+        + (cal->solved.drive_drive_contact_Phi_w_em_T_l * self->P_w_w__T_l);
+    work->t_w_em__T_l = (cal->solved.drive_drive_contact_Phi_w_em_theta_d * self->P_theta_d__T_l)
+        + (cal->solved.drive_drive_contact_Phi_w_em_w_em * self->P_w_em__T_l)
+        + (cal->solved.drive_drive_contact_Phi_w_em_w_w * self->P_w_w__T_l)
+        + (cal->solved.drive_drive_contact_Phi_w_em_T_l * self->P_T_l__T_l);
+    work->t_w_w__theta_d =
+        (cal->solved.drive_drive_contact_Phi_w_w_theta_d * self->P_theta_d__theta_d)
+        + (cal->solved.drive_drive_contact_Phi_w_w_w_em * self->P_theta_d__w_em)
+        + (cal->solved.drive_drive_contact_Phi_w_w_w_w * self->P_theta_d__w_w)
+        + (cal->solved.drive_drive_contact_Phi_w_w_T_l * self->P_theta_d__T_l);
+    work->t_w_w__w_em = (cal->solved.drive_drive_contact_Phi_w_w_theta_d * self->P_theta_d__w_em)
+        + (cal->solved.drive_drive_contact_Phi_w_w_w_em * self->P_w_em__w_em)
+        + (cal->solved.drive_drive_contact_Phi_w_w_w_w * self->P_w_em__w_w)
+        + (cal->solved.drive_drive_contact_Phi_w_w_T_l * self->P_w_em__T_l);
+    work->t_w_w__w_w = (cal->solved.drive_drive_contact_Phi_w_w_theta_d * self->P_theta_d__w_w)
+        + (cal->solved.drive_drive_contact_Phi_w_w_w_em * self->P_w_em__w_w)
+        + (cal->solved.drive_drive_contact_Phi_w_w_w_w * self->P_w_w__w_w)
+        + (cal->solved.drive_drive_contact_Phi_w_w_T_l * self->P_w_w__T_l);
+    work->t_w_w__T_l = (cal->solved.drive_drive_contact_Phi_w_w_theta_d * self->P_theta_d__T_l)
+        + (cal->solved.drive_drive_contact_Phi_w_w_w_em * self->P_w_em__T_l)
+        + (cal->solved.drive_drive_contact_Phi_w_w_w_w * self->P_w_w__T_l)
+        + (cal->solved.drive_drive_contact_Phi_w_w_T_l * self->P_T_l__T_l);
     work->t_T_l__theta_d = self->P_theta_d__T_l;
     work->t_T_l__w_em = self->P_w_em__T_l;
     work->t_T_l__w_w = self->P_w_w__T_l;
     work->t_T_l__T_l = self->P_T_l__T_l;
     self->P_theta_d__theta_d =
-        (solved_drive_drive_contact_Phi_theta_d_theta_d * work->t_theta_d__theta_d)
-        + (solved_drive_drive_contact_Phi_theta_d_w_em * work->t_theta_d__w_em)
-        + (solved_drive_drive_contact_Phi_theta_d_w_w * work->t_theta_d__w_w)
-        + (solved_drive_drive_contact_Phi_theta_d_T_l * work->t_theta_d__T_l)
-        + solved_drive_drive_contact_Qd_theta_d_theta_d
-        + (work->density_w_em * solved_drive_drive_contact_N_w_em_theta_d_theta_d);
+        (cal->solved.drive_drive_contact_Phi_theta_d_theta_d * work->t_theta_d__theta_d)
+        + (cal->solved.drive_drive_contact_Phi_theta_d_w_em * work->t_theta_d__w_em)
+        + (cal->solved.drive_drive_contact_Phi_theta_d_w_w * work->t_theta_d__w_w)
+        + (cal->solved.drive_drive_contact_Phi_theta_d_T_l * work->t_theta_d__T_l)
+        + cal->solved.drive_drive_contact_Qd_theta_d_theta_d
+        + (work->density_w_em * cal->solved.drive_drive_contact_N_w_em_theta_d_theta_d);
     self->P_theta_d__w_em =
-        (solved_drive_drive_contact_Phi_w_em_theta_d * work->t_theta_d__theta_d)
-        + (solved_drive_drive_contact_Phi_w_em_w_em * work->t_theta_d__w_em)
-        + (solved_drive_drive_contact_Phi_w_em_w_w * work->t_theta_d__w_w)
-        + (solved_drive_drive_contact_Phi_w_em_T_l * work->t_theta_d__T_l)
-        + solved_drive_drive_contact_Qd_theta_d_w_em
-        + (work->density_w_em * solved_drive_drive_contact_N_w_em_theta_d_w_em);
-    self->P_theta_d__w_w = (solved_drive_drive_contact_Phi_w_w_theta_d * work->t_theta_d__theta_d)
-        + (solved_drive_drive_contact_Phi_w_w_w_em * work->t_theta_d__w_em)
-        + (solved_drive_drive_contact_Phi_w_w_w_w * work->t_theta_d__w_w)
-        + (solved_drive_drive_contact_Phi_w_w_T_l * work->t_theta_d__T_l)
-        + solved_drive_drive_contact_Qd_theta_d_w_w
-        + (work->density_w_em * solved_drive_drive_contact_N_w_em_theta_d_w_w);
-    self->P_theta_d__T_l = work->t_theta_d__T_l + solved_drive_drive_contact_Qd_theta_d_T_l;
-    self->P_w_em__w_em = (solved_drive_drive_contact_Phi_w_em_theta_d * work->t_w_em__theta_d)
-        + (solved_drive_drive_contact_Phi_w_em_w_em * work->t_w_em__w_em)
-        + (solved_drive_drive_contact_Phi_w_em_w_w * work->t_w_em__w_w)
-        + (solved_drive_drive_contact_Phi_w_em_T_l * work->t_w_em__T_l)
-        + solved_drive_drive_contact_Qd_w_em_w_em
-        + (work->density_w_em * solved_drive_drive_contact_N_w_em_w_em_w_em);
-    self->P_w_em__w_w = (solved_drive_drive_contact_Phi_w_w_theta_d * work->t_w_em__theta_d)
-        + (solved_drive_drive_contact_Phi_w_w_w_em * work->t_w_em__w_em)
-        + (solved_drive_drive_contact_Phi_w_w_w_w * work->t_w_em__w_w)
-        + (solved_drive_drive_contact_Phi_w_w_T_l * work->t_w_em__T_l)
-        + solved_drive_drive_contact_Qd_w_em_w_w
-        + (work->density_w_em * solved_drive_drive_contact_N_w_em_w_em_w_w);
-    self->P_w_em__T_l = work->t_w_em__T_l + solved_drive_drive_contact_Qd_w_em_T_l;
-    self->P_w_w__w_w = (solved_drive_drive_contact_Phi_w_w_theta_d * work->t_w_w__theta_d)
-        + (solved_drive_drive_contact_Phi_w_w_w_em * work->t_w_w__w_em)
-        + (solved_drive_drive_contact_Phi_w_w_w_w * work->t_w_w__w_w)
-        + (solved_drive_drive_contact_Phi_w_w_T_l * work->t_w_w__T_l)
-        + solved_drive_drive_contact_Qd_w_w_w_w
-        + (work->density_w_em * solved_drive_drive_contact_N_w_em_w_w_w_w);
-    self->P_w_w__T_l = work->t_w_w__T_l + solved_drive_drive_contact_Qd_w_w_T_l;
-    self->P_T_l__T_l = work->t_T_l__T_l + solved_drive_drive_contact_Qd_T_l_T_l;
+        (cal->solved.drive_drive_contact_Phi_w_em_theta_d * work->t_theta_d__theta_d)
+        + (cal->solved.drive_drive_contact_Phi_w_em_w_em * work->t_theta_d__w_em)
+        + (cal->solved.drive_drive_contact_Phi_w_em_w_w * work->t_theta_d__w_w)
+        + (cal->solved.drive_drive_contact_Phi_w_em_T_l * work->t_theta_d__T_l)
+        + cal->solved.drive_drive_contact_Qd_theta_d_w_em
+        + (work->density_w_em * cal->solved.drive_drive_contact_N_w_em_theta_d_w_em);
+    self->P_theta_d__w_w =
+        (cal->solved.drive_drive_contact_Phi_w_w_theta_d * work->t_theta_d__theta_d)
+        + (cal->solved.drive_drive_contact_Phi_w_w_w_em * work->t_theta_d__w_em)
+        + (cal->solved.drive_drive_contact_Phi_w_w_w_w * work->t_theta_d__w_w)
+        + (cal->solved.drive_drive_contact_Phi_w_w_T_l * work->t_theta_d__T_l)
+        + cal->solved.drive_drive_contact_Qd_theta_d_w_w
+        + (work->density_w_em * cal->solved.drive_drive_contact_N_w_em_theta_d_w_w);
+    self->P_theta_d__T_l = work->t_theta_d__T_l + cal->solved.drive_drive_contact_Qd_theta_d_T_l;
+    self->P_w_em__w_em = (cal->solved.drive_drive_contact_Phi_w_em_theta_d * work->t_w_em__theta_d)
+        + (cal->solved.drive_drive_contact_Phi_w_em_w_em * work->t_w_em__w_em)
+        + (cal->solved.drive_drive_contact_Phi_w_em_w_w * work->t_w_em__w_w)
+        + (cal->solved.drive_drive_contact_Phi_w_em_T_l * work->t_w_em__T_l)
+        + cal->solved.drive_drive_contact_Qd_w_em_w_em
+        + (work->density_w_em * cal->solved.drive_drive_contact_N_w_em_w_em_w_em);
+    self->P_w_em__w_w = (cal->solved.drive_drive_contact_Phi_w_w_theta_d * work->t_w_em__theta_d)
+        + (cal->solved.drive_drive_contact_Phi_w_w_w_em * work->t_w_em__w_em)
+        + (cal->solved.drive_drive_contact_Phi_w_w_w_w * work->t_w_em__w_w)
+        + (cal->solved.drive_drive_contact_Phi_w_w_T_l * work->t_w_em__T_l)
+        + cal->solved.drive_drive_contact_Qd_w_em_w_w
+        + (work->density_w_em * cal->solved.drive_drive_contact_N_w_em_w_em_w_w);
+    self->P_w_em__T_l = work->t_w_em__T_l + cal->solved.drive_drive_contact_Qd_w_em_T_l;
+    self->P_w_w__w_w = (cal->solved.drive_drive_contact_Phi_w_w_theta_d * work->t_w_w__theta_d)
+        + (cal->solved.drive_drive_contact_Phi_w_w_w_em * work->t_w_w__w_em)
+        + (cal->solved.drive_drive_contact_Phi_w_w_w_w * work->t_w_w__w_w)
+        + (cal->solved.drive_drive_contact_Phi_w_w_T_l * work->t_w_w__T_l)
+        + cal->solved.drive_drive_contact_Qd_w_w_w_w
+        + (work->density_w_em * cal->solved.drive_drive_contact_N_w_em_w_w_w_w);
+    self->P_w_w__T_l = work->t_w_w__T_l + cal->solved.drive_drive_contact_Qd_w_w_T_l;
+    self->P_T_l__T_l = work->t_T_l__T_l + cal->solved.drive_drive_contact_Qd_T_l_T_l;
     run_drive(self, work);
 }
 
-static inline void correct_drive(hko_Self *self, const hko_In *in, Work *work)
+static inline void correct_drive(hko_Self *self, const volatile hko_Cal *cal, const hko_In *in,
+    Work *work)
 {
     if (in->is_new.y_em) {
         self->innovation.y_em = self->latched.y_em - self->state.w_em;
@@ -1098,7 +1108,7 @@ static inline void correct_drive(hko_Self *self, const hko_In *in, Work *work)
         work->pc_w_em = self->P_w_em__w_em;
         work->pc_w_w = self->P_w_em__w_w;
         work->pc_T_l = self->P_w_em__T_l;
-        work->spread = ha_max(work->pc_w_em + solved_drive_R_y_em, solved_drive_R_y_em);
+        work->spread = ha_max(work->pc_w_em + cal->solved.drive_R_y_em, cal->solved.drive_R_y_em);
         work->gain_theta_d = work->pc_theta_d / work->spread;
         work->new_theta_d = self->state.theta_d + (work->gain_theta_d * work->residual);
         if (fabs(work->new_theta_d) <= 0.5) {
@@ -1149,7 +1159,7 @@ static inline void correct_drive(hko_Self *self, const hko_In *in, Work *work)
         work->pc_w_em = self->P_w_em__w_w;
         work->pc_w_w = self->P_w_w__w_w;
         work->pc_T_l = self->P_w_w__T_l;
-        work->spread = ha_max(work->pc_w_w + solved_drive_R_y_w, solved_drive_R_y_w);
+        work->spread = ha_max(work->pc_w_w + cal->solved.drive_R_y_w, cal->solved.drive_R_y_w);
         work->gain_theta_d = work->pc_theta_d / work->spread;
         work->new_theta_d = self->state.theta_d + (work->gain_theta_d * work->residual);
         if (fabs(work->new_theta_d) <= 0.5) {
@@ -1279,7 +1289,7 @@ static inline void run_gap(hko_Self *self, Work *work)
     rest_gap(self, work);
 }
 
-static inline void predict_gap(hko_Self *self, Work *work)
+static inline void predict_gap(hko_Self *self, const volatile hko_Cal *cal, Work *work)
 {
     switch (self->run_mode) {
     case hko_RUN_drive_contact:
@@ -1290,106 +1300,108 @@ static inline void predict_gap(hko_Self *self, Work *work)
             - (self->kept ? self->delay_2 :
             self->latched.T_em)) * self->derived.per_J_em) / 12.0)) * constant.t_hold;
         work->t_theta_d__theta_d =
-            (solved_gap_drive_contact_Phi_theta_d_theta_d * self->P_theta_d__theta_d)
-            + (solved_gap_drive_contact_Phi_theta_d_w_em * self->P_theta_d__w_em)
-            + (solved_gap_drive_contact_Phi_theta_d_w_w * self->P_theta_d__w_w)
-            + (solved_gap_drive_contact_Phi_theta_d_T_l * self->P_theta_d__T_l);
+            (cal->solved.gap_drive_contact_Phi_theta_d_theta_d * self->P_theta_d__theta_d)
+            + (cal->solved.gap_drive_contact_Phi_theta_d_w_em * self->P_theta_d__w_em)
+            + (cal->solved.gap_drive_contact_Phi_theta_d_w_w * self->P_theta_d__w_w)
+            + (cal->solved.gap_drive_contact_Phi_theta_d_T_l * self->P_theta_d__T_l);
         work->t_theta_d__w_em =
-            (solved_gap_drive_contact_Phi_theta_d_theta_d * self->P_theta_d__w_em)
-            + (solved_gap_drive_contact_Phi_theta_d_w_em * self->P_w_em__w_em)
-            + (solved_gap_drive_contact_Phi_theta_d_w_w * self->P_w_em__w_w)
-            + (solved_gap_drive_contact_Phi_theta_d_T_l * self->P_w_em__T_l);
+            (cal->solved.gap_drive_contact_Phi_theta_d_theta_d * self->P_theta_d__w_em)
+            + (cal->solved.gap_drive_contact_Phi_theta_d_w_em * self->P_w_em__w_em)
+            + (cal->solved.gap_drive_contact_Phi_theta_d_w_w * self->P_w_em__w_w)
+            + (cal->solved.gap_drive_contact_Phi_theta_d_T_l * self->P_w_em__T_l);
         work->t_theta_d__w_w =
-            (solved_gap_drive_contact_Phi_theta_d_theta_d * self->P_theta_d__w_w)
-            + (solved_gap_drive_contact_Phi_theta_d_w_em * self->P_w_em__w_w)
-            + (solved_gap_drive_contact_Phi_theta_d_w_w * self->P_w_w__w_w)
-            + (solved_gap_drive_contact_Phi_theta_d_T_l * self->P_w_w__T_l);
+            (cal->solved.gap_drive_contact_Phi_theta_d_theta_d * self->P_theta_d__w_w)
+            + (cal->solved.gap_drive_contact_Phi_theta_d_w_em * self->P_w_em__w_w)
+            + (cal->solved.gap_drive_contact_Phi_theta_d_w_w * self->P_w_w__w_w)
+            + (cal->solved.gap_drive_contact_Phi_theta_d_T_l * self->P_w_w__T_l);
         work->t_theta_d__T_l =
-            (solved_gap_drive_contact_Phi_theta_d_theta_d * self->P_theta_d__T_l)
-            + (solved_gap_drive_contact_Phi_theta_d_w_em * self->P_w_em__T_l)
-            + (solved_gap_drive_contact_Phi_theta_d_w_w * self->P_w_w__T_l)
-            + (solved_gap_drive_contact_Phi_theta_d_T_l * self->P_T_l__T_l);
+            (cal->solved.gap_drive_contact_Phi_theta_d_theta_d * self->P_theta_d__T_l)
+            + (cal->solved.gap_drive_contact_Phi_theta_d_w_em * self->P_w_em__T_l)
+            + (cal->solved.gap_drive_contact_Phi_theta_d_w_w * self->P_w_w__T_l)
+            + (cal->solved.gap_drive_contact_Phi_theta_d_T_l * self->P_T_l__T_l);
         work->t_w_em__theta_d =
-            (solved_gap_drive_contact_Phi_w_em_theta_d * self->P_theta_d__theta_d)
-            + (solved_gap_drive_contact_Phi_w_em_w_em * self->P_theta_d__w_em)
-            + (solved_gap_drive_contact_Phi_w_em_w_w * self->P_theta_d__w_w)
-            + (solved_gap_drive_contact_Phi_w_em_T_l * self->P_theta_d__T_l);
-        work->t_w_em__w_em = (solved_gap_drive_contact_Phi_w_em_theta_d * self->P_theta_d__w_em)
-            + (solved_gap_drive_contact_Phi_w_em_w_em * self->P_w_em__w_em)
-            + (solved_gap_drive_contact_Phi_w_em_w_w * self->P_w_em__w_w)
-            + (solved_gap_drive_contact_Phi_w_em_T_l * self->P_w_em__T_l);
-        work->t_w_em__w_w = (solved_gap_drive_contact_Phi_w_em_theta_d * self->P_theta_d__w_w)
-            + (solved_gap_drive_contact_Phi_w_em_w_em * self->P_w_em__w_w)
-            + (solved_gap_drive_contact_Phi_w_em_w_w * self->P_w_w__w_w)
-            + (solved_gap_drive_contact_Phi_w_em_T_l * self->P_w_w__T_l);
-        work->t_w_em__T_l = (solved_gap_drive_contact_Phi_w_em_theta_d * self->P_theta_d__T_l)
-            + (solved_gap_drive_contact_Phi_w_em_w_em * self->P_w_em__T_l)
-            + (solved_gap_drive_contact_Phi_w_em_w_w * self->P_w_w__T_l)
-            + (solved_gap_drive_contact_Phi_w_em_T_l * self->P_T_l__T_l);
+            (cal->solved.gap_drive_contact_Phi_w_em_theta_d * self->P_theta_d__theta_d)
+            + (cal->solved.gap_drive_contact_Phi_w_em_w_em * self->P_theta_d__w_em)
+            + (cal->solved.gap_drive_contact_Phi_w_em_w_w * self->P_theta_d__w_w)
+            + (cal->solved.gap_drive_contact_Phi_w_em_T_l * self->P_theta_d__T_l);
+        work->t_w_em__w_em =
+            (cal->solved.gap_drive_contact_Phi_w_em_theta_d * self->P_theta_d__w_em)
+            + (cal->solved.gap_drive_contact_Phi_w_em_w_em * self->P_w_em__w_em)
+            + (cal->solved.gap_drive_contact_Phi_w_em_w_w * self->P_w_em__w_w)
+            + (cal->solved.gap_drive_contact_Phi_w_em_T_l * self->P_w_em__T_l);
+        work->t_w_em__w_w = (cal->solved.gap_drive_contact_Phi_w_em_theta_d * self->P_theta_d__w_w)
+            + (cal->solved.gap_drive_contact_Phi_w_em_w_em * self->P_w_em__w_w)
+            + (cal->solved.gap_drive_contact_Phi_w_em_w_w * self->P_w_w__w_w)
+            + (cal->solved.gap_drive_contact_Phi_w_em_T_l * self->P_w_w__T_l);
+        work->t_w_em__T_l = (cal->solved.gap_drive_contact_Phi_w_em_theta_d * self->P_theta_d__T_l)
+            + (cal->solved.gap_drive_contact_Phi_w_em_w_em * self->P_w_em__T_l)
+            + (cal->solved.gap_drive_contact_Phi_w_em_w_w * self->P_w_w__T_l)
+            + (cal->solved.gap_drive_contact_Phi_w_em_T_l * self->P_T_l__T_l);
         work->t_w_w__theta_d =
-            (solved_gap_drive_contact_Phi_w_w_theta_d * self->P_theta_d__theta_d)
-            + (solved_gap_drive_contact_Phi_w_w_w_em * self->P_theta_d__w_em)
-            + (solved_gap_drive_contact_Phi_w_w_w_w * self->P_theta_d__w_w)
-            + (solved_gap_drive_contact_Phi_w_w_T_l * self->P_theta_d__T_l);
-        work->t_w_w__w_em = (solved_gap_drive_contact_Phi_w_w_theta_d * self->P_theta_d__w_em)
-            + (solved_gap_drive_contact_Phi_w_w_w_em * self->P_w_em__w_em)
-            + (solved_gap_drive_contact_Phi_w_w_w_w * self->P_w_em__w_w)
-            + (solved_gap_drive_contact_Phi_w_w_T_l * self->P_w_em__T_l);
-        work->t_w_w__w_w = (solved_gap_drive_contact_Phi_w_w_theta_d * self->P_theta_d__w_w)
-            + (solved_gap_drive_contact_Phi_w_w_w_em * self->P_w_em__w_w)
-            + (solved_gap_drive_contact_Phi_w_w_w_w * self->P_w_w__w_w)
-            + (solved_gap_drive_contact_Phi_w_w_T_l * self->P_w_w__T_l);
-        work->t_w_w__T_l = (solved_gap_drive_contact_Phi_w_w_theta_d * self->P_theta_d__T_l)
-            + (solved_gap_drive_contact_Phi_w_w_w_em * self->P_w_em__T_l)
-            + (solved_gap_drive_contact_Phi_w_w_w_w * self->P_w_w__T_l)
-            + (solved_gap_drive_contact_Phi_w_w_T_l * self->P_T_l__T_l);
+            (cal->solved.gap_drive_contact_Phi_w_w_theta_d * self->P_theta_d__theta_d)
+            + (cal->solved.gap_drive_contact_Phi_w_w_w_em * self->P_theta_d__w_em)
+            + (cal->solved.gap_drive_contact_Phi_w_w_w_w * self->P_theta_d__w_w)
+            + (cal->solved.gap_drive_contact_Phi_w_w_T_l * self->P_theta_d__T_l);
+        work->t_w_w__w_em = (cal->solved.gap_drive_contact_Phi_w_w_theta_d * self->P_theta_d__w_em)
+            + (cal->solved.gap_drive_contact_Phi_w_w_w_em * self->P_w_em__w_em)
+            + (cal->solved.gap_drive_contact_Phi_w_w_w_w * self->P_w_em__w_w)
+            + (cal->solved.gap_drive_contact_Phi_w_w_T_l * self->P_w_em__T_l);
+        work->t_w_w__w_w = (cal->solved.gap_drive_contact_Phi_w_w_theta_d * self->P_theta_d__w_w)
+            + (cal->solved.gap_drive_contact_Phi_w_w_w_em * self->P_w_em__w_w)
+            + (cal->solved.gap_drive_contact_Phi_w_w_w_w * self->P_w_w__w_w)
+            + (cal->solved.gap_drive_contact_Phi_w_w_T_l * self->P_w_w__T_l);
+        work->t_w_w__T_l = (cal->solved.gap_drive_contact_Phi_w_w_theta_d * self->P_theta_d__T_l)
+            + (cal->solved.gap_drive_contact_Phi_w_w_w_em * self->P_w_em__T_l)
+            + (cal->solved.gap_drive_contact_Phi_w_w_w_w * self->P_w_w__T_l)
+            + (cal->solved.gap_drive_contact_Phi_w_w_T_l * self->P_T_l__T_l);
         work->t_T_l__theta_d = self->P_theta_d__T_l;
         work->t_T_l__w_em = self->P_w_em__T_l;
         work->t_T_l__w_w = self->P_w_w__T_l;
         work->t_T_l__T_l = self->P_T_l__T_l;
         self->P_theta_d__theta_d =
-            (solved_gap_drive_contact_Phi_theta_d_theta_d * work->t_theta_d__theta_d)
-            + (solved_gap_drive_contact_Phi_theta_d_w_em * work->t_theta_d__w_em)
-            + (solved_gap_drive_contact_Phi_theta_d_w_w * work->t_theta_d__w_w)
-            + (solved_gap_drive_contact_Phi_theta_d_T_l * work->t_theta_d__T_l)
-            + solved_gap_drive_contact_Qd_theta_d_theta_d
-            + (work->density_w_em * solved_gap_drive_contact_N_w_em_theta_d_theta_d);
+            (cal->solved.gap_drive_contact_Phi_theta_d_theta_d * work->t_theta_d__theta_d)
+            + (cal->solved.gap_drive_contact_Phi_theta_d_w_em * work->t_theta_d__w_em)
+            + (cal->solved.gap_drive_contact_Phi_theta_d_w_w * work->t_theta_d__w_w)
+            + (cal->solved.gap_drive_contact_Phi_theta_d_T_l * work->t_theta_d__T_l)
+            + cal->solved.gap_drive_contact_Qd_theta_d_theta_d
+            + (work->density_w_em * cal->solved.gap_drive_contact_N_w_em_theta_d_theta_d);
         self->P_theta_d__w_em =
-            (solved_gap_drive_contact_Phi_w_em_theta_d * work->t_theta_d__theta_d)
-            + (solved_gap_drive_contact_Phi_w_em_w_em * work->t_theta_d__w_em)
-            + (solved_gap_drive_contact_Phi_w_em_w_w * work->t_theta_d__w_w)
-            + (solved_gap_drive_contact_Phi_w_em_T_l * work->t_theta_d__T_l)
-            + solved_gap_drive_contact_Qd_theta_d_w_em
-            + (work->density_w_em * solved_gap_drive_contact_N_w_em_theta_d_w_em);
+            (cal->solved.gap_drive_contact_Phi_w_em_theta_d * work->t_theta_d__theta_d)
+            + (cal->solved.gap_drive_contact_Phi_w_em_w_em * work->t_theta_d__w_em)
+            + (cal->solved.gap_drive_contact_Phi_w_em_w_w * work->t_theta_d__w_w)
+            + (cal->solved.gap_drive_contact_Phi_w_em_T_l * work->t_theta_d__T_l)
+            + cal->solved.gap_drive_contact_Qd_theta_d_w_em
+            + (work->density_w_em * cal->solved.gap_drive_contact_N_w_em_theta_d_w_em);
         self->P_theta_d__w_w =
-            (solved_gap_drive_contact_Phi_w_w_theta_d * work->t_theta_d__theta_d)
-            + (solved_gap_drive_contact_Phi_w_w_w_em * work->t_theta_d__w_em)
-            + (solved_gap_drive_contact_Phi_w_w_w_w * work->t_theta_d__w_w)
-            + (solved_gap_drive_contact_Phi_w_w_T_l * work->t_theta_d__T_l)
-            + solved_gap_drive_contact_Qd_theta_d_w_w
-            + (work->density_w_em * solved_gap_drive_contact_N_w_em_theta_d_w_w);
-        self->P_theta_d__T_l = work->t_theta_d__T_l + solved_gap_drive_contact_Qd_theta_d_T_l;
-        self->P_w_em__w_em = (solved_gap_drive_contact_Phi_w_em_theta_d * work->t_w_em__theta_d)
-            + (solved_gap_drive_contact_Phi_w_em_w_em * work->t_w_em__w_em)
-            + (solved_gap_drive_contact_Phi_w_em_w_w * work->t_w_em__w_w)
-            + (solved_gap_drive_contact_Phi_w_em_T_l * work->t_w_em__T_l)
-            + solved_gap_drive_contact_Qd_w_em_w_em
-            + (work->density_w_em * solved_gap_drive_contact_N_w_em_w_em_w_em);
-        self->P_w_em__w_w = (solved_gap_drive_contact_Phi_w_w_theta_d * work->t_w_em__theta_d)
-            + (solved_gap_drive_contact_Phi_w_w_w_em * work->t_w_em__w_em)
-            + (solved_gap_drive_contact_Phi_w_w_w_w * work->t_w_em__w_w)
-            + (solved_gap_drive_contact_Phi_w_w_T_l * work->t_w_em__T_l)
-            + solved_gap_drive_contact_Qd_w_em_w_w
-            + (work->density_w_em * solved_gap_drive_contact_N_w_em_w_em_w_w);
-        self->P_w_em__T_l = work->t_w_em__T_l + solved_gap_drive_contact_Qd_w_em_T_l;
-        self->P_w_w__w_w = (solved_gap_drive_contact_Phi_w_w_theta_d * work->t_w_w__theta_d)
-            + (solved_gap_drive_contact_Phi_w_w_w_em * work->t_w_w__w_em)
-            + (solved_gap_drive_contact_Phi_w_w_w_w * work->t_w_w__w_w)
-            + (solved_gap_drive_contact_Phi_w_w_T_l * work->t_w_w__T_l)
-            + solved_gap_drive_contact_Qd_w_w_w_w
-            + (work->density_w_em * solved_gap_drive_contact_N_w_em_w_w_w_w);
-        self->P_w_w__T_l = work->t_w_w__T_l + solved_gap_drive_contact_Qd_w_w_T_l;
-        self->P_T_l__T_l = work->t_T_l__T_l + solved_gap_drive_contact_Qd_T_l_T_l;
+            (cal->solved.gap_drive_contact_Phi_w_w_theta_d * work->t_theta_d__theta_d)
+            + (cal->solved.gap_drive_contact_Phi_w_w_w_em * work->t_theta_d__w_em)
+            + (cal->solved.gap_drive_contact_Phi_w_w_w_w * work->t_theta_d__w_w)
+            + (cal->solved.gap_drive_contact_Phi_w_w_T_l * work->t_theta_d__T_l)
+            + cal->solved.gap_drive_contact_Qd_theta_d_w_w
+            + (work->density_w_em * cal->solved.gap_drive_contact_N_w_em_theta_d_w_w);
+        self->P_theta_d__T_l = work->t_theta_d__T_l + cal->solved.gap_drive_contact_Qd_theta_d_T_l;
+        self->P_w_em__w_em =
+            (cal->solved.gap_drive_contact_Phi_w_em_theta_d * work->t_w_em__theta_d)
+            + (cal->solved.gap_drive_contact_Phi_w_em_w_em * work->t_w_em__w_em)
+            + (cal->solved.gap_drive_contact_Phi_w_em_w_w * work->t_w_em__w_w)
+            + (cal->solved.gap_drive_contact_Phi_w_em_T_l * work->t_w_em__T_l)
+            + cal->solved.gap_drive_contact_Qd_w_em_w_em
+            + (work->density_w_em * cal->solved.gap_drive_contact_N_w_em_w_em_w_em);
+        self->P_w_em__w_w = (cal->solved.gap_drive_contact_Phi_w_w_theta_d * work->t_w_em__theta_d)
+            + (cal->solved.gap_drive_contact_Phi_w_w_w_em * work->t_w_em__w_em)
+            + (cal->solved.gap_drive_contact_Phi_w_w_w_w * work->t_w_em__w_w)
+            + (cal->solved.gap_drive_contact_Phi_w_w_T_l * work->t_w_em__T_l)
+            + cal->solved.gap_drive_contact_Qd_w_em_w_w
+            + (work->density_w_em * cal->solved.gap_drive_contact_N_w_em_w_em_w_w);
+        self->P_w_em__T_l = work->t_w_em__T_l + cal->solved.gap_drive_contact_Qd_w_em_T_l;
+        self->P_w_w__w_w = (cal->solved.gap_drive_contact_Phi_w_w_theta_d * work->t_w_w__theta_d)
+            + (cal->solved.gap_drive_contact_Phi_w_w_w_em * work->t_w_w__w_em)
+            + (cal->solved.gap_drive_contact_Phi_w_w_w_w * work->t_w_w__w_w)
+            + (cal->solved.gap_drive_contact_Phi_w_w_T_l * work->t_w_w__T_l)
+            + cal->solved.gap_drive_contact_Qd_w_w_w_w
+            + (work->density_w_em * cal->solved.gap_drive_contact_N_w_em_w_w_w_w);
+        self->P_w_w__T_l = work->t_w_w__T_l + cal->solved.gap_drive_contact_Qd_w_w_T_l;
+        self->P_T_l__T_l = work->t_T_l__T_l + cal->solved.gap_drive_contact_Qd_T_l_T_l;
         break;
     case hko_RUN_no_contact:
         /* hko modes.gap.observer.process_noise.w_em */
@@ -1399,59 +1411,59 @@ static inline void predict_gap(hko_Self *self, Work *work)
             - (self->kept ? self->delay_2 :
             self->latched.T_em)) * self->derived.per_J_em) / 12.0)) * constant.t_hold;
         work->t_theta_d__theta_d = self->P_theta_d__theta_d
-            + (solved_gap_no_contact_Phi_theta_d_w_em * self->P_theta_d__w_em)
-            + (solved_gap_no_contact_Phi_theta_d_w_w * self->P_theta_d__w_w)
-            + (solved_gap_no_contact_Phi_theta_d_T_l * self->P_theta_d__T_l);
+            + (cal->solved.gap_no_contact_Phi_theta_d_w_em * self->P_theta_d__w_em)
+            + (cal->solved.gap_no_contact_Phi_theta_d_w_w * self->P_theta_d__w_w)
+            + (cal->solved.gap_no_contact_Phi_theta_d_T_l * self->P_theta_d__T_l);
         work->t_theta_d__w_em = self->P_theta_d__w_em
-            + (solved_gap_no_contact_Phi_theta_d_w_em * self->P_w_em__w_em)
-            + (solved_gap_no_contact_Phi_theta_d_w_w * self->P_w_em__w_w)
-            + (solved_gap_no_contact_Phi_theta_d_T_l * self->P_w_em__T_l);
-        work->t_theta_d__w_w =
-            self->P_theta_d__w_w + (solved_gap_no_contact_Phi_theta_d_w_em * self->P_w_em__w_w)
-            + (solved_gap_no_contact_Phi_theta_d_w_w * self->P_w_w__w_w)
-            + (solved_gap_no_contact_Phi_theta_d_T_l * self->P_w_w__T_l);
-        work->t_theta_d__T_l =
-            self->P_theta_d__T_l + (solved_gap_no_contact_Phi_theta_d_w_em * self->P_w_em__T_l)
-            + (solved_gap_no_contact_Phi_theta_d_w_w * self->P_w_w__T_l)
-            + (solved_gap_no_contact_Phi_theta_d_T_l * self->P_T_l__T_l);
-        work->t_w_em__theta_d = solved_gap_no_contact_Phi_w_em_w_em * self->P_theta_d__w_em;
-        work->t_w_em__w_em = solved_gap_no_contact_Phi_w_em_w_em * self->P_w_em__w_em;
-        work->t_w_em__w_w = solved_gap_no_contact_Phi_w_em_w_em * self->P_w_em__w_w;
-        work->t_w_em__T_l = solved_gap_no_contact_Phi_w_em_w_em * self->P_w_em__T_l;
-        work->t_w_w__theta_d = (solved_gap_no_contact_Phi_w_w_w_w * self->P_theta_d__w_w)
-            + (solved_gap_no_contact_Phi_w_w_T_l * self->P_theta_d__T_l);
-        work->t_w_w__w_em = (solved_gap_no_contact_Phi_w_w_w_w * self->P_w_em__w_w)
-            + (solved_gap_no_contact_Phi_w_w_T_l * self->P_w_em__T_l);
-        work->t_w_w__w_w = (solved_gap_no_contact_Phi_w_w_w_w * self->P_w_w__w_w)
-            + (solved_gap_no_contact_Phi_w_w_T_l * self->P_w_w__T_l);
-        work->t_w_w__T_l = (solved_gap_no_contact_Phi_w_w_w_w * self->P_w_w__T_l)
-            + (solved_gap_no_contact_Phi_w_w_T_l * self->P_T_l__T_l);
+            + (cal->solved.gap_no_contact_Phi_theta_d_w_em * self->P_w_em__w_em)
+            + (cal->solved.gap_no_contact_Phi_theta_d_w_w * self->P_w_em__w_w)
+            + (cal->solved.gap_no_contact_Phi_theta_d_T_l * self->P_w_em__T_l);
+        work->t_theta_d__w_w = self->P_theta_d__w_w
+            + (cal->solved.gap_no_contact_Phi_theta_d_w_em * self->P_w_em__w_w)
+            + (cal->solved.gap_no_contact_Phi_theta_d_w_w * self->P_w_w__w_w)
+            + (cal->solved.gap_no_contact_Phi_theta_d_T_l * self->P_w_w__T_l);
+        work->t_theta_d__T_l = self->P_theta_d__T_l
+            + (cal->solved.gap_no_contact_Phi_theta_d_w_em * self->P_w_em__T_l)
+            + (cal->solved.gap_no_contact_Phi_theta_d_w_w * self->P_w_w__T_l)
+            + (cal->solved.gap_no_contact_Phi_theta_d_T_l * self->P_T_l__T_l);
+        work->t_w_em__theta_d = cal->solved.gap_no_contact_Phi_w_em_w_em * self->P_theta_d__w_em;
+        work->t_w_em__w_em = cal->solved.gap_no_contact_Phi_w_em_w_em * self->P_w_em__w_em;
+        work->t_w_em__w_w = cal->solved.gap_no_contact_Phi_w_em_w_em * self->P_w_em__w_w;
+        work->t_w_em__T_l = cal->solved.gap_no_contact_Phi_w_em_w_em * self->P_w_em__T_l;
+        work->t_w_w__theta_d = (cal->solved.gap_no_contact_Phi_w_w_w_w * self->P_theta_d__w_w)
+            + (cal->solved.gap_no_contact_Phi_w_w_T_l * self->P_theta_d__T_l);
+        work->t_w_w__w_em = (cal->solved.gap_no_contact_Phi_w_w_w_w * self->P_w_em__w_w)
+            + (cal->solved.gap_no_contact_Phi_w_w_T_l * self->P_w_em__T_l);
+        work->t_w_w__w_w = (cal->solved.gap_no_contact_Phi_w_w_w_w * self->P_w_w__w_w)
+            + (cal->solved.gap_no_contact_Phi_w_w_T_l * self->P_w_w__T_l);
+        work->t_w_w__T_l = (cal->solved.gap_no_contact_Phi_w_w_w_w * self->P_w_w__T_l)
+            + (cal->solved.gap_no_contact_Phi_w_w_T_l * self->P_T_l__T_l);
         work->t_T_l__theta_d = self->P_theta_d__T_l;
         work->t_T_l__w_em = self->P_w_em__T_l;
         work->t_T_l__w_w = self->P_w_w__T_l;
         work->t_T_l__T_l = self->P_T_l__T_l;
         self->P_theta_d__theta_d = work->t_theta_d__theta_d
-            + (solved_gap_no_contact_Phi_theta_d_w_em * work->t_theta_d__w_em)
-            + (solved_gap_no_contact_Phi_theta_d_w_w * work->t_theta_d__w_w)
-            + (solved_gap_no_contact_Phi_theta_d_T_l * work->t_theta_d__T_l)
-            + solved_gap_no_contact_Qd_theta_d_theta_d
-            + (work->density_w_em * solved_gap_no_contact_N_w_em_theta_d_theta_d);
-        self->P_theta_d__w_em = (solved_gap_no_contact_Phi_w_em_w_em * work->t_theta_d__w_em)
-            + (work->density_w_em * solved_gap_no_contact_N_w_em_theta_d_w_em);
-        self->P_theta_d__w_w = (solved_gap_no_contact_Phi_w_w_w_w * work->t_theta_d__w_w)
-            + (solved_gap_no_contact_Phi_w_w_T_l * work->t_theta_d__T_l)
-            + solved_gap_no_contact_Qd_theta_d_w_w;
-        self->P_theta_d__T_l = work->t_theta_d__T_l + solved_gap_no_contact_Qd_theta_d_T_l;
-        self->P_w_em__w_em = (solved_gap_no_contact_Phi_w_em_w_em * work->t_w_em__w_em)
-            + (work->density_w_em * solved_gap_no_contact_N_w_em_w_em_w_em);
-        self->P_w_em__w_w = (solved_gap_no_contact_Phi_w_w_w_w * work->t_w_em__w_w)
-            + (solved_gap_no_contact_Phi_w_w_T_l * work->t_w_em__T_l);
+            + (cal->solved.gap_no_contact_Phi_theta_d_w_em * work->t_theta_d__w_em)
+            + (cal->solved.gap_no_contact_Phi_theta_d_w_w * work->t_theta_d__w_w)
+            + (cal->solved.gap_no_contact_Phi_theta_d_T_l * work->t_theta_d__T_l)
+            + cal->solved.gap_no_contact_Qd_theta_d_theta_d
+            + (work->density_w_em * cal->solved.gap_no_contact_N_w_em_theta_d_theta_d);
+        self->P_theta_d__w_em = (cal->solved.gap_no_contact_Phi_w_em_w_em * work->t_theta_d__w_em)
+            + (work->density_w_em * cal->solved.gap_no_contact_N_w_em_theta_d_w_em);
+        self->P_theta_d__w_w = (cal->solved.gap_no_contact_Phi_w_w_w_w * work->t_theta_d__w_w)
+            + (cal->solved.gap_no_contact_Phi_w_w_T_l * work->t_theta_d__T_l)
+            + cal->solved.gap_no_contact_Qd_theta_d_w_w;
+        self->P_theta_d__T_l = work->t_theta_d__T_l + cal->solved.gap_no_contact_Qd_theta_d_T_l;
+        self->P_w_em__w_em = (cal->solved.gap_no_contact_Phi_w_em_w_em * work->t_w_em__w_em)
+            + (work->density_w_em * cal->solved.gap_no_contact_N_w_em_w_em_w_em);
+        self->P_w_em__w_w = (cal->solved.gap_no_contact_Phi_w_w_w_w * work->t_w_em__w_w)
+            + (cal->solved.gap_no_contact_Phi_w_w_T_l * work->t_w_em__T_l);
         self->P_w_em__T_l = work->t_w_em__T_l;
-        self->P_w_w__w_w = (solved_gap_no_contact_Phi_w_w_w_w * work->t_w_w__w_w)
-            + (solved_gap_no_contact_Phi_w_w_T_l * work->t_w_w__T_l)
-            + solved_gap_no_contact_Qd_w_w_w_w;
-        self->P_w_w__T_l = work->t_w_w__T_l + solved_gap_no_contact_Qd_w_w_T_l;
-        self->P_T_l__T_l = work->t_T_l__T_l + solved_gap_no_contact_Qd_T_l_T_l;
+        self->P_w_w__w_w = (cal->solved.gap_no_contact_Phi_w_w_w_w * work->t_w_w__w_w)
+            + (cal->solved.gap_no_contact_Phi_w_w_T_l * work->t_w_w__T_l)
+            + cal->solved.gap_no_contact_Qd_w_w_w_w;
+        self->P_w_w__T_l = work->t_w_w__T_l + cal->solved.gap_no_contact_Qd_w_w_T_l;
+        self->P_T_l__T_l = work->t_T_l__T_l + cal->solved.gap_no_contact_Qd_T_l_T_l;
         break;
     case hko_RUN_coast_contact:
         /* hko modes.gap.observer.process_noise.w_em */
@@ -1461,106 +1473,108 @@ static inline void predict_gap(hko_Self *self, Work *work)
             - (self->kept ? self->delay_2 :
             self->latched.T_em)) * self->derived.per_J_em) / 12.0)) * constant.t_hold;
         work->t_theta_d__theta_d =
-            (solved_gap_coast_contact_Phi_theta_d_theta_d * self->P_theta_d__theta_d)
-            + (solved_gap_coast_contact_Phi_theta_d_w_em * self->P_theta_d__w_em)
-            + (solved_gap_coast_contact_Phi_theta_d_w_w * self->P_theta_d__w_w)
-            + (solved_gap_coast_contact_Phi_theta_d_T_l * self->P_theta_d__T_l);
+            (cal->solved.gap_coast_contact_Phi_theta_d_theta_d * self->P_theta_d__theta_d)
+            + (cal->solved.gap_coast_contact_Phi_theta_d_w_em * self->P_theta_d__w_em)
+            + (cal->solved.gap_coast_contact_Phi_theta_d_w_w * self->P_theta_d__w_w)
+            + (cal->solved.gap_coast_contact_Phi_theta_d_T_l * self->P_theta_d__T_l);
         work->t_theta_d__w_em =
-            (solved_gap_coast_contact_Phi_theta_d_theta_d * self->P_theta_d__w_em)
-            + (solved_gap_coast_contact_Phi_theta_d_w_em * self->P_w_em__w_em)
-            + (solved_gap_coast_contact_Phi_theta_d_w_w * self->P_w_em__w_w)
-            + (solved_gap_coast_contact_Phi_theta_d_T_l * self->P_w_em__T_l);
+            (cal->solved.gap_coast_contact_Phi_theta_d_theta_d * self->P_theta_d__w_em)
+            + (cal->solved.gap_coast_contact_Phi_theta_d_w_em * self->P_w_em__w_em)
+            + (cal->solved.gap_coast_contact_Phi_theta_d_w_w * self->P_w_em__w_w)
+            + (cal->solved.gap_coast_contact_Phi_theta_d_T_l * self->P_w_em__T_l);
         work->t_theta_d__w_w =
-            (solved_gap_coast_contact_Phi_theta_d_theta_d * self->P_theta_d__w_w)
-            + (solved_gap_coast_contact_Phi_theta_d_w_em * self->P_w_em__w_w)
-            + (solved_gap_coast_contact_Phi_theta_d_w_w * self->P_w_w__w_w)
-            + (solved_gap_coast_contact_Phi_theta_d_T_l * self->P_w_w__T_l);
+            (cal->solved.gap_coast_contact_Phi_theta_d_theta_d * self->P_theta_d__w_w)
+            + (cal->solved.gap_coast_contact_Phi_theta_d_w_em * self->P_w_em__w_w)
+            + (cal->solved.gap_coast_contact_Phi_theta_d_w_w * self->P_w_w__w_w)
+            + (cal->solved.gap_coast_contact_Phi_theta_d_T_l * self->P_w_w__T_l);
         work->t_theta_d__T_l =
-            (solved_gap_coast_contact_Phi_theta_d_theta_d * self->P_theta_d__T_l)
-            + (solved_gap_coast_contact_Phi_theta_d_w_em * self->P_w_em__T_l)
-            + (solved_gap_coast_contact_Phi_theta_d_w_w * self->P_w_w__T_l)
-            + (solved_gap_coast_contact_Phi_theta_d_T_l * self->P_T_l__T_l);
+            (cal->solved.gap_coast_contact_Phi_theta_d_theta_d * self->P_theta_d__T_l)
+            + (cal->solved.gap_coast_contact_Phi_theta_d_w_em * self->P_w_em__T_l)
+            + (cal->solved.gap_coast_contact_Phi_theta_d_w_w * self->P_w_w__T_l)
+            + (cal->solved.gap_coast_contact_Phi_theta_d_T_l * self->P_T_l__T_l);
         work->t_w_em__theta_d =
-            (solved_gap_coast_contact_Phi_w_em_theta_d * self->P_theta_d__theta_d)
-            + (solved_gap_coast_contact_Phi_w_em_w_em * self->P_theta_d__w_em)
-            + (solved_gap_coast_contact_Phi_w_em_w_w * self->P_theta_d__w_w)
-            + (solved_gap_coast_contact_Phi_w_em_T_l * self->P_theta_d__T_l);
-        work->t_w_em__w_em = (solved_gap_coast_contact_Phi_w_em_theta_d * self->P_theta_d__w_em)
-            + (solved_gap_coast_contact_Phi_w_em_w_em * self->P_w_em__w_em)
-            + (solved_gap_coast_contact_Phi_w_em_w_w * self->P_w_em__w_w)
-            + (solved_gap_coast_contact_Phi_w_em_T_l * self->P_w_em__T_l);
-        work->t_w_em__w_w = (solved_gap_coast_contact_Phi_w_em_theta_d * self->P_theta_d__w_w)
-            + (solved_gap_coast_contact_Phi_w_em_w_em * self->P_w_em__w_w)
-            + (solved_gap_coast_contact_Phi_w_em_w_w * self->P_w_w__w_w)
-            + (solved_gap_coast_contact_Phi_w_em_T_l * self->P_w_w__T_l);
-        work->t_w_em__T_l = (solved_gap_coast_contact_Phi_w_em_theta_d * self->P_theta_d__T_l)
-            + (solved_gap_coast_contact_Phi_w_em_w_em * self->P_w_em__T_l)
-            + (solved_gap_coast_contact_Phi_w_em_w_w * self->P_w_w__T_l)
-            + (solved_gap_coast_contact_Phi_w_em_T_l * self->P_T_l__T_l);
+            (cal->solved.gap_coast_contact_Phi_w_em_theta_d * self->P_theta_d__theta_d)
+            + (cal->solved.gap_coast_contact_Phi_w_em_w_em * self->P_theta_d__w_em)
+            + (cal->solved.gap_coast_contact_Phi_w_em_w_w * self->P_theta_d__w_w)
+            + (cal->solved.gap_coast_contact_Phi_w_em_T_l * self->P_theta_d__T_l);
+        work->t_w_em__w_em =
+            (cal->solved.gap_coast_contact_Phi_w_em_theta_d * self->P_theta_d__w_em)
+            + (cal->solved.gap_coast_contact_Phi_w_em_w_em * self->P_w_em__w_em)
+            + (cal->solved.gap_coast_contact_Phi_w_em_w_w * self->P_w_em__w_w)
+            + (cal->solved.gap_coast_contact_Phi_w_em_T_l * self->P_w_em__T_l);
+        work->t_w_em__w_w = (cal->solved.gap_coast_contact_Phi_w_em_theta_d * self->P_theta_d__w_w)
+            + (cal->solved.gap_coast_contact_Phi_w_em_w_em * self->P_w_em__w_w)
+            + (cal->solved.gap_coast_contact_Phi_w_em_w_w * self->P_w_w__w_w)
+            + (cal->solved.gap_coast_contact_Phi_w_em_T_l * self->P_w_w__T_l);
+        work->t_w_em__T_l = (cal->solved.gap_coast_contact_Phi_w_em_theta_d * self->P_theta_d__T_l)
+            + (cal->solved.gap_coast_contact_Phi_w_em_w_em * self->P_w_em__T_l)
+            + (cal->solved.gap_coast_contact_Phi_w_em_w_w * self->P_w_w__T_l)
+            + (cal->solved.gap_coast_contact_Phi_w_em_T_l * self->P_T_l__T_l);
         work->t_w_w__theta_d =
-            (solved_gap_coast_contact_Phi_w_w_theta_d * self->P_theta_d__theta_d)
-            + (solved_gap_coast_contact_Phi_w_w_w_em * self->P_theta_d__w_em)
-            + (solved_gap_coast_contact_Phi_w_w_w_w * self->P_theta_d__w_w)
-            + (solved_gap_coast_contact_Phi_w_w_T_l * self->P_theta_d__T_l);
-        work->t_w_w__w_em = (solved_gap_coast_contact_Phi_w_w_theta_d * self->P_theta_d__w_em)
-            + (solved_gap_coast_contact_Phi_w_w_w_em * self->P_w_em__w_em)
-            + (solved_gap_coast_contact_Phi_w_w_w_w * self->P_w_em__w_w)
-            + (solved_gap_coast_contact_Phi_w_w_T_l * self->P_w_em__T_l);
-        work->t_w_w__w_w = (solved_gap_coast_contact_Phi_w_w_theta_d * self->P_theta_d__w_w)
-            + (solved_gap_coast_contact_Phi_w_w_w_em * self->P_w_em__w_w)
-            + (solved_gap_coast_contact_Phi_w_w_w_w * self->P_w_w__w_w)
-            + (solved_gap_coast_contact_Phi_w_w_T_l * self->P_w_w__T_l);
-        work->t_w_w__T_l = (solved_gap_coast_contact_Phi_w_w_theta_d * self->P_theta_d__T_l)
-            + (solved_gap_coast_contact_Phi_w_w_w_em * self->P_w_em__T_l)
-            + (solved_gap_coast_contact_Phi_w_w_w_w * self->P_w_w__T_l)
-            + (solved_gap_coast_contact_Phi_w_w_T_l * self->P_T_l__T_l);
+            (cal->solved.gap_coast_contact_Phi_w_w_theta_d * self->P_theta_d__theta_d)
+            + (cal->solved.gap_coast_contact_Phi_w_w_w_em * self->P_theta_d__w_em)
+            + (cal->solved.gap_coast_contact_Phi_w_w_w_w * self->P_theta_d__w_w)
+            + (cal->solved.gap_coast_contact_Phi_w_w_T_l * self->P_theta_d__T_l);
+        work->t_w_w__w_em = (cal->solved.gap_coast_contact_Phi_w_w_theta_d * self->P_theta_d__w_em)
+            + (cal->solved.gap_coast_contact_Phi_w_w_w_em * self->P_w_em__w_em)
+            + (cal->solved.gap_coast_contact_Phi_w_w_w_w * self->P_w_em__w_w)
+            + (cal->solved.gap_coast_contact_Phi_w_w_T_l * self->P_w_em__T_l);
+        work->t_w_w__w_w = (cal->solved.gap_coast_contact_Phi_w_w_theta_d * self->P_theta_d__w_w)
+            + (cal->solved.gap_coast_contact_Phi_w_w_w_em * self->P_w_em__w_w)
+            + (cal->solved.gap_coast_contact_Phi_w_w_w_w * self->P_w_w__w_w)
+            + (cal->solved.gap_coast_contact_Phi_w_w_T_l * self->P_w_w__T_l);
+        work->t_w_w__T_l = (cal->solved.gap_coast_contact_Phi_w_w_theta_d * self->P_theta_d__T_l)
+            + (cal->solved.gap_coast_contact_Phi_w_w_w_em * self->P_w_em__T_l)
+            + (cal->solved.gap_coast_contact_Phi_w_w_w_w * self->P_w_w__T_l)
+            + (cal->solved.gap_coast_contact_Phi_w_w_T_l * self->P_T_l__T_l);
         work->t_T_l__theta_d = self->P_theta_d__T_l;
         work->t_T_l__w_em = self->P_w_em__T_l;
         work->t_T_l__w_w = self->P_w_w__T_l;
         work->t_T_l__T_l = self->P_T_l__T_l;
         self->P_theta_d__theta_d =
-            (solved_gap_coast_contact_Phi_theta_d_theta_d * work->t_theta_d__theta_d)
-            + (solved_gap_coast_contact_Phi_theta_d_w_em * work->t_theta_d__w_em)
-            + (solved_gap_coast_contact_Phi_theta_d_w_w * work->t_theta_d__w_w)
-            + (solved_gap_coast_contact_Phi_theta_d_T_l * work->t_theta_d__T_l)
-            + solved_gap_coast_contact_Qd_theta_d_theta_d
-            + (work->density_w_em * solved_gap_coast_contact_N_w_em_theta_d_theta_d);
+            (cal->solved.gap_coast_contact_Phi_theta_d_theta_d * work->t_theta_d__theta_d)
+            + (cal->solved.gap_coast_contact_Phi_theta_d_w_em * work->t_theta_d__w_em)
+            + (cal->solved.gap_coast_contact_Phi_theta_d_w_w * work->t_theta_d__w_w)
+            + (cal->solved.gap_coast_contact_Phi_theta_d_T_l * work->t_theta_d__T_l)
+            + cal->solved.gap_coast_contact_Qd_theta_d_theta_d
+            + (work->density_w_em * cal->solved.gap_coast_contact_N_w_em_theta_d_theta_d);
         self->P_theta_d__w_em =
-            (solved_gap_coast_contact_Phi_w_em_theta_d * work->t_theta_d__theta_d)
-            + (solved_gap_coast_contact_Phi_w_em_w_em * work->t_theta_d__w_em)
-            + (solved_gap_coast_contact_Phi_w_em_w_w * work->t_theta_d__w_w)
-            + (solved_gap_coast_contact_Phi_w_em_T_l * work->t_theta_d__T_l)
-            + solved_gap_coast_contact_Qd_theta_d_w_em
-            + (work->density_w_em * solved_gap_coast_contact_N_w_em_theta_d_w_em);
+            (cal->solved.gap_coast_contact_Phi_w_em_theta_d * work->t_theta_d__theta_d)
+            + (cal->solved.gap_coast_contact_Phi_w_em_w_em * work->t_theta_d__w_em)
+            + (cal->solved.gap_coast_contact_Phi_w_em_w_w * work->t_theta_d__w_w)
+            + (cal->solved.gap_coast_contact_Phi_w_em_T_l * work->t_theta_d__T_l)
+            + cal->solved.gap_coast_contact_Qd_theta_d_w_em
+            + (work->density_w_em * cal->solved.gap_coast_contact_N_w_em_theta_d_w_em);
         self->P_theta_d__w_w =
-            (solved_gap_coast_contact_Phi_w_w_theta_d * work->t_theta_d__theta_d)
-            + (solved_gap_coast_contact_Phi_w_w_w_em * work->t_theta_d__w_em)
-            + (solved_gap_coast_contact_Phi_w_w_w_w * work->t_theta_d__w_w)
-            + (solved_gap_coast_contact_Phi_w_w_T_l * work->t_theta_d__T_l)
-            + solved_gap_coast_contact_Qd_theta_d_w_w
-            + (work->density_w_em * solved_gap_coast_contact_N_w_em_theta_d_w_w);
-        self->P_theta_d__T_l = work->t_theta_d__T_l + solved_gap_coast_contact_Qd_theta_d_T_l;
-        self->P_w_em__w_em = (solved_gap_coast_contact_Phi_w_em_theta_d * work->t_w_em__theta_d)
-            + (solved_gap_coast_contact_Phi_w_em_w_em * work->t_w_em__w_em)
-            + (solved_gap_coast_contact_Phi_w_em_w_w * work->t_w_em__w_w)
-            + (solved_gap_coast_contact_Phi_w_em_T_l * work->t_w_em__T_l)
-            + solved_gap_coast_contact_Qd_w_em_w_em
-            + (work->density_w_em * solved_gap_coast_contact_N_w_em_w_em_w_em);
-        self->P_w_em__w_w = (solved_gap_coast_contact_Phi_w_w_theta_d * work->t_w_em__theta_d)
-            + (solved_gap_coast_contact_Phi_w_w_w_em * work->t_w_em__w_em)
-            + (solved_gap_coast_contact_Phi_w_w_w_w * work->t_w_em__w_w)
-            + (solved_gap_coast_contact_Phi_w_w_T_l * work->t_w_em__T_l)
-            + solved_gap_coast_contact_Qd_w_em_w_w
-            + (work->density_w_em * solved_gap_coast_contact_N_w_em_w_em_w_w);
-        self->P_w_em__T_l = work->t_w_em__T_l + solved_gap_coast_contact_Qd_w_em_T_l;
-        self->P_w_w__w_w = (solved_gap_coast_contact_Phi_w_w_theta_d * work->t_w_w__theta_d)
-            + (solved_gap_coast_contact_Phi_w_w_w_em * work->t_w_w__w_em)
-            + (solved_gap_coast_contact_Phi_w_w_w_w * work->t_w_w__w_w)
-            + (solved_gap_coast_contact_Phi_w_w_T_l * work->t_w_w__T_l)
-            + solved_gap_coast_contact_Qd_w_w_w_w
-            + (work->density_w_em * solved_gap_coast_contact_N_w_em_w_w_w_w);
-        self->P_w_w__T_l = work->t_w_w__T_l + solved_gap_coast_contact_Qd_w_w_T_l;
-        self->P_T_l__T_l = work->t_T_l__T_l + solved_gap_coast_contact_Qd_T_l_T_l;
+            (cal->solved.gap_coast_contact_Phi_w_w_theta_d * work->t_theta_d__theta_d)
+            + (cal->solved.gap_coast_contact_Phi_w_w_w_em * work->t_theta_d__w_em)
+            + (cal->solved.gap_coast_contact_Phi_w_w_w_w * work->t_theta_d__w_w)
+            + (cal->solved.gap_coast_contact_Phi_w_w_T_l * work->t_theta_d__T_l)
+            + cal->solved.gap_coast_contact_Qd_theta_d_w_w
+            + (work->density_w_em * cal->solved.gap_coast_contact_N_w_em_theta_d_w_w);
+        self->P_theta_d__T_l = work->t_theta_d__T_l + cal->solved.gap_coast_contact_Qd_theta_d_T_l;
+        self->P_w_em__w_em =
+            (cal->solved.gap_coast_contact_Phi_w_em_theta_d * work->t_w_em__theta_d)
+            + (cal->solved.gap_coast_contact_Phi_w_em_w_em * work->t_w_em__w_em)
+            + (cal->solved.gap_coast_contact_Phi_w_em_w_w * work->t_w_em__w_w)
+            + (cal->solved.gap_coast_contact_Phi_w_em_T_l * work->t_w_em__T_l)
+            + cal->solved.gap_coast_contact_Qd_w_em_w_em
+            + (work->density_w_em * cal->solved.gap_coast_contact_N_w_em_w_em_w_em);
+        self->P_w_em__w_w = (cal->solved.gap_coast_contact_Phi_w_w_theta_d * work->t_w_em__theta_d)
+            + (cal->solved.gap_coast_contact_Phi_w_w_w_em * work->t_w_em__w_em)
+            + (cal->solved.gap_coast_contact_Phi_w_w_w_w * work->t_w_em__w_w)
+            + (cal->solved.gap_coast_contact_Phi_w_w_T_l * work->t_w_em__T_l)
+            + cal->solved.gap_coast_contact_Qd_w_em_w_w
+            + (work->density_w_em * cal->solved.gap_coast_contact_N_w_em_w_em_w_w);
+        self->P_w_em__T_l = work->t_w_em__T_l + cal->solved.gap_coast_contact_Qd_w_em_T_l;
+        self->P_w_w__w_w = (cal->solved.gap_coast_contact_Phi_w_w_theta_d * work->t_w_w__theta_d)
+            + (cal->solved.gap_coast_contact_Phi_w_w_w_em * work->t_w_w__w_em)
+            + (cal->solved.gap_coast_contact_Phi_w_w_w_w * work->t_w_w__w_w)
+            + (cal->solved.gap_coast_contact_Phi_w_w_T_l * work->t_w_w__T_l)
+            + cal->solved.gap_coast_contact_Qd_w_w_w_w
+            + (work->density_w_em * cal->solved.gap_coast_contact_N_w_em_w_w_w_w);
+        self->P_w_w__T_l = work->t_w_w__T_l + cal->solved.gap_coast_contact_Qd_w_w_T_l;
+        self->P_T_l__T_l = work->t_T_l__T_l + cal->solved.gap_coast_contact_Qd_T_l_T_l;
         break;
     default:
         break;
@@ -1568,7 +1582,8 @@ static inline void predict_gap(hko_Self *self, Work *work)
     run_gap(self, work);
 }
 
-static inline void correct_gap(hko_Self *self, const hko_In *in, Work *work)
+static inline void correct_gap(hko_Self *self, const volatile hko_Cal *cal, const hko_In *in,
+    Work *work)
 {
     if (in->is_new.y_em) {
         self->innovation.y_em = self->latched.y_em - self->state.w_em;
@@ -1582,7 +1597,7 @@ static inline void correct_gap(hko_Self *self, const hko_In *in, Work *work)
         work->pc_w_em = self->P_w_em__w_em;
         work->pc_w_w = self->P_w_em__w_w;
         work->pc_T_l = self->P_w_em__T_l;
-        work->spread = ha_max(work->pc_w_em + solved_gap_R_y_em, solved_gap_R_y_em);
+        work->spread = ha_max(work->pc_w_em + cal->solved.gap_R_y_em, cal->solved.gap_R_y_em);
         work->gain_theta_d = work->pc_theta_d / work->spread;
         work->new_theta_d = self->state.theta_d + (work->gain_theta_d * work->residual);
         if (fabs(work->new_theta_d) <= 0.5) {
@@ -1633,7 +1648,7 @@ static inline void correct_gap(hko_Self *self, const hko_In *in, Work *work)
         work->pc_w_em = self->P_w_em__w_w;
         work->pc_w_w = self->P_w_w__w_w;
         work->pc_T_l = self->P_w_w__T_l;
-        work->spread = ha_max(work->pc_w_w + solved_gap_R_y_w, solved_gap_R_y_w);
+        work->spread = ha_max(work->pc_w_w + cal->solved.gap_R_y_w, cal->solved.gap_R_y_w);
         work->gain_theta_d = work->pc_theta_d / work->spread;
         work->new_theta_d = self->state.theta_d + (work->gain_theta_d * work->residual);
         if (fabs(work->new_theta_d) <= 0.5) {
@@ -1726,7 +1741,7 @@ static inline void run_coast(hko_Self *self, Work *work)
     }
 }
 
-static inline void predict_coast(hko_Self *self, Work *work)
+static inline void predict_coast(hko_Self *self, const volatile hko_Cal *cal, Work *work)
 {
     /* hko modes.coast.observer.process_noise.w_em */
     work->density_w_em =
@@ -1735,106 +1750,111 @@ static inline void predict_coast(hko_Self *self, Work *work)
         - (self->kept ? self->delay_2 :
         self->latched.T_em)) * self->derived.per_J_em) / 12.0)) * constant.t_hold;
     work->t_theta_d__theta_d =
-        (solved_coast_coast_contact_Phi_theta_d_theta_d * self->P_theta_d__theta_d)
-        + (solved_coast_coast_contact_Phi_theta_d_w_em * self->P_theta_d__w_em)
-        + (solved_coast_coast_contact_Phi_theta_d_w_w * self->P_theta_d__w_w)
-        + (solved_coast_coast_contact_Phi_theta_d_T_l * self->P_theta_d__T_l);
+        (cal->solved.coast_coast_contact_Phi_theta_d_theta_d * self->P_theta_d__theta_d)
+        + (cal->solved.coast_coast_contact_Phi_theta_d_w_em * self->P_theta_d__w_em)
+        + (cal->solved.coast_coast_contact_Phi_theta_d_w_w * self->P_theta_d__w_w)
+        + (cal->solved.coast_coast_contact_Phi_theta_d_T_l * self->P_theta_d__T_l);
     work->t_theta_d__w_em =
-        (solved_coast_coast_contact_Phi_theta_d_theta_d * self->P_theta_d__w_em)
-        + (solved_coast_coast_contact_Phi_theta_d_w_em * self->P_w_em__w_em)
-        + (solved_coast_coast_contact_Phi_theta_d_w_w * self->P_w_em__w_w)
-        + (solved_coast_coast_contact_Phi_theta_d_T_l * self->P_w_em__T_l);
-    work->t_theta_d__w_w = (solved_coast_coast_contact_Phi_theta_d_theta_d * self->P_theta_d__w_w)
-        + (solved_coast_coast_contact_Phi_theta_d_w_em * self->P_w_em__w_w)
-        + (solved_coast_coast_contact_Phi_theta_d_w_w * self->P_w_w__w_w)
-        + (solved_coast_coast_contact_Phi_theta_d_T_l * self->P_w_w__T_l);
-    work->t_theta_d__T_l = (solved_coast_coast_contact_Phi_theta_d_theta_d * self->P_theta_d__T_l)
-        + (solved_coast_coast_contact_Phi_theta_d_w_em * self->P_w_em__T_l)
-        + (solved_coast_coast_contact_Phi_theta_d_w_w * self->P_w_w__T_l)
-        + (solved_coast_coast_contact_Phi_theta_d_T_l * self->P_T_l__T_l);
+        (cal->solved.coast_coast_contact_Phi_theta_d_theta_d * self->P_theta_d__w_em)
+        + (cal->solved.coast_coast_contact_Phi_theta_d_w_em * self->P_w_em__w_em)
+        + (cal->solved.coast_coast_contact_Phi_theta_d_w_w * self->P_w_em__w_w)
+        + (cal->solved.coast_coast_contact_Phi_theta_d_T_l * self->P_w_em__T_l);
+    work->t_theta_d__w_w =
+        (cal->solved.coast_coast_contact_Phi_theta_d_theta_d * self->P_theta_d__w_w)
+        + (cal->solved.coast_coast_contact_Phi_theta_d_w_em * self->P_w_em__w_w)
+        + (cal->solved.coast_coast_contact_Phi_theta_d_w_w * self->P_w_w__w_w)
+        + (cal->solved.coast_coast_contact_Phi_theta_d_T_l * self->P_w_w__T_l);
+    work->t_theta_d__T_l =
+        (cal->solved.coast_coast_contact_Phi_theta_d_theta_d * self->P_theta_d__T_l)
+        + (cal->solved.coast_coast_contact_Phi_theta_d_w_em * self->P_w_em__T_l)
+        + (cal->solved.coast_coast_contact_Phi_theta_d_w_w * self->P_w_w__T_l)
+        + (cal->solved.coast_coast_contact_Phi_theta_d_T_l * self->P_T_l__T_l);
     work->t_w_em__theta_d =
-        (solved_coast_coast_contact_Phi_w_em_theta_d * self->P_theta_d__theta_d)
-        + (solved_coast_coast_contact_Phi_w_em_w_em * self->P_theta_d__w_em)
-        + (solved_coast_coast_contact_Phi_w_em_w_w * self->P_theta_d__w_w)
-        + (solved_coast_coast_contact_Phi_w_em_T_l * self->P_theta_d__T_l);
-    work->t_w_em__w_em = (solved_coast_coast_contact_Phi_w_em_theta_d * self->P_theta_d__w_em)
-        + (solved_coast_coast_contact_Phi_w_em_w_em * self->P_w_em__w_em)
-        + (solved_coast_coast_contact_Phi_w_em_w_w * self->P_w_em__w_w)
-        + (solved_coast_coast_contact_Phi_w_em_T_l * self->P_w_em__T_l);
-    work->t_w_em__w_w = (solved_coast_coast_contact_Phi_w_em_theta_d * self->P_theta_d__w_w)
-        + (solved_coast_coast_contact_Phi_w_em_w_em * self->P_w_em__w_w)
-        + (solved_coast_coast_contact_Phi_w_em_w_w * self->P_w_w__w_w)
-        + (solved_coast_coast_contact_Phi_w_em_T_l * self->P_w_w__T_l);
-    work->t_w_em__T_l = (solved_coast_coast_contact_Phi_w_em_theta_d * self->P_theta_d__T_l)
-        + (solved_coast_coast_contact_Phi_w_em_w_em * self->P_w_em__T_l)
-        + (solved_coast_coast_contact_Phi_w_em_w_w * self->P_w_w__T_l)
-        + (solved_coast_coast_contact_Phi_w_em_T_l * self->P_T_l__T_l);
-    work->t_w_w__theta_d = (solved_coast_coast_contact_Phi_w_w_theta_d * self->P_theta_d__theta_d)
-        + (solved_coast_coast_contact_Phi_w_w_w_em * self->P_theta_d__w_em)
-        + (solved_coast_coast_contact_Phi_w_w_w_w * self->P_theta_d__w_w)
-        + (solved_coast_coast_contact_Phi_w_w_T_l * self->P_theta_d__T_l);
-    work->t_w_w__w_em = (solved_coast_coast_contact_Phi_w_w_theta_d * self->P_theta_d__w_em)
-        + (solved_coast_coast_contact_Phi_w_w_w_em * self->P_w_em__w_em)
-        + (solved_coast_coast_contact_Phi_w_w_w_w * self->P_w_em__w_w)
-        + (solved_coast_coast_contact_Phi_w_w_T_l * self->P_w_em__T_l);
-    work->t_w_w__w_w = (solved_coast_coast_contact_Phi_w_w_theta_d * self->P_theta_d__w_w)
-        + (solved_coast_coast_contact_Phi_w_w_w_em * self->P_w_em__w_w)
-        + (solved_coast_coast_contact_Phi_w_w_w_w * self->P_w_w__w_w)
-        + (solved_coast_coast_contact_Phi_w_w_T_l * self->P_w_w__T_l);
-    work->t_w_w__T_l = (solved_coast_coast_contact_Phi_w_w_theta_d * self->P_theta_d__T_l)
-        + (solved_coast_coast_contact_Phi_w_w_w_em * self->P_w_em__T_l)
-        + (solved_coast_coast_contact_Phi_w_w_w_w * self->P_w_w__T_l)
-        + (solved_coast_coast_contact_Phi_w_w_T_l * self->P_T_l__T_l);
+        (cal->solved.coast_coast_contact_Phi_w_em_theta_d * self->P_theta_d__theta_d)
+        + (cal->solved.coast_coast_contact_Phi_w_em_w_em * self->P_theta_d__w_em)
+        + (cal->solved.coast_coast_contact_Phi_w_em_w_w * self->P_theta_d__w_w)
+        + (cal->solved.coast_coast_contact_Phi_w_em_T_l * self->P_theta_d__T_l);
+    work->t_w_em__w_em = (cal->solved.coast_coast_contact_Phi_w_em_theta_d * self->P_theta_d__w_em)
+        + (cal->solved.coast_coast_contact_Phi_w_em_w_em * self->P_w_em__w_em)
+        + (cal->solved.coast_coast_contact_Phi_w_em_w_w * self->P_w_em__w_w)
+        + (cal->solved.coast_coast_contact_Phi_w_em_T_l * self->P_w_em__T_l);
+    work->t_w_em__w_w = (cal->solved.coast_coast_contact_Phi_w_em_theta_d * self->P_theta_d__w_w)
+        + (cal->solved.coast_coast_contact_Phi_w_em_w_em * self->P_w_em__w_w)
+        + (cal->solved.coast_coast_contact_Phi_w_em_w_w * self->P_w_w__w_w)
+        + (cal->solved.coast_coast_contact_Phi_w_em_T_l * self->P_w_w__T_l);
+    work->t_w_em__T_l = (cal->solved.coast_coast_contact_Phi_w_em_theta_d * self->P_theta_d__T_l)
+        + (cal->solved.coast_coast_contact_Phi_w_em_w_em * self->P_w_em__T_l)
+        + (cal->solved.coast_coast_contact_Phi_w_em_w_w * self->P_w_w__T_l)
+        + (cal->solved.coast_coast_contact_Phi_w_em_T_l * self->P_T_l__T_l);
+    work->t_w_w__theta_d =
+        (cal->solved.coast_coast_contact_Phi_w_w_theta_d * self->P_theta_d__theta_d)
+        + (cal->solved.coast_coast_contact_Phi_w_w_w_em * self->P_theta_d__w_em)
+        + (cal->solved.coast_coast_contact_Phi_w_w_w_w * self->P_theta_d__w_w)
+        + (cal->solved.coast_coast_contact_Phi_w_w_T_l * self->P_theta_d__T_l);
+    work->t_w_w__w_em = (cal->solved.coast_coast_contact_Phi_w_w_theta_d * self->P_theta_d__w_em)
+        + (cal->solved.coast_coast_contact_Phi_w_w_w_em * self->P_w_em__w_em)
+        + (cal->solved.coast_coast_contact_Phi_w_w_w_w * self->P_w_em__w_w)
+        + (cal->solved.coast_coast_contact_Phi_w_w_T_l * self->P_w_em__T_l);
+    work->t_w_w__w_w = (cal->solved.coast_coast_contact_Phi_w_w_theta_d * self->P_theta_d__w_w)
+        + (cal->solved.coast_coast_contact_Phi_w_w_w_em * self->P_w_em__w_w)
+        + (cal->solved.coast_coast_contact_Phi_w_w_w_w * self->P_w_w__w_w)
+        + (cal->solved.coast_coast_contact_Phi_w_w_T_l * self->P_w_w__T_l);
+    work->t_w_w__T_l = (cal->solved.coast_coast_contact_Phi_w_w_theta_d * self->P_theta_d__T_l)
+        + (cal->solved.coast_coast_contact_Phi_w_w_w_em * self->P_w_em__T_l)
+        + (cal->solved.coast_coast_contact_Phi_w_w_w_w * self->P_w_w__T_l)
+        + (cal->solved.coast_coast_contact_Phi_w_w_T_l * self->P_T_l__T_l);
     work->t_T_l__theta_d = self->P_theta_d__T_l;
     work->t_T_l__w_em = self->P_w_em__T_l;
     work->t_T_l__w_w = self->P_w_w__T_l;
     work->t_T_l__T_l = self->P_T_l__T_l;
     self->P_theta_d__theta_d =
-        (solved_coast_coast_contact_Phi_theta_d_theta_d * work->t_theta_d__theta_d)
-        + (solved_coast_coast_contact_Phi_theta_d_w_em * work->t_theta_d__w_em)
-        + (solved_coast_coast_contact_Phi_theta_d_w_w * work->t_theta_d__w_w)
-        + (solved_coast_coast_contact_Phi_theta_d_T_l * work->t_theta_d__T_l)
-        + solved_coast_coast_contact_Qd_theta_d_theta_d
-        + (work->density_w_em * solved_coast_coast_contact_N_w_em_theta_d_theta_d);
+        (cal->solved.coast_coast_contact_Phi_theta_d_theta_d * work->t_theta_d__theta_d)
+        + (cal->solved.coast_coast_contact_Phi_theta_d_w_em * work->t_theta_d__w_em)
+        + (cal->solved.coast_coast_contact_Phi_theta_d_w_w * work->t_theta_d__w_w)
+        + (cal->solved.coast_coast_contact_Phi_theta_d_T_l * work->t_theta_d__T_l)
+        + cal->solved.coast_coast_contact_Qd_theta_d_theta_d
+        + (work->density_w_em * cal->solved.coast_coast_contact_N_w_em_theta_d_theta_d);
     self->P_theta_d__w_em =
-        (solved_coast_coast_contact_Phi_w_em_theta_d * work->t_theta_d__theta_d)
-        + (solved_coast_coast_contact_Phi_w_em_w_em * work->t_theta_d__w_em)
-        + (solved_coast_coast_contact_Phi_w_em_w_w * work->t_theta_d__w_w)
-        + (solved_coast_coast_contact_Phi_w_em_T_l * work->t_theta_d__T_l)
-        + solved_coast_coast_contact_Qd_theta_d_w_em
-        + (work->density_w_em * solved_coast_coast_contact_N_w_em_theta_d_w_em);
-    self->P_theta_d__w_w = (solved_coast_coast_contact_Phi_w_w_theta_d * work->t_theta_d__theta_d)
-        + (solved_coast_coast_contact_Phi_w_w_w_em * work->t_theta_d__w_em)
-        + (solved_coast_coast_contact_Phi_w_w_w_w * work->t_theta_d__w_w)
-        + (solved_coast_coast_contact_Phi_w_w_T_l * work->t_theta_d__T_l)
-        + solved_coast_coast_contact_Qd_theta_d_w_w
-        + (work->density_w_em * solved_coast_coast_contact_N_w_em_theta_d_w_w);
-    self->P_theta_d__T_l = work->t_theta_d__T_l + solved_coast_coast_contact_Qd_theta_d_T_l;
-    self->P_w_em__w_em = (solved_coast_coast_contact_Phi_w_em_theta_d * work->t_w_em__theta_d)
-        + (solved_coast_coast_contact_Phi_w_em_w_em * work->t_w_em__w_em)
-        + (solved_coast_coast_contact_Phi_w_em_w_w * work->t_w_em__w_w)
-        + (solved_coast_coast_contact_Phi_w_em_T_l * work->t_w_em__T_l)
-        + solved_coast_coast_contact_Qd_w_em_w_em
-        + (work->density_w_em * solved_coast_coast_contact_N_w_em_w_em_w_em);
-    self->P_w_em__w_w = (solved_coast_coast_contact_Phi_w_w_theta_d * work->t_w_em__theta_d)
-        + (solved_coast_coast_contact_Phi_w_w_w_em * work->t_w_em__w_em)
-        + (solved_coast_coast_contact_Phi_w_w_w_w * work->t_w_em__w_w)
-        + (solved_coast_coast_contact_Phi_w_w_T_l * work->t_w_em__T_l)
-        + solved_coast_coast_contact_Qd_w_em_w_w
-        + (work->density_w_em * solved_coast_coast_contact_N_w_em_w_em_w_w);
-    self->P_w_em__T_l = work->t_w_em__T_l + solved_coast_coast_contact_Qd_w_em_T_l;
-    self->P_w_w__w_w = (solved_coast_coast_contact_Phi_w_w_theta_d * work->t_w_w__theta_d)
-        + (solved_coast_coast_contact_Phi_w_w_w_em * work->t_w_w__w_em)
-        + (solved_coast_coast_contact_Phi_w_w_w_w * work->t_w_w__w_w)
-        + (solved_coast_coast_contact_Phi_w_w_T_l * work->t_w_w__T_l)
-        + solved_coast_coast_contact_Qd_w_w_w_w
-        + (work->density_w_em * solved_coast_coast_contact_N_w_em_w_w_w_w);
-    self->P_w_w__T_l = work->t_w_w__T_l + solved_coast_coast_contact_Qd_w_w_T_l;
-    self->P_T_l__T_l = work->t_T_l__T_l + solved_coast_coast_contact_Qd_T_l_T_l;
+        (cal->solved.coast_coast_contact_Phi_w_em_theta_d * work->t_theta_d__theta_d)
+        + (cal->solved.coast_coast_contact_Phi_w_em_w_em * work->t_theta_d__w_em)
+        + (cal->solved.coast_coast_contact_Phi_w_em_w_w * work->t_theta_d__w_w)
+        + (cal->solved.coast_coast_contact_Phi_w_em_T_l * work->t_theta_d__T_l)
+        + cal->solved.coast_coast_contact_Qd_theta_d_w_em
+        + (work->density_w_em * cal->solved.coast_coast_contact_N_w_em_theta_d_w_em);
+    self->P_theta_d__w_w =
+        (cal->solved.coast_coast_contact_Phi_w_w_theta_d * work->t_theta_d__theta_d)
+        + (cal->solved.coast_coast_contact_Phi_w_w_w_em * work->t_theta_d__w_em)
+        + (cal->solved.coast_coast_contact_Phi_w_w_w_w * work->t_theta_d__w_w)
+        + (cal->solved.coast_coast_contact_Phi_w_w_T_l * work->t_theta_d__T_l)
+        + cal->solved.coast_coast_contact_Qd_theta_d_w_w
+        + (work->density_w_em * cal->solved.coast_coast_contact_N_w_em_theta_d_w_w);
+    self->P_theta_d__T_l = work->t_theta_d__T_l + cal->solved.coast_coast_contact_Qd_theta_d_T_l;
+    self->P_w_em__w_em = (cal->solved.coast_coast_contact_Phi_w_em_theta_d * work->t_w_em__theta_d)
+        + (cal->solved.coast_coast_contact_Phi_w_em_w_em * work->t_w_em__w_em)
+        + (cal->solved.coast_coast_contact_Phi_w_em_w_w * work->t_w_em__w_w)
+        + (cal->solved.coast_coast_contact_Phi_w_em_T_l * work->t_w_em__T_l)
+        + cal->solved.coast_coast_contact_Qd_w_em_w_em
+        + (work->density_w_em * cal->solved.coast_coast_contact_N_w_em_w_em_w_em);
+    self->P_w_em__w_w = (cal->solved.coast_coast_contact_Phi_w_w_theta_d * work->t_w_em__theta_d)
+        + (cal->solved.coast_coast_contact_Phi_w_w_w_em * work->t_w_em__w_em)
+        + (cal->solved.coast_coast_contact_Phi_w_w_w_w * work->t_w_em__w_w)
+        + (cal->solved.coast_coast_contact_Phi_w_w_T_l * work->t_w_em__T_l)
+        + cal->solved.coast_coast_contact_Qd_w_em_w_w
+        + (work->density_w_em * cal->solved.coast_coast_contact_N_w_em_w_em_w_w);
+    self->P_w_em__T_l = work->t_w_em__T_l + cal->solved.coast_coast_contact_Qd_w_em_T_l;
+    self->P_w_w__w_w = (cal->solved.coast_coast_contact_Phi_w_w_theta_d * work->t_w_w__theta_d)
+        + (cal->solved.coast_coast_contact_Phi_w_w_w_em * work->t_w_w__w_em)
+        + (cal->solved.coast_coast_contact_Phi_w_w_w_w * work->t_w_w__w_w)
+        + (cal->solved.coast_coast_contact_Phi_w_w_T_l * work->t_w_w__T_l)
+        + cal->solved.coast_coast_contact_Qd_w_w_w_w
+        + (work->density_w_em * cal->solved.coast_coast_contact_N_w_em_w_w_w_w);
+    self->P_w_w__T_l = work->t_w_w__T_l + cal->solved.coast_coast_contact_Qd_w_w_T_l;
+    self->P_T_l__T_l = work->t_T_l__T_l + cal->solved.coast_coast_contact_Qd_T_l_T_l;
     run_coast(self, work);
 }
 
-static inline void correct_coast(hko_Self *self, const hko_In *in, Work *work)
+static inline void correct_coast(hko_Self *self, const volatile hko_Cal *cal, const hko_In *in,
+    Work *work)
 {
     if (in->is_new.y_em) {
         self->innovation.y_em = self->latched.y_em - self->state.w_em;
@@ -1848,7 +1868,7 @@ static inline void correct_coast(hko_Self *self, const hko_In *in, Work *work)
         work->pc_w_em = self->P_w_em__w_em;
         work->pc_w_w = self->P_w_em__w_w;
         work->pc_T_l = self->P_w_em__T_l;
-        work->spread = ha_max(work->pc_w_em + solved_coast_R_y_em, solved_coast_R_y_em);
+        work->spread = ha_max(work->pc_w_em + cal->solved.coast_R_y_em, cal->solved.coast_R_y_em);
         work->gain_theta_d = work->pc_theta_d / work->spread;
         work->new_theta_d = self->state.theta_d + (work->gain_theta_d * work->residual);
         if (fabs(work->new_theta_d) <= 0.5) {
@@ -1899,7 +1919,7 @@ static inline void correct_coast(hko_Self *self, const hko_In *in, Work *work)
         work->pc_w_em = self->P_w_em__w_w;
         work->pc_w_w = self->P_w_w__w_w;
         work->pc_T_l = self->P_w_w__T_l;
-        work->spread = ha_max(work->pc_w_w + solved_coast_R_y_w, solved_coast_R_y_w);
+        work->spread = ha_max(work->pc_w_w + cal->solved.coast_R_y_w, cal->solved.coast_R_y_w);
         work->gain_theta_d = work->pc_theta_d / work->spread;
         work->new_theta_d = self->state.theta_d + (work->gain_theta_d * work->residual);
         if (fabs(work->new_theta_d) <= 0.5) {
@@ -1946,7 +1966,7 @@ static inline void correct_coast(hko_Self *self, const hko_In *in, Work *work)
     }
 }
 
-static inline void equations_drive(hko_Self *self, const hko_Cal *cal)
+static inline void equations_drive(hko_Self *self, const volatile hko_Cal *cal)
 {
     /* hko equations.w_d */
     self->equation.w_d = (self->state.w_em * constant.per_R) - self->state.w_w;
@@ -1987,7 +2007,7 @@ static inline void back_drive_0(hko_Self *self, Work *work)
     work->back = 0;
     if (work->until) {
         for (int32_t look = 0; look < 8; look++) {
-            if ((work->back == 0) && (look < self->timer.past)) {
+            if ((work->back == 0) && (look < (int32_t)self->timer.past)) {
                 work->place =
                     (self->newest >= look) ? (self->newest - look) : (self->newest - look + 8);
                 work->at_w_w = self->past_w_w[work->place];
@@ -2136,7 +2156,7 @@ static inline void jump_drive(hko_Self *self, Work *work)
     }
 }
 
-static inline void equations_gap(hko_Self *self, const hko_Cal *cal)
+static inline void equations_gap(hko_Self *self, const volatile hko_Cal *cal)
 {
     /* hko equations.w_d */
     self->equation.w_d = (self->state.w_em * constant.per_R) - self->state.w_w;
@@ -2165,12 +2185,16 @@ static inline void jump_gap(hko_Self *self, Work *work)
         self->timer.gap_watch_drive = 0U;
     } else if (self->timer.gap_watch_drive < 6U) {
         self->timer.gap_watch_drive++;
+    } else {
+        /* nothing to do */
     }
     /* hko modes.gap.transitions.watch_coast.when */
     if (!(self->equation.T_acc < (-self->equation.T_sum))) {
         self->timer.gap_watch_coast = 0U;
     } else if (self->timer.gap_watch_coast < 6U) {
         self->timer.gap_watch_coast++;
+    } else {
+        /* nothing to do */
     }
     if (self->run_mode == hko_RUN_drive_contact) {
         self->timer.gap_watch_drive = 0U;
@@ -2212,10 +2236,12 @@ static inline void jump_gap(hko_Self *self, Work *work)
         self->mode = hko_MODE_coast;
         self->fired = 5U; /* hko modes.gap.transitions.watch_coast */
         self->run_mode = hko_RUN_coast_contact; /* hko modes.coast.runs */
+    } else {
+        /* nothing to do */
     }
 }
 
-static inline void equations_coast(hko_Self *self, const hko_Cal *cal)
+static inline void equations_coast(hko_Self *self, const volatile hko_Cal *cal)
 {
     /* hko equations.w_d */
     self->equation.w_d = (self->state.w_em * constant.per_R) - self->state.w_w;
@@ -2256,7 +2282,7 @@ static inline void back_coast_0(hko_Self *self, Work *work)
     work->back = 0;
     if (work->until) {
         for (int32_t look = 0; look < 8; look++) {
-            if ((work->back == 0) && (look < self->timer.past)) {
+            if ((work->back == 0) && (look < (int32_t)self->timer.past)) {
                 work->place =
                     (self->newest >= look) ? (self->newest - look) : (self->newest - look + 8);
                 work->at_w_w = self->past_w_w[work->place];
@@ -2405,9 +2431,9 @@ static inline void jump_coast(hko_Self *self, Work *work)
     }
 }
 
-static inline void compare_stamps(hko_Self *self, const hko_Cal *cal)
+static inline void compare_stamps(hko_Self *self, const volatile hko_Cal *cal)
 {
-    if (cal->J_em != solved_stamp_J_em) {
+    if (cal->J_em != cal->solved.stamp_J_em) {
         self->faults |= hko_FAULT_stale_calibration;
     }
 }
@@ -2463,6 +2489,8 @@ static inline void keep(hko_Self *self)
             self->timer.past = 0U;
         } else if (self->timer.past < 8U) {
             self->timer.past++;
+        } else {
+            /* nothing to do */
         }
         break;
     case hko_MODE_coast:
@@ -2478,6 +2506,8 @@ static inline void keep(hko_Self *self)
             self->timer.past = 0U;
         } else if (self->timer.past < 8U) {
             self->timer.past++;
+        } else {
+            /* nothing to do */
         }
         break;
     default:
@@ -2485,7 +2515,7 @@ static inline void keep(hko_Self *self)
     }
 }
 
-static inline void start(hko_Self *self, const hko_In *in, Work *work)
+static inline void start(hko_Self *self, const volatile hko_Cal *cal, const hko_In *in, Work *work)
 {
     if (fabs(constant.alpha) <= 0.5) {
         self->state.theta_d = constant.alpha; /* hko states.theta_d.initial */
@@ -2521,20 +2551,20 @@ static inline void start(hko_Self *self, const hko_In *in, Work *work)
     self->mode = hko_MODE_drive;
     self->started = true;
     self->run_mode = hko_RUN_drive_contact; /* hko modes.drive.runs */
-    self->P_theta_d__theta_d = solved_drive_P_theta_d_theta_d;
-    self->P_theta_d__w_em = solved_drive_P_theta_d_w_em;
-    self->P_theta_d__w_w = solved_drive_P_theta_d_w_w;
-    self->P_theta_d__T_l = solved_drive_P_theta_d_T_l;
-    self->P_w_em__w_em = solved_drive_P_w_em_w_em;
-    self->P_w_em__w_w = solved_drive_P_w_em_w_w;
-    self->P_w_em__T_l = solved_drive_P_w_em_T_l;
-    self->P_w_w__w_w = solved_drive_P_w_w_w_w;
-    self->P_w_w__T_l = solved_drive_P_w_w_T_l;
-    self->P_T_l__T_l = solved_drive_P_T_l_T_l;
-    correct_drive(self, in, work);
+    self->P_theta_d__theta_d = cal->solved.drive_P_theta_d_theta_d;
+    self->P_theta_d__w_em = cal->solved.drive_P_theta_d_w_em;
+    self->P_theta_d__w_w = cal->solved.drive_P_theta_d_w_w;
+    self->P_theta_d__T_l = cal->solved.drive_P_theta_d_T_l;
+    self->P_w_em__w_em = cal->solved.drive_P_w_em_w_em;
+    self->P_w_em__w_w = cal->solved.drive_P_w_em_w_w;
+    self->P_w_em__T_l = cal->solved.drive_P_w_em_T_l;
+    self->P_w_w__w_w = cal->solved.drive_P_w_w_w_w;
+    self->P_w_w__T_l = cal->solved.drive_P_w_w_T_l;
+    self->P_T_l__T_l = cal->solved.drive_P_T_l_T_l;
+    correct_drive(self, cal, in, work);
 }
 
-void hko_Derive(const hko_Cal *cal, hko_Derived *derived)
+void hko_Derive(const volatile hko_Cal *cal, hko_Derived *derived)
 {
     derived->per_J_em = 1.0 / cal->J_em; /* 1 / J_em */
     const double q_em_per_J_em = constant.q_em / cal->J_em; /* q_em / J_em */
@@ -2544,7 +2574,7 @@ void hko_Derive(const hko_Cal *cal, hko_Derived *derived)
     derived->n_sd_R_J_em_sd_acc = constant.n_sd * constant.R * cal->J_em * constant.sd_acc;
 }
 
-void hko_Init(hko_Self *self, const hko_Cal *cal)
+void hko_Init(hko_Self *self, const volatile hko_Cal *cal)
 {
     static const hko_Self zero; /* every member 0 or false */
 
@@ -2560,14 +2590,14 @@ void hko_Init(hko_Self *self, const hko_Cal *cal)
     compare_stamps(self, cal);
 }
 
-void hko_Calibrate(hko_Self *self, const hko_Cal *cal)
+void hko_Calibrate(hko_Self *self, const volatile hko_Cal *cal)
 {
     hko_Derive(cal, &self->derived);
     compare_stamps(self, cal);
 }
 
-void hko_Step(hko_Self *self, const hko_Cal *cal, const hko_In *in,
-    hko_Out *out)
+void hko_Step(hko_Self *self, const volatile hko_Cal *cal,
+    const hko_In *in, hko_Out *out)
 {
     Work scratch;
     Work *const work = &scratch;
@@ -2584,22 +2614,22 @@ void hko_Step(hko_Self *self, const hko_Cal *cal, const hko_In *in,
     if (self->started) {
         switch (self->mode) {
         case hko_MODE_drive:
-            predict_drive(self, work);
-            correct_drive(self, in, work);
+            predict_drive(self, cal, work);
+            correct_drive(self, cal, in, work);
             break;
         case hko_MODE_gap:
-            predict_gap(self, work);
-            correct_gap(self, in, work);
+            predict_gap(self, cal, work);
+            correct_gap(self, cal, in, work);
             break;
         case hko_MODE_coast:
-            predict_coast(self, work);
-            correct_coast(self, in, work);
+            predict_coast(self, cal, work);
+            correct_coast(self, cal, in, work);
             break;
         default:
             break;
         }
     } else {
-        start(self, in, work);
+        start(self, cal, in, work);
     }
     switch (self->mode) {
     case hko_MODE_drive:

@@ -39,9 +39,155 @@ enum {
 #define hko_FAULT_range_w_w (1UL << 10)
 #define hko_FAULT_range_T_l (1UL << 11)
 
-/* Tunable parameters */
+/* The calibration page: tunable parameters */
 typedef struct {
     double J_em; /* kg*m^2; driveline_load parameters.J_em; 0.01 to 0.2; motor and gears, at the motor */
+    struct {
+        double drive_R_y_em;
+        double drive_R_y_w;
+        double drive_P_theta_d_theta_d;
+        double drive_P_theta_d_w_em;
+        double drive_P_theta_d_w_w;
+        double drive_P_theta_d_T_l;
+        double drive_P_w_em_w_em;
+        double drive_P_w_em_w_w;
+        double drive_P_w_em_T_l;
+        double drive_P_w_w_w_w;
+        double drive_P_w_w_T_l;
+        double drive_P_T_l_T_l;
+        double drive_drive_contact_Phi_theta_d_theta_d;
+        double drive_drive_contact_Phi_theta_d_w_em;
+        double drive_drive_contact_Phi_theta_d_w_w;
+        double drive_drive_contact_Phi_theta_d_T_l;
+        double drive_drive_contact_Phi_w_em_theta_d;
+        double drive_drive_contact_Phi_w_em_w_em;
+        double drive_drive_contact_Phi_w_em_w_w;
+        double drive_drive_contact_Phi_w_em_T_l;
+        double drive_drive_contact_Phi_w_w_theta_d;
+        double drive_drive_contact_Phi_w_w_w_em;
+        double drive_drive_contact_Phi_w_w_w_w;
+        double drive_drive_contact_Phi_w_w_T_l;
+        double drive_drive_contact_Qd_theta_d_theta_d;
+        double drive_drive_contact_Qd_theta_d_w_em;
+        double drive_drive_contact_Qd_theta_d_w_w;
+        double drive_drive_contact_Qd_theta_d_T_l;
+        double drive_drive_contact_Qd_w_em_w_em;
+        double drive_drive_contact_Qd_w_em_w_w;
+        double drive_drive_contact_Qd_w_em_T_l;
+        double drive_drive_contact_Qd_w_w_w_w;
+        double drive_drive_contact_Qd_w_w_T_l;
+        double drive_drive_contact_Qd_T_l_T_l;
+        double drive_drive_contact_N_w_em_theta_d_theta_d;
+        double drive_drive_contact_N_w_em_theta_d_w_em;
+        double drive_drive_contact_N_w_em_theta_d_w_w;
+        double drive_drive_contact_N_w_em_w_em_w_em;
+        double drive_drive_contact_N_w_em_w_em_w_w;
+        double drive_drive_contact_N_w_em_w_w_w_w;
+        double gap_R_y_em;
+        double gap_R_y_w;
+        double gap_drive_contact_Phi_theta_d_theta_d;
+        double gap_drive_contact_Phi_theta_d_w_em;
+        double gap_drive_contact_Phi_theta_d_w_w;
+        double gap_drive_contact_Phi_theta_d_T_l;
+        double gap_drive_contact_Phi_w_em_theta_d;
+        double gap_drive_contact_Phi_w_em_w_em;
+        double gap_drive_contact_Phi_w_em_w_w;
+        double gap_drive_contact_Phi_w_em_T_l;
+        double gap_drive_contact_Phi_w_w_theta_d;
+        double gap_drive_contact_Phi_w_w_w_em;
+        double gap_drive_contact_Phi_w_w_w_w;
+        double gap_drive_contact_Phi_w_w_T_l;
+        double gap_drive_contact_Qd_theta_d_theta_d;
+        double gap_drive_contact_Qd_theta_d_w_em;
+        double gap_drive_contact_Qd_theta_d_w_w;
+        double gap_drive_contact_Qd_theta_d_T_l;
+        double gap_drive_contact_Qd_w_em_w_em;
+        double gap_drive_contact_Qd_w_em_w_w;
+        double gap_drive_contact_Qd_w_em_T_l;
+        double gap_drive_contact_Qd_w_w_w_w;
+        double gap_drive_contact_Qd_w_w_T_l;
+        double gap_drive_contact_Qd_T_l_T_l;
+        double gap_drive_contact_N_w_em_theta_d_theta_d;
+        double gap_drive_contact_N_w_em_theta_d_w_em;
+        double gap_drive_contact_N_w_em_theta_d_w_w;
+        double gap_drive_contact_N_w_em_w_em_w_em;
+        double gap_drive_contact_N_w_em_w_em_w_w;
+        double gap_drive_contact_N_w_em_w_w_w_w;
+        double gap_no_contact_Phi_theta_d_w_em;
+        double gap_no_contact_Phi_theta_d_w_w;
+        double gap_no_contact_Phi_theta_d_T_l;
+        double gap_no_contact_Phi_w_em_w_em;
+        double gap_no_contact_Phi_w_w_w_w;
+        double gap_no_contact_Phi_w_w_T_l;
+        double gap_no_contact_Qd_theta_d_theta_d;
+        double gap_no_contact_Qd_theta_d_w_w;
+        double gap_no_contact_Qd_theta_d_T_l;
+        double gap_no_contact_Qd_w_w_w_w;
+        double gap_no_contact_Qd_w_w_T_l;
+        double gap_no_contact_Qd_T_l_T_l;
+        double gap_no_contact_N_w_em_theta_d_theta_d;
+        double gap_no_contact_N_w_em_theta_d_w_em;
+        double gap_no_contact_N_w_em_w_em_w_em;
+        double gap_coast_contact_Phi_theta_d_theta_d;
+        double gap_coast_contact_Phi_theta_d_w_em;
+        double gap_coast_contact_Phi_theta_d_w_w;
+        double gap_coast_contact_Phi_theta_d_T_l;
+        double gap_coast_contact_Phi_w_em_theta_d;
+        double gap_coast_contact_Phi_w_em_w_em;
+        double gap_coast_contact_Phi_w_em_w_w;
+        double gap_coast_contact_Phi_w_em_T_l;
+        double gap_coast_contact_Phi_w_w_theta_d;
+        double gap_coast_contact_Phi_w_w_w_em;
+        double gap_coast_contact_Phi_w_w_w_w;
+        double gap_coast_contact_Phi_w_w_T_l;
+        double gap_coast_contact_Qd_theta_d_theta_d;
+        double gap_coast_contact_Qd_theta_d_w_em;
+        double gap_coast_contact_Qd_theta_d_w_w;
+        double gap_coast_contact_Qd_theta_d_T_l;
+        double gap_coast_contact_Qd_w_em_w_em;
+        double gap_coast_contact_Qd_w_em_w_w;
+        double gap_coast_contact_Qd_w_em_T_l;
+        double gap_coast_contact_Qd_w_w_w_w;
+        double gap_coast_contact_Qd_w_w_T_l;
+        double gap_coast_contact_Qd_T_l_T_l;
+        double gap_coast_contact_N_w_em_theta_d_theta_d;
+        double gap_coast_contact_N_w_em_theta_d_w_em;
+        double gap_coast_contact_N_w_em_theta_d_w_w;
+        double gap_coast_contact_N_w_em_w_em_w_em;
+        double gap_coast_contact_N_w_em_w_em_w_w;
+        double gap_coast_contact_N_w_em_w_w_w_w;
+        double coast_R_y_em;
+        double coast_R_y_w;
+        double coast_coast_contact_Phi_theta_d_theta_d;
+        double coast_coast_contact_Phi_theta_d_w_em;
+        double coast_coast_contact_Phi_theta_d_w_w;
+        double coast_coast_contact_Phi_theta_d_T_l;
+        double coast_coast_contact_Phi_w_em_theta_d;
+        double coast_coast_contact_Phi_w_em_w_em;
+        double coast_coast_contact_Phi_w_em_w_w;
+        double coast_coast_contact_Phi_w_em_T_l;
+        double coast_coast_contact_Phi_w_w_theta_d;
+        double coast_coast_contact_Phi_w_w_w_em;
+        double coast_coast_contact_Phi_w_w_w_w;
+        double coast_coast_contact_Phi_w_w_T_l;
+        double coast_coast_contact_Qd_theta_d_theta_d;
+        double coast_coast_contact_Qd_theta_d_w_em;
+        double coast_coast_contact_Qd_theta_d_w_w;
+        double coast_coast_contact_Qd_theta_d_T_l;
+        double coast_coast_contact_Qd_w_em_w_em;
+        double coast_coast_contact_Qd_w_em_w_w;
+        double coast_coast_contact_Qd_w_em_T_l;
+        double coast_coast_contact_Qd_w_w_w_w;
+        double coast_coast_contact_Qd_w_w_T_l;
+        double coast_coast_contact_Qd_T_l_T_l;
+        double coast_coast_contact_N_w_em_theta_d_theta_d;
+        double coast_coast_contact_N_w_em_theta_d_w_em;
+        double coast_coast_contact_N_w_em_theta_d_w_w;
+        double coast_coast_contact_N_w_em_w_em_w_em;
+        double coast_coast_contact_N_w_em_w_em_w_w;
+        double coast_coast_contact_N_w_em_w_w_w_w;
+        double stamp_J_em;
+    } solved; /* matrix exponentials and gains for these values, stamps of the values */
 } hko_Cal;
 
 /* What follows from tunable parameters: hko_Derive */
@@ -138,18 +284,21 @@ typedef struct {
     hko_Derived derived;
 } hko_Self;
 
-/* Default values of the tunable parameters */
-extern const hko_Cal hko_default_cal;
+/* The digest of the Program, which a tool compares with that of its description */
+extern const char hko_Version[17];
+
+/* The page with default values, in a section of its own: hko_MemMap.h */
+extern const volatile hko_Cal hko_default_cal;
 
 /* Before the first step */
-void hko_Init(hko_Self *self, const hko_Cal *cal);
+void hko_Init(hko_Self *self, const volatile hko_Cal *cal);
 
 /* After a change of the calibration page: X_Derive, and a fault if solved numbers do not fit it */
-void hko_Calibrate(hko_Self *self, const hko_Cal *cal);
-void hko_Derive(const hko_Cal *cal, hko_Derived *derived);
+void hko_Calibrate(hko_Self *self, const volatile hko_Cal *cal);
+void hko_Derive(const volatile hko_Cal *cal, hko_Derived *derived);
 
 /* One tick of 1/1000 s */
-void hko_Step(hko_Self *self, const hko_Cal *cal, const hko_In *in,
-    hko_Out *out);
+void hko_Step(hko_Self *self, const volatile hko_Cal *cal,
+    const hko_In *in, hko_Out *out);
 
 #endif

@@ -3,6 +3,7 @@
  * Program digest: dd7335f5e965af94
  */
 #include "contactor.h"
+#include "contactor_MemMap.h"
 
 #include <float.h>
 
@@ -10,7 +11,9 @@
 #error "this code is exact only without fast-math and without excess precision"
 #endif
 
-const contactor_Cal contactor_default_cal = {
+const char contactor_Version[] = contactor_DIGEST;
+
+contactor_CALIBRATION const volatile contactor_Cal contactor_default_cal = {
     .reserved = 0U,
 };
 
@@ -25,6 +28,8 @@ static inline void jump_open(contactor_Self *self, const contactor_In *in)
         self->timer.open_shut = 0U;
     } else if (self->timer.open_shut < 5U) {
         self->timer.open_shut++;
+    } else {
+        /* nothing to do */
     }
     if (self->timer.open_shut > 4U) {
         self->timer.open_shut = 0U;
@@ -48,15 +53,16 @@ static inline void jump_shut(contactor_Self *self, const contactor_In *in)
 
 static inline void remember(void)
 {
+    /* nothing to do */
 }
 
-void contactor_Derive(const contactor_Cal *cal, contactor_Derived *derived)
+void contactor_Derive(const volatile contactor_Cal *cal, contactor_Derived *derived)
 {
     (void)cal;
     derived->reserved = 0U;
 }
 
-void contactor_Init(contactor_Self *self, const contactor_Cal *cal)
+void contactor_Init(contactor_Self *self, const volatile contactor_Cal *cal)
 {
     static const contactor_Self zero; /* every member 0 or false */
 
@@ -66,13 +72,13 @@ void contactor_Init(contactor_Self *self, const contactor_Cal *cal)
     self->faults = 0U;
 }
 
-void contactor_Calibrate(contactor_Self *self, const contactor_Cal *cal)
+void contactor_Calibrate(contactor_Self *self, const volatile contactor_Cal *cal)
 {
     contactor_Derive(cal, &self->derived);
 }
 
-void contactor_Step(contactor_Self *self, const contactor_Cal *cal, const contactor_In *in,
-    contactor_Out *out)
+void contactor_Step(contactor_Self *self, const volatile contactor_Cal *cal,
+    const contactor_In *in, contactor_Out *out)
 {
     (void)cal;
     self->fired = 0U;

@@ -17,7 +17,7 @@ enum {
     contactor_MODE_shut = 1
 };
 
-/* Tunable parameters */
+/* The calibration page: tunable parameters */
 typedef struct {
     uint8_t reserved; /* there are none */
 } contactor_Cal;
@@ -49,18 +49,21 @@ typedef struct {
     contactor_Derived derived;
 } contactor_Self;
 
-/* Default values of the tunable parameters */
-extern const contactor_Cal contactor_default_cal;
+/* The digest of the Program, which a tool compares with that of its description */
+extern const char contactor_Version[17];
+
+/* The page with default values, in a section of its own: contactor_MemMap.h */
+extern const volatile contactor_Cal contactor_default_cal;
 
 /* Before the first step */
-void contactor_Init(contactor_Self *self, const contactor_Cal *cal);
+void contactor_Init(contactor_Self *self, const volatile contactor_Cal *cal);
 
 /* After a change of the calibration page: X_Derive, and a fault if solved numbers do not fit it */
-void contactor_Calibrate(contactor_Self *self, const contactor_Cal *cal);
-void contactor_Derive(const contactor_Cal *cal, contactor_Derived *derived);
+void contactor_Calibrate(contactor_Self *self, const volatile contactor_Cal *cal);
+void contactor_Derive(const volatile contactor_Cal *cal, contactor_Derived *derived);
 
 /* One tick of 1/100 s */
-void contactor_Step(contactor_Self *self, const contactor_Cal *cal, const contactor_In *in,
-    contactor_Out *out);
+void contactor_Step(contactor_Self *self, const volatile contactor_Cal *cal,
+    const contactor_In *in, contactor_Out *out);
 
 #endif

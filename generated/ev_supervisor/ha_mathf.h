@@ -44,11 +44,18 @@ static inline float ha_signf(float x)
 static inline int32_t ha_wholef(float x)
 {
     const float largest = (float)2147483520;
+    int32_t whole = INT32_MIN;
 
     if ((x >= -largest) && (x <= largest)) {
-        return (int32_t)x;
+        whole = (int32_t)x;
+    } else if (x > 0.0F) {
+        whole = 2147483520;
+    } else if (x < 0.0F) {
+        whole = -2147483520;
+    } else {
+        /* NaN */
     }
-    return (x > 0.0F) ? 2147483520 : ((x < 0.0F) ? -2147483520 : INT32_MIN);
+    return whole;
 }
 
 #endif

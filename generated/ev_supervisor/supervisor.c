@@ -3,6 +3,7 @@
  * Program digest: 0f68214cb8f027c0
  */
 #include "supervisor.h"
+#include "supervisor_MemMap.h"
 
 #include <float.h>
 #include <math.h>
@@ -25,7 +26,9 @@ static const struct {
 /* Points of the axes of tables, SI */
 static const float axis_lim_1[3] = {333.15F, 363.15F, 393.15F}; /* K; supervisor parameters.lim.table.over temp */
 
-const supervisor_Cal supervisor_default_cal = {
+const char supervisor_Version[] = supervisor_DIGEST;
+
+supervisor_CALIBRATION const volatile supervisor_Cal supervisor_default_cal = {
     .T_creep = 10.0F,
     .T_regen = 120.0F,
     .v_creep = 1.6666666F,
@@ -287,7 +290,8 @@ static inline void equations_fault(supervisor_Self *self)
     }
 }
 
-static inline void update_operation_drive_torque_creep(const supervisor_Self *self, const supervisor_Cal *cal, Work *work)
+static inline void update_operation_drive_torque_creep(const supervisor_Self *self,
+    const volatile supervisor_Cal *cal, Work *work)
 {
     /* supervisor modes.operation.modes.drive.regions.torque.modes.creep.update.T_cmd */
     work->next_T_cmd = self->discrete.share * cal->T_creep;
@@ -319,7 +323,8 @@ static inline void store_operation_drive_torque_pull(supervisor_Self *self, cons
     }
 }
 
-static inline void update_operation_drive_torque_regen(const supervisor_Self *self, const supervisor_Cal *cal, Work *work)
+static inline void update_operation_drive_torque_regen(const supervisor_Self *self,
+    const volatile supervisor_Cal *cal, Work *work)
 {
     /* supervisor modes.operation.modes.drive.regions.torque.modes.regen.update.T_cmd */
     work->next_T_cmd = self->discrete.share * ha_maxf(self->latched.T_req, -cal->T_regen);
@@ -374,8 +379,11 @@ static inline void count_operation(supervisor_Self *self, const supervisor_In *i
             self->timer.operation_fault = 0U;
         } else if (self->timer.operation_fault < 4U) {
             self->timer.operation_fault++;
+        } else {
+            /* nothing to do */
         }
     } else if (work->is_over) {
+        /* nothing to do */
     } else if (!in->hv_ok) {
         if (self->timer.operation_fault == 0U) {
             self->timer.operation_fault = 1U;
@@ -391,10 +399,13 @@ static inline void choose_operation(const supervisor_Self *self, Work *work)
         work->wish_chart = 19U; /* supervisor modes.operation.transitions.fault */
     } else if (work->event == 2) {
         work->wish_chart = 20U; /* supervisor modes.operation.transitions.tripped */
+    } else {
+        /* nothing to do */
     }
 }
 
-static inline void choose_operation_standby(const supervisor_Self *self, const supervisor_In *in, Work *work)
+static inline void choose_operation_standby(const supervisor_Self *self, const supervisor_In *in,
+    Work *work)
 {
     if ((self->latched.key == supervisor_key_ignition) && in->hv_ok) {
         work->wish_chart = 1U; /* supervisor modes.operation.modes.standby.transitions.precharge */
@@ -409,8 +420,11 @@ static inline void count_operation_precharge(supervisor_Self *self, const Work *
             self->timer.operation_precharge_ready = 0U;
         } else if (self->timer.operation_precharge_ready < 6U) {
             self->timer.operation_precharge_ready++;
+        } else {
+            /* nothing to do */
         }
     } else if (work->is_over) {
+        /* nothing to do */
     } else if (self->discrete.permit && self->equation.pre_closed) {
         if (self->timer.operation_precharge_ready == 0U) {
             self->timer.operation_precharge_ready = 1U;
@@ -428,6 +442,8 @@ static inline void choose_operation_precharge(const supervisor_Self *self, Work 
         work->wish_chart = 3U; /* supervisor modes.operation.modes.precharge.transitions.standby */
     } else if (self->timer.after_1 >= 200U) {
         work->wish_chart = 4U; /* supervisor modes.operation.modes.precharge.transitions.too_long */
+    } else {
+        /* nothing to do */
     }
 }
 
@@ -437,6 +453,8 @@ static inline void choose_operation_ready(const supervisor_Self *self, Work *wor
         work->wish_chart = 5U; /* supervisor modes.operation.modes.ready.transitions.drive */
     } else if (self->latched.key == supervisor_key_parked) {
         work->wish_chart = 6U; /* supervisor modes.operation.modes.ready.transitions.standby */
+    } else {
+        /* nothing to do */
     }
 }
 
@@ -462,7 +480,8 @@ static inline void choose_operation_drive(Work *work)
     }
 }
 
-static inline void choose_operation_drive_torque_creep(const supervisor_Self *self, const supervisor_Cal *cal, Work *work)
+static inline void choose_operation_drive_torque_creep(const supervisor_Self *self,
+    const volatile supervisor_Cal *cal, Work *work)
 {
     if (self->latched.T_req > 1.0F) {
         /* supervisor modes.operation.modes.drive.regions.torque.modes.creep.transitions.pull */
@@ -470,6 +489,8 @@ static inline void choose_operation_drive_torque_creep(const supervisor_Self *se
     } else if ((self->latched.T_req < (-1.0F)) && (self->latched.v > cal->v_creep)) {
         /* supervisor modes.operation.modes.drive.regions.torque.modes.creep.transitions.regen */
         work->wish_operation_drive_torque = 10U;
+    } else {
+        /* nothing to do */
     }
 }
 
@@ -481,7 +502,8 @@ static inline void choose_operation_drive_torque_pull(const supervisor_Self *sel
     }
 }
 
-static inline void count_operation_drive_torque_regen(supervisor_Self *self, const supervisor_Cal *cal, const Work *work)
+static inline void count_operation_drive_torque_regen(supervisor_Self *self,
+    const volatile supervisor_Cal *cal, const Work *work)
 {
     if (work->is_first) {
         /* supervisor modes.operation.modes.drive.regions.torque.modes.regen.transitions.creep.when */
@@ -489,8 +511,11 @@ static inline void count_operation_drive_torque_regen(supervisor_Self *self, con
             self->timer.operation_drive_torque_regen_creep = 0U;
         } else if (self->timer.operation_drive_torque_regen_creep < 3U) {
             self->timer.operation_drive_torque_regen_creep++;
+        } else {
+            /* nothing to do */
         }
     } else if (work->is_over) {
+        /* nothing to do */
     } else if ((self->latched.v < cal->v_creep) || (self->latched.T_req >= 0.0F)) {
         if (self->timer.operation_drive_torque_regen_creep == 0U) {
             self->timer.operation_drive_torque_regen_creep = 1U;
@@ -516,8 +541,11 @@ static inline void count_operation_drive_derating_cool(supervisor_Self *self, co
             self->timer.operation_drive_derating_cool_warm = 0U;
         } else if (self->timer.operation_drive_derating_cool_warm < 101U) {
             self->timer.operation_drive_derating_cool_warm++;
+        } else {
+            /* nothing to do */
         }
     } else if (work->is_over) {
+        /* nothing to do */
     } else if (self->latched.temp > 333.15F) {
         if (self->timer.operation_drive_derating_cool_warm == 0U) {
             self->timer.operation_drive_derating_cool_warm = 1U;
@@ -543,8 +571,11 @@ static inline void count_operation_drive_derating_warm(supervisor_Self *self, co
             self->timer.operation_drive_derating_warm_cool = 0U;
         } else if (self->timer.operation_drive_derating_warm_cool < 501U) {
             self->timer.operation_drive_derating_warm_cool++;
+        } else {
+            /* nothing to do */
         }
     } else if (work->is_over) {
+        /* nothing to do */
     } else if (self->latched.temp < 328.15F) {
         if (self->timer.operation_drive_derating_warm_cool == 0U) {
             self->timer.operation_drive_derating_warm_cool = 1U;
@@ -577,8 +608,11 @@ static inline void count_main_open(supervisor_Self *self, const Work *work)
             self->timer.main_open_shut = 0U;
         } else if (self->timer.main_open_shut < 5U) {
             self->timer.main_open_shut++;
+        } else {
+            /* nothing to do */
         }
     } else if (work->is_over) {
+        /* nothing to do */
     } else if (self->equation.main_command) {
         if (self->timer.main_open_shut == 0U) {
             self->timer.main_open_shut = 1U;
@@ -610,8 +644,11 @@ static inline void count_pre_open(supervisor_Self *self, const Work *work)
             self->timer.pre_open_shut = 0U;
         } else if (self->timer.pre_open_shut < 3U) {
             self->timer.pre_open_shut++;
+        } else {
+            /* nothing to do */
         }
     } else if (work->is_over) {
+        /* nothing to do */
     } else if (self->equation.pre_command) {
         if (self->timer.pre_open_shut == 0U) {
             self->timer.pre_open_shut = 1U;
@@ -635,7 +672,8 @@ static inline void choose_pre_shut(const supervisor_Self *self, Work *work)
     }
 }
 
-static inline void select_transitions(supervisor_Self *self, const supervisor_Cal *cal, const supervisor_In *in, Work *work)
+static inline void select_transitions(supervisor_Self *self, const volatile supervisor_Cal *cal,
+    const supervisor_In *in, Work *work)
 {
     work->wish_chart = 0U;
     work->wish_operation_drive_torque = 0U;
@@ -929,6 +967,7 @@ static inline void hear(const supervisor_Self *self, Work *work)
     case supervisor_MODE_operation_standby:
         if (work->wish_chart != 0U) {
             if (work->heard_chart) {
+                /* nothing to do */
             } else {
                 hear_chart(work);
             }
@@ -937,6 +976,7 @@ static inline void hear(const supervisor_Self *self, Work *work)
     case supervisor_MODE_operation_precharge:
         if (work->wish_chart != 0U) {
             if (work->heard_chart) {
+                /* nothing to do */
             } else {
                 hear_chart(work);
             }
@@ -945,6 +985,7 @@ static inline void hear(const supervisor_Self *self, Work *work)
     case supervisor_MODE_operation_ready:
         if (work->wish_chart != 0U) {
             if (work->heard_chart) {
+                /* nothing to do */
             } else {
                 hear_chart(work);
             }
@@ -953,6 +994,7 @@ static inline void hear(const supervisor_Self *self, Work *work)
     case supervisor_MODE_fault:
         if (work->wish_chart != 0U) {
             if (work->heard_chart) {
+                /* nothing to do */
             } else {
                 hear_chart(work);
             }
@@ -965,40 +1007,52 @@ static inline void hear(const supervisor_Self *self, Work *work)
     case supervisor_operation_drive_torque_creep:
         if (work->wish_chart != 0U) {
             if (work->heard_chart) {
+                /* nothing to do */
             } else {
                 hear_chart(work);
             }
         } else if (work->wish_operation_drive_torque != 0U) {
             if (work->heard_operation_drive_torque) {
+                /* nothing to do */
             } else {
                 hear_operation_drive_torque(work);
             }
+        } else {
+            /* nothing to do */
         }
         break;
     case supervisor_operation_drive_torque_pull:
         if (work->wish_chart != 0U) {
             if (work->heard_chart) {
+                /* nothing to do */
             } else {
                 hear_chart(work);
             }
         } else if (work->wish_operation_drive_torque != 0U) {
             if (work->heard_operation_drive_torque) {
+                /* nothing to do */
             } else {
                 hear_operation_drive_torque(work);
             }
+        } else {
+            /* nothing to do */
         }
         break;
     case supervisor_operation_drive_torque_regen:
         if (work->wish_chart != 0U) {
             if (work->heard_chart) {
+                /* nothing to do */
             } else {
                 hear_chart(work);
             }
         } else if (work->wish_operation_drive_torque != 0U) {
             if (work->heard_operation_drive_torque) {
+                /* nothing to do */
             } else {
                 hear_operation_drive_torque(work);
             }
+        } else {
+            /* nothing to do */
         }
         break;
     default:
@@ -1008,27 +1062,35 @@ static inline void hear(const supervisor_Self *self, Work *work)
     case supervisor_operation_drive_derating_cool:
         if (work->wish_chart != 0U) {
             if (work->heard_chart) {
+                /* nothing to do */
             } else {
                 hear_chart(work);
             }
         } else if (work->wish_operation_drive_derating != 0U) {
             if (work->heard_operation_drive_derating) {
+                /* nothing to do */
             } else {
                 hear_operation_drive_derating(work);
             }
+        } else {
+            /* nothing to do */
         }
         break;
     case supervisor_operation_drive_derating_warm:
         if (work->wish_chart != 0U) {
             if (work->heard_chart) {
+                /* nothing to do */
             } else {
                 hear_chart(work);
             }
         } else if (work->wish_operation_drive_derating != 0U) {
             if (work->heard_operation_drive_derating) {
+                /* nothing to do */
             } else {
                 hear_operation_drive_derating(work);
             }
+        } else {
+            /* nothing to do */
         }
         break;
     default:
@@ -1038,6 +1100,7 @@ static inline void hear(const supervisor_Self *self, Work *work)
     case supervisor_main_open:
         if (work->wish_main != 0U) {
             if (work->heard_main) {
+                /* nothing to do */
             } else {
                 hear_main(work);
             }
@@ -1046,6 +1109,7 @@ static inline void hear(const supervisor_Self *self, Work *work)
     case supervisor_main_shut:
         if (work->wish_main != 0U) {
             if (work->heard_main) {
+                /* nothing to do */
             } else {
                 hear_main(work);
             }
@@ -1058,6 +1122,7 @@ static inline void hear(const supervisor_Self *self, Work *work)
     case supervisor_pre_open:
         if (work->wish_pre != 0U) {
             if (work->heard_pre) {
+                /* nothing to do */
             } else {
                 hear_pre(work);
             }
@@ -1066,6 +1131,7 @@ static inline void hear(const supervisor_Self *self, Work *work)
     case supervisor_pre_shut:
         if (work->wish_pre != 0U) {
             if (work->heard_pre) {
+                /* nothing to do */
             } else {
                 hear_pre(work);
             }
@@ -1384,6 +1450,7 @@ static inline void commit(supervisor_Self *self, Work *work)
             self->mode_operation_drive_derating = supervisor_operation_drive_derating_cool;
         } else {
             if (self->left_operation_drive_torque == -128) {
+                /* nothing to do */
             } else {
                 switch (self->left_operation_drive_torque) {
                 case 0:
@@ -1400,6 +1467,7 @@ static inline void commit(supervisor_Self *self, Work *work)
                 }
             }
             if (self->left_operation_drive_derating == -128) {
+                /* nothing to do */
             } else {
                 switch (self->left_operation_drive_derating) {
                 case 0:
@@ -1553,7 +1621,8 @@ static inline void commit(supervisor_Self *self, Work *work)
     }
 }
 
-static inline void micro_step(supervisor_Self *self, const supervisor_Cal *cal, const supervisor_In *in, Work *work)
+static inline void micro_step(supervisor_Self *self, const volatile supervisor_Cal *cal,
+    const supervisor_In *in, Work *work)
 {
     select_transitions(self, cal, in, work);
     hear(self, work);
@@ -1585,7 +1654,8 @@ static inline void micro_step(supervisor_Self *self, const supervisor_Cal *cal, 
     work->is_first = false;
 }
 
-static inline void jump(supervisor_Self *self, const supervisor_Cal *cal, const supervisor_In *in, Work *work)
+static inline void jump(supervisor_Self *self, const volatile supervisor_Cal *cal,
+    const supervisor_In *in, Work *work)
 {
     self->count_of_log = 0;
     work->steps = 0;
@@ -1627,6 +1697,7 @@ static inline void latch(supervisor_Self *self, const supervisor_In *in)
 
 static inline void remember(void)
 {
+    /* nothing to do */
 }
 
 static inline void decide(supervisor_Self *self, const supervisor_In *in, Work *work)
@@ -1655,6 +1726,8 @@ static inline void keep(supervisor_Self *self)
         self->timer.after_1 = 0U;
     } else if (self->timer.after_1 < 200U) {
         self->timer.after_1++;
+    } else {
+        /* nothing to do */
     }
 }
 
@@ -1699,13 +1772,13 @@ static inline void start(supervisor_Self *self, Work *work)
     }
 }
 
-void supervisor_Derive(const supervisor_Cal *cal, supervisor_Derived *derived)
+void supervisor_Derive(const volatile supervisor_Cal *cal, supervisor_Derived *derived)
 {
     (void)cal;
     derived->reserved = 0U;
 }
 
-void supervisor_Init(supervisor_Self *self, const supervisor_Cal *cal)
+void supervisor_Init(supervisor_Self *self, const volatile supervisor_Cal *cal)
 {
     static const supervisor_Self zero; /* every member 0 or false */
 
@@ -1729,13 +1802,13 @@ void supervisor_Init(supervisor_Self *self, const supervisor_Cal *cal)
     self->latched.temp = 233.15F;
 }
 
-void supervisor_Calibrate(supervisor_Self *self, const supervisor_Cal *cal)
+void supervisor_Calibrate(supervisor_Self *self, const volatile supervisor_Cal *cal)
 {
     supervisor_Derive(cal, &self->derived);
 }
 
-void supervisor_Step(supervisor_Self *self, const supervisor_Cal *cal, const supervisor_In *in,
-    supervisor_Out *out)
+void supervisor_Step(supervisor_Self *self, const volatile supervisor_Cal *cal,
+    const supervisor_In *in, supervisor_Out *out)
 {
     Work scratch = {0};
     Work *const work = &scratch;
@@ -1747,6 +1820,7 @@ void supervisor_Step(supervisor_Self *self, const supervisor_Cal *cal, const sup
     self->fired_pre = 0U;
     latch(self, in);
     if (self->started) {
+        /* nothing to do */
     } else {
         start(self, work);
     }

@@ -65,7 +65,7 @@ enum {
 #define supervisor_FAULT_range_T_cmd (1UL << 7)
 #define supervisor_FAULT_range_share (1UL << 8)
 
-/* Tunable parameters */
+/* The calibration page: tunable parameters */
 typedef struct {
     float T_creep; /* N*m; supervisor parameters.T_creep; 0.0 to 50.0 */
     float T_regen; /* N*m; supervisor parameters.T_regen; 0.0 to 400.0 */
@@ -156,18 +156,21 @@ typedef struct {
     supervisor_Derived derived;
 } supervisor_Self;
 
-/* Default values of the tunable parameters */
-extern const supervisor_Cal supervisor_default_cal;
+/* The digest of the Program, which a tool compares with that of its description */
+extern const char supervisor_Version[17];
+
+/* The page with default values, in a section of its own: supervisor_MemMap.h */
+extern const volatile supervisor_Cal supervisor_default_cal;
 
 /* Before the first step */
-void supervisor_Init(supervisor_Self *self, const supervisor_Cal *cal);
+void supervisor_Init(supervisor_Self *self, const volatile supervisor_Cal *cal);
 
 /* After a change of the calibration page: X_Derive, and a fault if solved numbers do not fit it */
-void supervisor_Calibrate(supervisor_Self *self, const supervisor_Cal *cal);
-void supervisor_Derive(const supervisor_Cal *cal, supervisor_Derived *derived);
+void supervisor_Calibrate(supervisor_Self *self, const volatile supervisor_Cal *cal);
+void supervisor_Derive(const volatile supervisor_Cal *cal, supervisor_Derived *derived);
 
 /* One tick of 1/100 s */
-void supervisor_Step(supervisor_Self *self, const supervisor_Cal *cal, const supervisor_In *in,
-    supervisor_Out *out);
+void supervisor_Step(supervisor_Self *self, const volatile supervisor_Cal *cal,
+    const supervisor_In *in, supervisor_Out *out);
 
 #endif

@@ -17,7 +17,8 @@ double ha_pow2(double k)
     double result = k;
 
     if ((k >= -1022.0) && (k <= 1023.0)) {
-        const uint64_t bits = (uint64_t)((int64_t)k + 1023) << 52;
+        const int64_t exponent = (int64_t)k + 1023;
+        const uint64_t bits = (uint64_t)exponent << 52;
         (void)memcpy(&result, &bits, sizeof result);
     }
     return result;
@@ -26,7 +27,14 @@ double ha_pow2(double k)
 /* sine; |x| <= 1e5 rad, clamped; error < 0.85 ULP */
 double ha_sin(double x)
 {
-    const double bounded = (x > 100000.0) ? 100000.0 : ((x < (-100000.0)) ? (-100000.0) : x);
+    double bounded;
+    if (x > 100000.0) {
+        bounded = 100000.0;
+    } else if (x < (-100000.0)) {
+        bounded = -100000.0;
+    } else {
+        bounded = x;
+    }
     const double quarters =
         (bounded * 0.6366197723675814) + 6755399441055744.0 - 6755399441055744.0;
     const double turns = (0.25 * quarters) - 0.375 + 6755399441055744.0 - 6755399441055744.0;
@@ -50,14 +58,32 @@ double ha_sin(double x)
         + (square * (2.4801587289671533e-05 + (square * cosine_upper)))));
     const double cosine =
         crest + (1.0 - crest - half + ((square * square * cosine_series) - (head * tail)));
-    return (fabs(x) < 7.450580596923828e-09) ? x : ((quadrant < 0.5) ? sine : ((quadrant < 1.5) ?
-        cosine : ((quadrant < 2.5) ? (-sine) : (-cosine))));
+    double y;
+    if (fabs(x) < 7.450580596923828e-09) {
+        y = x;
+    } else if (quadrant < 0.5) {
+        y = sine;
+    } else if (quadrant < 1.5) {
+        y = cosine;
+    } else if (quadrant < 2.5) {
+        y = -sine;
+    } else {
+        y = -cosine;
+    }
+    return y;
 }
 
 /* cosine; |x| <= 1e5 rad, clamped; error < 0.85 ULP */
 double ha_cos(double x)
 {
-    const double bounded = (x > 100000.0) ? 100000.0 : ((x < (-100000.0)) ? (-100000.0) : x);
+    double bounded;
+    if (x > 100000.0) {
+        bounded = 100000.0;
+    } else if (x < (-100000.0)) {
+        bounded = -100000.0;
+    } else {
+        bounded = x;
+    }
     const double quarters =
         (bounded * 0.6366197723675814) + 6755399441055744.0 - 6755399441055744.0;
     const double turns = (0.25 * quarters) - 0.375 + 6755399441055744.0 - 6755399441055744.0;
@@ -81,14 +107,30 @@ double ha_cos(double x)
         + (square * (2.4801587289671533e-05 + (square * cosine_upper)))));
     const double cosine =
         crest + (1.0 - crest - half + ((square * square * cosine_series) - (head * tail)));
-    return (quadrant < 0.5) ? cosine : ((quadrant < 1.5) ? (-sine) : ((quadrant < 2.5) ? (-cosine)
-        : sine));
+    double y;
+    if (quadrant < 0.5) {
+        y = cosine;
+    } else if (quadrant < 1.5) {
+        y = -sine;
+    } else if (quadrant < 2.5) {
+        y = -cosine;
+    } else {
+        y = sine;
+    }
+    return y;
 }
 
 /* e^x; -708 <= x <= 709, clamped; error < 0.95 ULP */
 double ha_exp(double x)
 {
-    const double bounded = (x > 709.0) ? 709.0 : ((x < (-708.0)) ? (-708.0) : x);
+    double bounded;
+    if (x > 709.0) {
+        bounded = 709.0;
+    } else if (x < (-708.0)) {
+        bounded = -708.0;
+    } else {
+        bounded = x;
+    }
     const double exponent =
         (bounded > (-708.0)) ? ((bounded * 1.4426950408889634) + 6755399441055744.0
         - 6755399441055744.0) : (-1021.0);
@@ -119,13 +161,28 @@ double ha_tanh(double x)
     const double magnitude =
         (bounded < 0.625) ? (bounded - (bounded * square * above / below)) : (1.0
         - (2.0 / (ha_exp(bounded + bounded) + 1.0)));
-    return (size < 7.450580596923828e-09) ? x : ((x < 0.0) ? (-magnitude) : magnitude);
+    double y;
+    if (size < 7.450580596923828e-09) {
+        y = x;
+    } else if (x < 0.0) {
+        y = -magnitude;
+    } else {
+        y = magnitude;
+    }
+    return y;
 }
 
 /* tangent; |x| <= 1e5 rad, clamped; error < 2.4 ULP */
 double ha_tan(double x)
 {
-    const double bounded = (x > 100000.0) ? 100000.0 : ((x < (-100000.0)) ? (-100000.0) : x);
+    double bounded;
+    if (x > 100000.0) {
+        bounded = 100000.0;
+    } else if (x < (-100000.0)) {
+        bounded = -100000.0;
+    } else {
+        bounded = x;
+    }
     const double quarters =
         (bounded * 0.6366197723675814) + 6755399441055744.0 - 6755399441055744.0;
     const double turns = (0.25 * quarters) - 0.375 + 6755399441055744.0 - 6755399441055744.0;
@@ -149,9 +206,19 @@ double ha_tan(double x)
         + (square * (2.4801587289671533e-05 + (square * cosine_upper)))));
     const double cosine =
         crest + (1.0 - crest - half + ((square * square * cosine_series) - (head * tail)));
-    return (fabs(x) < 7.450580596923828e-09) ? x : ((quadrant < 0.5) ? (sine / cosine) :
-        ((quadrant < 1.5) ? (-(cosine / sine)) : ((quadrant < 2.5) ? (sine / cosine) :
-        (-(cosine / sine)))));
+    double y;
+    if (fabs(x) < 7.450580596923828e-09) {
+        y = x;
+    } else if (quadrant < 0.5) {
+        y = sine / cosine;
+    } else if (quadrant < 1.5) {
+        y = -(cosine / sine);
+    } else if (quadrant < 2.5) {
+        y = sine / cosine;
+    } else {
+        y = -(cosine / sine);
+    }
+    return y;
 }
 
 /* angle of (run, rise), in (-pi, pi] rad; error < 1.5 ULP */
@@ -162,16 +229,33 @@ double ha_atan2(double rise, double run)
     const double least = (up > along) ? along : up;
     const double most = (up > along) ? up : along;
     const double factor = (most > 1.0715086071862673e+301) ? 7.888609052210118e-31 : 1.0;
-    const double low =
-        (most > 1.7976931348623157e+308) ? ((least > 1.7976931348623157e+308) ? 1.0 :
-        (least * 0.0)) : (least * factor);
+    double low;
+    if (most > 1.7976931348623157e+308) {
+        if (least > 1.7976931348623157e+308) {
+            low = 1.0;
+        } else {
+            low = least * 0.0;
+        }
+    } else {
+        low = least * factor;
+    }
     const double high = (most > 1.7976931348623157e+308) ? 1.0 : (most * factor);
-    const double top =
-        ((16.0 * low) < (7.0 * high)) ? low : (((16.0 * low) < (11.0 * high)) ? (low + low
-        - high) : (low - high));
-    const double below =
-        ((16.0 * low) < (7.0 * high)) ? high : (((16.0 * low) < (11.0 * high)) ? (high + high
-        + low) : (high + low));
+    double top;
+    if ((16.0 * low) < (7.0 * high)) {
+        top = low;
+    } else if ((16.0 * low) < (11.0 * high)) {
+        top = low + low - high;
+    } else {
+        top = low - high;
+    }
+    double below;
+    if ((16.0 * low) < (7.0 * high)) {
+        below = high;
+    } else if ((16.0 * low) < (11.0 * high)) {
+        below = high + high + low;
+    } else {
+        below = high + low;
+    }
     const double r = top / ((high <= 0.0) ? 1.0 : below);
     const double square = r * r;
     const double upper = (-0.05200077063553983) + (square * (0.0443291101751916
@@ -185,25 +269,84 @@ double ha_atan2(double rise, double run)
     const double core = r + (r * square * series);
     const double turn = (up > along) ? (-core) : core;
     const double arc = (run < 0.0) ? (-turn) : turn;
-    const double first =
-        (up > along) ? ((run < 0.0) ? (((16.0 * low) < (7.0 * high)) ? 1.5707963267948966 :
-        (((16.0 * low) < (11.0 * high)) ? 2.0344439357957027 : 2.356194490192345)) :
-        (((16.0 * low) < (7.0 * high)) ? 1.5707963267948966 : (((16.0 * low) < (11.0 * high)) ?
-        1.1071487177940904 : 0.7853981633974483))) : ((run < 0.0) ?
-        (((16.0 * low) < (7.0 * high)) ? 3.141592653589793 : (((16.0 * low) < (11.0 * high)) ?
-        2.677945044588987 : 2.356194490192345)) : (((16.0 * low) < (7.0 * high)) ? 0.0 :
-        (((16.0 * low) < (11.0 * high)) ? 0.4636476090008061 : 0.7853981633974483)));
-    const double rest =
-        (up > along) ? ((run < 0.0) ? (((16.0 * low) < (7.0 * high)) ? 6.123233995736766e-17 :
-        (((16.0 * low) < (11.0 * high)) ? 2.841996617907152e-17 : 9.184850993605148e-17)) :
-        (((16.0 * low) < (7.0 * high)) ? 6.123233995736766e-17 : (((16.0 * low) < (11.0 * high))
-        ? 9.40447137356638e-17 : 3.061616997868383e-17))) : ((run < 0.0) ?
-        (((16.0 * low) < (7.0 * high)) ? 1.2246467991473532e-16 :
-        (((16.0 * low) < (11.0 * high)) ? 1.5527705369303147e-16 : 9.184850993605148e-17)) :
-        (((16.0 * low) < (7.0 * high)) ? 0.0 : (((16.0 * low) < (11.0 * high)) ?
-        2.2698777452961687e-17 : 3.061616997868383e-17)));
+    double first;
+    if (up > along) {
+        if (run < 0.0) {
+            if ((16.0 * low) < (7.0 * high)) {
+                first = 1.5707963267948966;
+            } else if ((16.0 * low) < (11.0 * high)) {
+                first = 2.0344439357957027;
+            } else {
+                first = 2.356194490192345;
+            }
+        } else if ((16.0 * low) < (7.0 * high)) {
+            first = 1.5707963267948966;
+        } else if ((16.0 * low) < (11.0 * high)) {
+            first = 1.1071487177940904;
+        } else {
+            first = 0.7853981633974483;
+        }
+    } else if (run < 0.0) {
+        if ((16.0 * low) < (7.0 * high)) {
+            first = 3.141592653589793;
+        } else if ((16.0 * low) < (11.0 * high)) {
+            first = 2.677945044588987;
+        } else {
+            first = 2.356194490192345;
+        }
+    } else if ((16.0 * low) < (7.0 * high)) {
+        first = 0.0;
+    } else if ((16.0 * low) < (11.0 * high)) {
+        first = 0.4636476090008061;
+    } else {
+        first = 0.7853981633974483;
+    }
+    double rest;
+    if (up > along) {
+        if (run < 0.0) {
+            if ((16.0 * low) < (7.0 * high)) {
+                rest = 6.123233995736766e-17;
+            } else if ((16.0 * low) < (11.0 * high)) {
+                rest = 2.841996617907152e-17;
+            } else {
+                rest = 9.184850993605148e-17;
+            }
+        } else if ((16.0 * low) < (7.0 * high)) {
+            rest = 6.123233995736766e-17;
+        } else if ((16.0 * low) < (11.0 * high)) {
+            rest = 9.40447137356638e-17;
+        } else {
+            rest = 3.061616997868383e-17;
+        }
+    } else if (run < 0.0) {
+        if ((16.0 * low) < (7.0 * high)) {
+            rest = 1.2246467991473532e-16;
+        } else if ((16.0 * low) < (11.0 * high)) {
+            rest = 1.5527705369303147e-16;
+        } else {
+            rest = 9.184850993605148e-17;
+        }
+    } else if ((16.0 * low) < (7.0 * high)) {
+        rest = 0.0;
+    } else if ((16.0 * low) < (11.0 * high)) {
+        rest = 2.2698777452961687e-17;
+    } else {
+        rest = 3.061616997868383e-17;
+    }
     const double size = first + (rest + arc);
-    return (up <= 0.0) ? ((run >= 0.0) ? rise : size) : ((rise < 0.0) ? (-size) : size);
+    double y;
+    if (up <= 0.0) {
+        if (run >= 0.0) {
+            y = rise;
+        } else {
+            y = size;
+        }
+    } else if (rise < 0.0) {
+        y = -size;
+    } else {
+        y = size;
+    }
+    return y;
 }
 
 /* The interval of an axis that x is in, and the part of it before x: 0 or 1 outside */
@@ -214,21 +357,20 @@ static int32_t cell(const double *axis, int32_t size, double x, double *part)
 
     if (x <= axis[low]) {
         *part = 0.0;
-        return low;
-    }
-    if (x >= axis[high]) {
+    } else if (x >= axis[high]) {
         *part = 1.0;
-        return high - 1;
-    }
-    while ((high - low) > 1) {
-        const int32_t middle = low + ((high - low) / 2);
-        if (x < axis[middle]) {
-            high = middle;
-        } else {
-            low = middle;
+        low = high - 1;
+    } else {
+        while ((high - low) > 1) {
+            const int32_t middle = low + ((high - low) / 2);
+            if (x < axis[middle]) {
+                high = middle;
+            } else {
+                low = middle;
+            }
         }
+        *part = (x - axis[low]) / (axis[high] - axis[low]);
     }
-    *part = (x - axis[low]) / (axis[high] - axis[low]);
     return low;
 }
 

@@ -3,6 +3,7 @@
  * Program digest: 342d34d6794b49e1
  */
 #include "leaf.h"
+#include "leaf_MemMap.h"
 
 #include <float.h>
 #include <math.h>
@@ -50,235 +51,237 @@ static const struct {
     .k_hs_per_J_v = 51.30509301553956, /* k_hs / J_v */
 };
 
-/* Numbers solved when the spec was checked: matrix exponentials, gains, stamps */
-static const double solved_drive_contact_A_w_w_w_w = -0.3254158130030241;
-static const double solved_drive_contact_A_w_w_w_em = 0.03954601850349461;
-static const double solved_drive_contact_A_w_w_theta_d = 51.30509301553956;
-static const double solved_drive_contact_A_w_w_theta_b = -51.30509301553956;
-static const double solved_drive_contact_A_w_em_w_w = 122.04349630208208;
-static const double solved_drive_contact_A_w_em_w_em = -15.061281656302986;
-static const double solved_drive_contact_A_w_em_theta_d = -19323.553581162996;
-static const double solved_drive_contact_A_w_em_theta_b = 19323.553581162996;
-static const double solved_drive_contact_A_theta_d_w_w = -1.0;
-static const double solved_drive_contact_A_theta_d_w_em = 0.12204349630208207;
-static const double solved_drive_contact_E_w_w_w_w = 0.9996516490615189;
-static const double solved_drive_contact_E_w_w_w_em = 4.2341678927367884e-05;
-static const double solved_drive_contact_E_w_w_theta_d = 0.050896209725249345;
-static const double solved_drive_contact_E_w_w_theta_b = -0.050896209725249345;
-static const double solved_drive_contact_E_w_em_w_w = 0.13067122130485836;
-static const double solved_drive_contact_E_w_em_w_em = 0.9838870635233042;
-static const double solved_drive_contact_E_w_em_theta_d = -19.16796330213581;
-static const double solved_drive_contact_E_w_em_theta_b = 19.167963302135806;
-static const double solved_drive_contact_E_theta_d_w_w = -0.000992030356710076;
-static const double solved_drive_contact_E_theta_d_w_em = 0.00012106082085559457;
-static const double solved_drive_contact_E_theta_d_theta_d = 0.9988015845548802;
-static const double solved_drive_contact_E_theta_d_theta_b = 0.0011984154451197813;
-static const double solved_drive_contact_E_theta_b_theta_b = 1.0;
-static const double solved_drive_contact_F_w_w_w_w = 0.000999829625927773;
-static const double solved_drive_contact_F_w_w_w_em = 2.0707486901231542e-08;
-static const double solved_drive_contact_F_w_w_theta_d = 2.551778199627501e-05;
-static const double solved_drive_contact_F_w_w_theta_b = -2.551778199627501e-05;
-static const double solved_drive_contact_F_w_em_w_w = 6.39056521159656e-05;
-static const double solved_drive_contact_F_w_em_w_em = 0.000992117826932742;
-static const double solved_drive_contact_F_w_em_theta_d = -0.009610488872101383;
-static const double solved_drive_contact_F_w_em_theta_b = 0.009610488872101385;
-static const double solved_drive_contact_F_theta_d_w_w = -4.973732722508863e-07;
-static const double solved_drive_contact_F_theta_d_w_em = 6.069782445537716e-08;
-static const double solved_drive_contact_F_theta_d_theta_d = 0.000999599984552296;
-static const double solved_drive_contact_F_theta_d_theta_b = 4.00015447704191e-07;
-static const double solved_drive_contact_F_theta_b_theta_b = 0.001;
-static const double solved_drive_contact_Eh_w_w_w_w = 0.9998315266712764;
-static const double solved_drive_contact_Eh_w_w_w_em = 2.0475805144617955e-05;
-static const double solved_drive_contact_Eh_w_w_theta_d = 0.025552622492045044;
-static const double solved_drive_contact_Eh_w_w_theta_b = -0.025552622492045044;
-static const double solved_drive_contact_Eh_w_em_w_w = 0.06319065595006759;
-static const double solved_drive_contact_Eh_w_em_w_em = 0.9922049765744245;
-static const double solved_drive_contact_Eh_w_em_theta_d = -9.623743212691092;
-static const double solved_drive_contact_Eh_w_em_theta_b = 9.623743212691092;
-static const double solved_drive_contact_Eh_theta_d_w_w = -0.0004980523567963424;
-static const double solved_drive_contact_Eh_theta_d_w_em = 6.0781536080154266e-05;
-static const double solved_drive_contact_Eh_theta_d_theta_d = 0.9996995833719463;
-static const double solved_drive_contact_Eh_theta_d_theta_b = 0.0003004166280536893;
-static const double solved_drive_contact_Eh_theta_b_theta_b = 1.0;
-static const double solved_drive_contact_Fh_w_w_w_w = 0.0004999583608145347;
-static const double solved_drive_contact_Fh_w_w_w_em = 5.060545050920358e-09;
-static const double solved_drive_contact_Fh_w_w_theta_d = 6.396578882692443e-06;
-static const double solved_drive_contact_Fh_w_w_theta_b = -6.396578882692443e-06;
-static const double solved_drive_contact_Fh_w_em_w_w = 1.561741572426417e-05;
-static const double solved_drive_contact_Fh_w_em_w_em = 0.0004980732154276062;
-static const double solved_drive_contact_Fh_w_em_theta_d = -0.0024091414788973142;
-static const double solved_drive_contact_Fh_w_em_theta_b = 0.0024091414788973142;
-static const double solved_drive_contact_Fh_theta_d_w_w = -1.2467726899462036e-07;
-static const double solved_drive_contact_Fh_theta_d_w_em = 1.521563039303567e-08;
-static const double solved_drive_contact_Fh_theta_d_theta_d = 0.0004999498974828016;
-static const double solved_drive_contact_Fh_theta_d_theta_b = 5.010251719843405e-08;
-static const double solved_drive_contact_Fh_theta_b_theta_b = 0.0005;
-static const double solved_no_contact_A_w_w_w_w = -0.0013836465890899815;
-static const double solved_no_contact_A_w_em_w_em = -0.16666666666666669;
-static const double solved_no_contact_A_theta_d_w_w = -1.0;
-static const double solved_no_contact_A_theta_d_w_em = 0.12204349630208207;
-static const double solved_no_contact_A_theta_b_w_w = -1.0;
-static const double solved_no_contact_A_theta_b_w_em = 0.12204349630208207;
-static const double solved_no_contact_A_theta_b_theta_d = 158.33333333333334;
-static const double solved_no_contact_A_theta_b_theta_b = -158.33333333333334;
-static const double solved_no_contact_E_w_w_w_w = 0.9999986163543682;
-static const double solved_no_contact_E_w_em_w_em = 0.9998333472214507;
-static const double solved_no_contact_E_theta_d_w_w = -0.0009999993081770246;
-static const double solved_no_contact_E_theta_d_w_em = 0.0001220333265757162;
-static const double solved_no_contact_E_theta_d_theta_d = 1.0;
-static const double solved_no_contact_E_theta_b_w_w = -0.0009999993081770246;
-static const double solved_no_contact_E_theta_b_w_em = 0.0001220333265757162;
-static const double solved_no_contact_E_theta_b_theta_d = 0.146434787194679;
-static const double solved_no_contact_E_theta_b_theta_b = 0.8535652128053209;
-static const double solved_no_contact_F_w_w_w_w = 0.0009999993081770246;
-static const double solved_no_contact_F_w_em_w_em = 0.0009999166712961033;
-static const double solved_no_contact_F_theta_d_w_w = -4.999997693923149e-07;
-static const double solved_no_contact_F_theta_d_w_em = 6.101835819517088e-08;
-static const double solved_no_contact_F_theta_d_theta_d = 0.001;
-static const double solved_no_contact_F_theta_b_w_w = -4.999997693923149e-07;
-static const double solved_no_contact_F_theta_b_w_em = 6.101835819517088e-08;
-static const double solved_no_contact_F_theta_b_theta_d = 7.514871245465897e-05;
-static const double solved_no_contact_F_theta_b_theta_b = 0.0009248512875453411;
-static const double solved_no_contact_Eh_w_w_w_w = 0.9999993081769447;
-static const double solved_no_contact_Eh_w_em_w_em = 0.9999166701387925;
-static const double solved_no_contact_Eh_theta_d_w_w = -0.0004999998270442163;
-static const double solved_no_contact_Eh_theta_d_w_em = 6.101920564882696e-05;
-static const double solved_no_contact_Eh_theta_d_theta_d = 1.0;
-static const double solved_no_contact_Eh_theta_b_w_w = -0.0004999998270442163;
-static const double solved_no_contact_Eh_theta_b_w_em = 6.101920564882696e-05;
-static const double solved_no_contact_Eh_theta_b_theta_d = 0.07611406937581251;
-static const double solved_no_contact_Eh_theta_b_theta_b = 0.9238859306241876;
-static const double solved_no_contact_Fh_w_w_w_w = 0.0004999998270442163;
-static const double solved_no_contact_Fh_w_em_w_em = 0.0004999791672453583;
-static const double solved_no_contact_Fh_theta_d_w_w = -1.2499997117403438e-07;
-static const double solved_no_contact_Fh_theta_d_w_em = 1.525501328444855e-08;
-static const double solved_no_contact_Fh_theta_d_theta_d = 0.0005;
-static const double solved_no_contact_Fh_theta_b_w_w = -1.2499997117403438e-07;
-static const double solved_no_contact_Fh_theta_b_w_em = 1.525501328444855e-08;
-static const double solved_no_contact_Fh_theta_b_theta_d = 1.9279561836973697e-05;
-static const double solved_no_contact_Fh_theta_b_theta_b = 0.0004807204381630263;
-static const double solved_coast_contact_A_w_w_w_w = -0.3254158130030241;
-static const double solved_coast_contact_A_w_w_w_em = 0.03954601850349461;
-static const double solved_coast_contact_A_w_w_theta_d = 51.30509301553956;
-static const double solved_coast_contact_A_w_w_theta_b = -51.30509301553956;
-static const double solved_coast_contact_A_w_em_w_w = 122.04349630208208;
-static const double solved_coast_contact_A_w_em_w_em = -15.061281656302986;
-static const double solved_coast_contact_A_w_em_theta_d = -19323.553581162996;
-static const double solved_coast_contact_A_w_em_theta_b = 19323.553581162996;
-static const double solved_coast_contact_A_theta_d_w_w = -1.0;
-static const double solved_coast_contact_A_theta_d_w_em = 0.12204349630208207;
-static const double solved_coast_contact_E_w_w_w_w = 0.9996516490615189;
-static const double solved_coast_contact_E_w_w_w_em = 4.2341678927367884e-05;
-static const double solved_coast_contact_E_w_w_theta_d = 0.050896209725249345;
-static const double solved_coast_contact_E_w_w_theta_b = -0.050896209725249345;
-static const double solved_coast_contact_E_w_em_w_w = 0.13067122130485836;
-static const double solved_coast_contact_E_w_em_w_em = 0.9838870635233042;
-static const double solved_coast_contact_E_w_em_theta_d = -19.16796330213581;
-static const double solved_coast_contact_E_w_em_theta_b = 19.167963302135806;
-static const double solved_coast_contact_E_theta_d_w_w = -0.000992030356710076;
-static const double solved_coast_contact_E_theta_d_w_em = 0.00012106082085559457;
-static const double solved_coast_contact_E_theta_d_theta_d = 0.9988015845548802;
-static const double solved_coast_contact_E_theta_d_theta_b = 0.0011984154451197813;
-static const double solved_coast_contact_E_theta_b_theta_b = 1.0;
-static const double solved_coast_contact_F_w_w_w_w = 0.000999829625927773;
-static const double solved_coast_contact_F_w_w_w_em = 2.0707486901231542e-08;
-static const double solved_coast_contact_F_w_w_theta_d = 2.551778199627501e-05;
-static const double solved_coast_contact_F_w_w_theta_b = -2.551778199627501e-05;
-static const double solved_coast_contact_F_w_em_w_w = 6.39056521159656e-05;
-static const double solved_coast_contact_F_w_em_w_em = 0.000992117826932742;
-static const double solved_coast_contact_F_w_em_theta_d = -0.009610488872101383;
-static const double solved_coast_contact_F_w_em_theta_b = 0.009610488872101385;
-static const double solved_coast_contact_F_theta_d_w_w = -4.973732722508863e-07;
-static const double solved_coast_contact_F_theta_d_w_em = 6.069782445537716e-08;
-static const double solved_coast_contact_F_theta_d_theta_d = 0.000999599984552296;
-static const double solved_coast_contact_F_theta_d_theta_b = 4.00015447704191e-07;
-static const double solved_coast_contact_F_theta_b_theta_b = 0.001;
-static const double solved_coast_contact_Eh_w_w_w_w = 0.9998315266712764;
-static const double solved_coast_contact_Eh_w_w_w_em = 2.0475805144617955e-05;
-static const double solved_coast_contact_Eh_w_w_theta_d = 0.025552622492045044;
-static const double solved_coast_contact_Eh_w_w_theta_b = -0.025552622492045044;
-static const double solved_coast_contact_Eh_w_em_w_w = 0.06319065595006759;
-static const double solved_coast_contact_Eh_w_em_w_em = 0.9922049765744245;
-static const double solved_coast_contact_Eh_w_em_theta_d = -9.623743212691092;
-static const double solved_coast_contact_Eh_w_em_theta_b = 9.623743212691092;
-static const double solved_coast_contact_Eh_theta_d_w_w = -0.0004980523567963424;
-static const double solved_coast_contact_Eh_theta_d_w_em = 6.0781536080154266e-05;
-static const double solved_coast_contact_Eh_theta_d_theta_d = 0.9996995833719463;
-static const double solved_coast_contact_Eh_theta_d_theta_b = 0.0003004166280536893;
-static const double solved_coast_contact_Eh_theta_b_theta_b = 1.0;
-static const double solved_coast_contact_Fh_w_w_w_w = 0.0004999583608145347;
-static const double solved_coast_contact_Fh_w_w_w_em = 5.060545050920358e-09;
-static const double solved_coast_contact_Fh_w_w_theta_d = 6.396578882692443e-06;
-static const double solved_coast_contact_Fh_w_w_theta_b = -6.396578882692443e-06;
-static const double solved_coast_contact_Fh_w_em_w_w = 1.561741572426417e-05;
-static const double solved_coast_contact_Fh_w_em_w_em = 0.0004980732154276062;
-static const double solved_coast_contact_Fh_w_em_theta_d = -0.0024091414788973142;
-static const double solved_coast_contact_Fh_w_em_theta_b = 0.0024091414788973142;
-static const double solved_coast_contact_Fh_theta_d_w_w = -1.2467726899462036e-07;
-static const double solved_coast_contact_Fh_theta_d_w_em = 1.521563039303567e-08;
-static const double solved_coast_contact_Fh_theta_d_theta_d = 0.0004999498974828016;
-static const double solved_coast_contact_Fh_theta_d_theta_b = 5.010251719843405e-08;
-static const double solved_coast_contact_Fh_theta_b_theta_b = 0.0005;
-static const double solved_drive_Phi_theta_d_theta_d = 0.9988015846568583;
-static const double solved_drive_Phi_theta_d_w_em = 0.00012106082093731243;
-static const double solved_drive_Phi_theta_d_w_w = -0.0009920243789589328;
-static const double solved_drive_Phi_w_em_theta_d = -19.16796331507447;
-static const double solved_drive_Phi_w_em_w_em = 0.9838870635129392;
-static const double solved_drive_Phi_w_em_w_w = 0.13067045324457832;
-static const double solved_drive_Phi_w_w_theta_d = 0.050895903036170906;
-static const double solved_drive_Phi_w_w_w_em = 4.23414300511314e-05;
-static const double solved_drive_Phi_w_w_w_w = 0.9996396331875687;
-static const double solved_drive_Gamma_theta_d_T_em = 1.0116304079280523e-06;
-static const double solved_drive_Gamma_theta_d_T_br = 2.686071539557799e-09;
-static const double solved_drive_Gamma_w_em_T_em = 0.016535297115503094;
-static const double solved_drive_Gamma_w_em_T_br = -3.451234145231811e-07;
-static const double solved_drive_Gamma_w_w_T_em = 3.4512341452318113e-07;
-static const double solved_drive_Gamma_w_w_T_br = -5.3995835456557965e-06;
-static const double solved_drive_G_theta_d_w_em = 6.069782447568313e-08;
-static const double solved_drive_G_theta_d_w_w = -4.973712769231343e-07;
-static const double solved_drive_G_w_em_w_em = 0.0009921178269301856;
-static const double solved_drive_G_w_em_w_w = 6.390539896257781e-05;
-static const double solved_drive_G_w_w_w_em = 2.0707404871390866e-08;
-static const double solved_drive_G_w_w_w_w = 0.0009998236172809052;
-static const double solved_drive_L_theta_d_y_em = -0.00446481085781143;
-static const double solved_drive_L_theta_d_y_w = 0.0031163959896571094;
-static const double solved_drive_L_w_em_y_em = 0.8137345666606076;
-static const double solved_drive_L_w_em_y_w = -0.008359569960666302;
-static const double solved_drive_L_w_w_y_em = -0.0002322102766851753;
-static const double solved_drive_L_w_w_y_w = 0.2883187325916938;
-static const double solved_drive_f_w_w = 0.2209501838103807;
-static const double solved_coast_Phi_theta_d_theta_d = 0.9988015846568583;
-static const double solved_coast_Phi_theta_d_w_em = 0.00012106082093731243;
-static const double solved_coast_Phi_theta_d_w_w = -0.0009920243789589328;
-static const double solved_coast_Phi_w_em_theta_d = -19.16796331507447;
-static const double solved_coast_Phi_w_em_w_em = 0.9838870635129392;
-static const double solved_coast_Phi_w_em_w_w = 0.13067045324457832;
-static const double solved_coast_Phi_w_w_theta_d = 0.050895903036170906;
-static const double solved_coast_Phi_w_w_w_em = 4.23414300511314e-05;
-static const double solved_coast_Phi_w_w_w_w = 0.9996396331875687;
-static const double solved_coast_Gamma_theta_d_T_em = 1.0116304079280523e-06;
-static const double solved_coast_Gamma_theta_d_T_br = 2.686071539557799e-09;
-static const double solved_coast_Gamma_w_em_T_em = 0.016535297115503094;
-static const double solved_coast_Gamma_w_em_T_br = -3.451234145231811e-07;
-static const double solved_coast_Gamma_w_w_T_em = 3.4512341452318113e-07;
-static const double solved_coast_Gamma_w_w_T_br = -5.3995835456557965e-06;
-static const double solved_coast_G_theta_d_w_em = 6.069782447568313e-08;
-static const double solved_coast_G_theta_d_w_w = -4.973712769231343e-07;
-static const double solved_coast_G_w_em_w_em = 0.0009921178269301856;
-static const double solved_coast_G_w_em_w_w = 6.390539896257781e-05;
-static const double solved_coast_G_w_w_w_em = 2.0707404871390866e-08;
-static const double solved_coast_G_w_w_w_w = 0.0009998236172809052;
-static const double solved_coast_L_theta_d_y_em = -0.00446481085781143;
-static const double solved_coast_L_theta_d_y_w = 0.0031163959896571094;
-static const double solved_coast_L_w_em_y_em = 0.8137345666606076;
-static const double solved_coast_L_w_em_y_w = -0.008359569960666302;
-static const double solved_coast_L_w_w_y_em = -0.0002322102766851753;
-static const double solved_coast_L_w_w_y_w = 0.2883187325916938;
-static const double solved_coast_f_w_w = 0.2209501838103807;
-static const double solved_stamp_J_em = 0.06;
+const char leaf_Version[] = leaf_DIGEST;
 
-const leaf_Cal leaf_default_cal = {
+leaf_CALIBRATION const volatile leaf_Cal leaf_default_cal = {
     .J_em = 0.06,
+    .solved = {
+        .drive_contact_A_w_w_w_w = -0.3254158130030241,
+        .drive_contact_A_w_w_w_em = 0.03954601850349461,
+        .drive_contact_A_w_w_theta_d = 51.30509301553956,
+        .drive_contact_A_w_w_theta_b = -51.30509301553956,
+        .drive_contact_A_w_em_w_w = 122.04349630208208,
+        .drive_contact_A_w_em_w_em = -15.061281656302986,
+        .drive_contact_A_w_em_theta_d = -19323.553581162996,
+        .drive_contact_A_w_em_theta_b = 19323.553581162996,
+        .drive_contact_A_theta_d_w_w = -1.0,
+        .drive_contact_A_theta_d_w_em = 0.12204349630208207,
+        .drive_contact_E_w_w_w_w = 0.9996516490615189,
+        .drive_contact_E_w_w_w_em = 4.2341678927367884e-05,
+        .drive_contact_E_w_w_theta_d = 0.050896209725249345,
+        .drive_contact_E_w_w_theta_b = -0.050896209725249345,
+        .drive_contact_E_w_em_w_w = 0.13067122130485836,
+        .drive_contact_E_w_em_w_em = 0.9838870635233042,
+        .drive_contact_E_w_em_theta_d = -19.16796330213581,
+        .drive_contact_E_w_em_theta_b = 19.167963302135806,
+        .drive_contact_E_theta_d_w_w = -0.000992030356710076,
+        .drive_contact_E_theta_d_w_em = 0.00012106082085559457,
+        .drive_contact_E_theta_d_theta_d = 0.9988015845548802,
+        .drive_contact_E_theta_d_theta_b = 0.0011984154451197813,
+        .drive_contact_E_theta_b_theta_b = 1.0,
+        .drive_contact_F_w_w_w_w = 0.000999829625927773,
+        .drive_contact_F_w_w_w_em = 2.0707486901231542e-08,
+        .drive_contact_F_w_w_theta_d = 2.551778199627501e-05,
+        .drive_contact_F_w_w_theta_b = -2.551778199627501e-05,
+        .drive_contact_F_w_em_w_w = 6.39056521159656e-05,
+        .drive_contact_F_w_em_w_em = 0.000992117826932742,
+        .drive_contact_F_w_em_theta_d = -0.009610488872101383,
+        .drive_contact_F_w_em_theta_b = 0.009610488872101385,
+        .drive_contact_F_theta_d_w_w = -4.973732722508863e-07,
+        .drive_contact_F_theta_d_w_em = 6.069782445537716e-08,
+        .drive_contact_F_theta_d_theta_d = 0.000999599984552296,
+        .drive_contact_F_theta_d_theta_b = 4.00015447704191e-07,
+        .drive_contact_F_theta_b_theta_b = 0.001,
+        .drive_contact_Eh_w_w_w_w = 0.9998315266712764,
+        .drive_contact_Eh_w_w_w_em = 2.0475805144617955e-05,
+        .drive_contact_Eh_w_w_theta_d = 0.025552622492045044,
+        .drive_contact_Eh_w_w_theta_b = -0.025552622492045044,
+        .drive_contact_Eh_w_em_w_w = 0.06319065595006759,
+        .drive_contact_Eh_w_em_w_em = 0.9922049765744245,
+        .drive_contact_Eh_w_em_theta_d = -9.623743212691092,
+        .drive_contact_Eh_w_em_theta_b = 9.623743212691092,
+        .drive_contact_Eh_theta_d_w_w = -0.0004980523567963424,
+        .drive_contact_Eh_theta_d_w_em = 6.0781536080154266e-05,
+        .drive_contact_Eh_theta_d_theta_d = 0.9996995833719463,
+        .drive_contact_Eh_theta_d_theta_b = 0.0003004166280536893,
+        .drive_contact_Eh_theta_b_theta_b = 1.0,
+        .drive_contact_Fh_w_w_w_w = 0.0004999583608145347,
+        .drive_contact_Fh_w_w_w_em = 5.060545050920358e-09,
+        .drive_contact_Fh_w_w_theta_d = 6.396578882692443e-06,
+        .drive_contact_Fh_w_w_theta_b = -6.396578882692443e-06,
+        .drive_contact_Fh_w_em_w_w = 1.561741572426417e-05,
+        .drive_contact_Fh_w_em_w_em = 0.0004980732154276062,
+        .drive_contact_Fh_w_em_theta_d = -0.0024091414788973142,
+        .drive_contact_Fh_w_em_theta_b = 0.0024091414788973142,
+        .drive_contact_Fh_theta_d_w_w = -1.2467726899462036e-07,
+        .drive_contact_Fh_theta_d_w_em = 1.521563039303567e-08,
+        .drive_contact_Fh_theta_d_theta_d = 0.0004999498974828016,
+        .drive_contact_Fh_theta_d_theta_b = 5.010251719843405e-08,
+        .drive_contact_Fh_theta_b_theta_b = 0.0005,
+        .no_contact_A_w_w_w_w = -0.0013836465890899815,
+        .no_contact_A_w_em_w_em = -0.16666666666666669,
+        .no_contact_A_theta_d_w_w = -1.0,
+        .no_contact_A_theta_d_w_em = 0.12204349630208207,
+        .no_contact_A_theta_b_w_w = -1.0,
+        .no_contact_A_theta_b_w_em = 0.12204349630208207,
+        .no_contact_A_theta_b_theta_d = 158.33333333333334,
+        .no_contact_A_theta_b_theta_b = -158.33333333333334,
+        .no_contact_E_w_w_w_w = 0.9999986163543682,
+        .no_contact_E_w_em_w_em = 0.9998333472214507,
+        .no_contact_E_theta_d_w_w = -0.0009999993081770246,
+        .no_contact_E_theta_d_w_em = 0.0001220333265757162,
+        .no_contact_E_theta_d_theta_d = 1.0,
+        .no_contact_E_theta_b_w_w = -0.0009999993081770246,
+        .no_contact_E_theta_b_w_em = 0.0001220333265757162,
+        .no_contact_E_theta_b_theta_d = 0.146434787194679,
+        .no_contact_E_theta_b_theta_b = 0.8535652128053209,
+        .no_contact_F_w_w_w_w = 0.0009999993081770246,
+        .no_contact_F_w_em_w_em = 0.0009999166712961033,
+        .no_contact_F_theta_d_w_w = -4.999997693923149e-07,
+        .no_contact_F_theta_d_w_em = 6.101835819517088e-08,
+        .no_contact_F_theta_d_theta_d = 0.001,
+        .no_contact_F_theta_b_w_w = -4.999997693923149e-07,
+        .no_contact_F_theta_b_w_em = 6.101835819517088e-08,
+        .no_contact_F_theta_b_theta_d = 7.514871245465897e-05,
+        .no_contact_F_theta_b_theta_b = 0.0009248512875453411,
+        .no_contact_Eh_w_w_w_w = 0.9999993081769447,
+        .no_contact_Eh_w_em_w_em = 0.9999166701387925,
+        .no_contact_Eh_theta_d_w_w = -0.0004999998270442163,
+        .no_contact_Eh_theta_d_w_em = 6.101920564882696e-05,
+        .no_contact_Eh_theta_d_theta_d = 1.0,
+        .no_contact_Eh_theta_b_w_w = -0.0004999998270442163,
+        .no_contact_Eh_theta_b_w_em = 6.101920564882696e-05,
+        .no_contact_Eh_theta_b_theta_d = 0.07611406937581251,
+        .no_contact_Eh_theta_b_theta_b = 0.9238859306241876,
+        .no_contact_Fh_w_w_w_w = 0.0004999998270442163,
+        .no_contact_Fh_w_em_w_em = 0.0004999791672453583,
+        .no_contact_Fh_theta_d_w_w = -1.2499997117403438e-07,
+        .no_contact_Fh_theta_d_w_em = 1.525501328444855e-08,
+        .no_contact_Fh_theta_d_theta_d = 0.0005,
+        .no_contact_Fh_theta_b_w_w = -1.2499997117403438e-07,
+        .no_contact_Fh_theta_b_w_em = 1.525501328444855e-08,
+        .no_contact_Fh_theta_b_theta_d = 1.9279561836973697e-05,
+        .no_contact_Fh_theta_b_theta_b = 0.0004807204381630263,
+        .coast_contact_A_w_w_w_w = -0.3254158130030241,
+        .coast_contact_A_w_w_w_em = 0.03954601850349461,
+        .coast_contact_A_w_w_theta_d = 51.30509301553956,
+        .coast_contact_A_w_w_theta_b = -51.30509301553956,
+        .coast_contact_A_w_em_w_w = 122.04349630208208,
+        .coast_contact_A_w_em_w_em = -15.061281656302986,
+        .coast_contact_A_w_em_theta_d = -19323.553581162996,
+        .coast_contact_A_w_em_theta_b = 19323.553581162996,
+        .coast_contact_A_theta_d_w_w = -1.0,
+        .coast_contact_A_theta_d_w_em = 0.12204349630208207,
+        .coast_contact_E_w_w_w_w = 0.9996516490615189,
+        .coast_contact_E_w_w_w_em = 4.2341678927367884e-05,
+        .coast_contact_E_w_w_theta_d = 0.050896209725249345,
+        .coast_contact_E_w_w_theta_b = -0.050896209725249345,
+        .coast_contact_E_w_em_w_w = 0.13067122130485836,
+        .coast_contact_E_w_em_w_em = 0.9838870635233042,
+        .coast_contact_E_w_em_theta_d = -19.16796330213581,
+        .coast_contact_E_w_em_theta_b = 19.167963302135806,
+        .coast_contact_E_theta_d_w_w = -0.000992030356710076,
+        .coast_contact_E_theta_d_w_em = 0.00012106082085559457,
+        .coast_contact_E_theta_d_theta_d = 0.9988015845548802,
+        .coast_contact_E_theta_d_theta_b = 0.0011984154451197813,
+        .coast_contact_E_theta_b_theta_b = 1.0,
+        .coast_contact_F_w_w_w_w = 0.000999829625927773,
+        .coast_contact_F_w_w_w_em = 2.0707486901231542e-08,
+        .coast_contact_F_w_w_theta_d = 2.551778199627501e-05,
+        .coast_contact_F_w_w_theta_b = -2.551778199627501e-05,
+        .coast_contact_F_w_em_w_w = 6.39056521159656e-05,
+        .coast_contact_F_w_em_w_em = 0.000992117826932742,
+        .coast_contact_F_w_em_theta_d = -0.009610488872101383,
+        .coast_contact_F_w_em_theta_b = 0.009610488872101385,
+        .coast_contact_F_theta_d_w_w = -4.973732722508863e-07,
+        .coast_contact_F_theta_d_w_em = 6.069782445537716e-08,
+        .coast_contact_F_theta_d_theta_d = 0.000999599984552296,
+        .coast_contact_F_theta_d_theta_b = 4.00015447704191e-07,
+        .coast_contact_F_theta_b_theta_b = 0.001,
+        .coast_contact_Eh_w_w_w_w = 0.9998315266712764,
+        .coast_contact_Eh_w_w_w_em = 2.0475805144617955e-05,
+        .coast_contact_Eh_w_w_theta_d = 0.025552622492045044,
+        .coast_contact_Eh_w_w_theta_b = -0.025552622492045044,
+        .coast_contact_Eh_w_em_w_w = 0.06319065595006759,
+        .coast_contact_Eh_w_em_w_em = 0.9922049765744245,
+        .coast_contact_Eh_w_em_theta_d = -9.623743212691092,
+        .coast_contact_Eh_w_em_theta_b = 9.623743212691092,
+        .coast_contact_Eh_theta_d_w_w = -0.0004980523567963424,
+        .coast_contact_Eh_theta_d_w_em = 6.0781536080154266e-05,
+        .coast_contact_Eh_theta_d_theta_d = 0.9996995833719463,
+        .coast_contact_Eh_theta_d_theta_b = 0.0003004166280536893,
+        .coast_contact_Eh_theta_b_theta_b = 1.0,
+        .coast_contact_Fh_w_w_w_w = 0.0004999583608145347,
+        .coast_contact_Fh_w_w_w_em = 5.060545050920358e-09,
+        .coast_contact_Fh_w_w_theta_d = 6.396578882692443e-06,
+        .coast_contact_Fh_w_w_theta_b = -6.396578882692443e-06,
+        .coast_contact_Fh_w_em_w_w = 1.561741572426417e-05,
+        .coast_contact_Fh_w_em_w_em = 0.0004980732154276062,
+        .coast_contact_Fh_w_em_theta_d = -0.0024091414788973142,
+        .coast_contact_Fh_w_em_theta_b = 0.0024091414788973142,
+        .coast_contact_Fh_theta_d_w_w = -1.2467726899462036e-07,
+        .coast_contact_Fh_theta_d_w_em = 1.521563039303567e-08,
+        .coast_contact_Fh_theta_d_theta_d = 0.0004999498974828016,
+        .coast_contact_Fh_theta_d_theta_b = 5.010251719843405e-08,
+        .coast_contact_Fh_theta_b_theta_b = 0.0005,
+        .drive_Phi_theta_d_theta_d = 0.9988015846568583,
+        .drive_Phi_theta_d_w_em = 0.00012106082093731243,
+        .drive_Phi_theta_d_w_w = -0.0009920243789589328,
+        .drive_Phi_w_em_theta_d = -19.16796331507447,
+        .drive_Phi_w_em_w_em = 0.9838870635129392,
+        .drive_Phi_w_em_w_w = 0.13067045324457832,
+        .drive_Phi_w_w_theta_d = 0.050895903036170906,
+        .drive_Phi_w_w_w_em = 4.23414300511314e-05,
+        .drive_Phi_w_w_w_w = 0.9996396331875687,
+        .drive_Gamma_theta_d_T_em = 1.0116304079280523e-06,
+        .drive_Gamma_theta_d_T_br = 2.686071539557799e-09,
+        .drive_Gamma_w_em_T_em = 0.016535297115503094,
+        .drive_Gamma_w_em_T_br = -3.451234145231811e-07,
+        .drive_Gamma_w_w_T_em = 3.4512341452318113e-07,
+        .drive_Gamma_w_w_T_br = -5.3995835456557965e-06,
+        .drive_G_theta_d_w_em = 6.069782447568313e-08,
+        .drive_G_theta_d_w_w = -4.973712769231343e-07,
+        .drive_G_w_em_w_em = 0.0009921178269301856,
+        .drive_G_w_em_w_w = 6.390539896257781e-05,
+        .drive_G_w_w_w_em = 2.0707404871390866e-08,
+        .drive_G_w_w_w_w = 0.0009998236172809052,
+        .drive_L_theta_d_y_em = -0.00446481085781143,
+        .drive_L_theta_d_y_w = 0.0031163959896571094,
+        .drive_L_w_em_y_em = 0.8137345666606076,
+        .drive_L_w_em_y_w = -0.008359569960666302,
+        .drive_L_w_w_y_em = -0.0002322102766851753,
+        .drive_L_w_w_y_w = 0.2883187325916938,
+        .drive_f_w_w = 0.2209501838103807,
+        .coast_Phi_theta_d_theta_d = 0.9988015846568583,
+        .coast_Phi_theta_d_w_em = 0.00012106082093731243,
+        .coast_Phi_theta_d_w_w = -0.0009920243789589328,
+        .coast_Phi_w_em_theta_d = -19.16796331507447,
+        .coast_Phi_w_em_w_em = 0.9838870635129392,
+        .coast_Phi_w_em_w_w = 0.13067045324457832,
+        .coast_Phi_w_w_theta_d = 0.050895903036170906,
+        .coast_Phi_w_w_w_em = 4.23414300511314e-05,
+        .coast_Phi_w_w_w_w = 0.9996396331875687,
+        .coast_Gamma_theta_d_T_em = 1.0116304079280523e-06,
+        .coast_Gamma_theta_d_T_br = 2.686071539557799e-09,
+        .coast_Gamma_w_em_T_em = 0.016535297115503094,
+        .coast_Gamma_w_em_T_br = -3.451234145231811e-07,
+        .coast_Gamma_w_w_T_em = 3.4512341452318113e-07,
+        .coast_Gamma_w_w_T_br = -5.3995835456557965e-06,
+        .coast_G_theta_d_w_em = 6.069782447568313e-08,
+        .coast_G_theta_d_w_w = -4.973712769231343e-07,
+        .coast_G_w_em_w_em = 0.0009921178269301856,
+        .coast_G_w_em_w_w = 6.390539896257781e-05,
+        .coast_G_w_w_w_em = 2.0707404871390866e-08,
+        .coast_G_w_w_w_w = 0.0009998236172809052,
+        .coast_L_theta_d_y_em = -0.00446481085781143,
+        .coast_L_theta_d_y_w = 0.0031163959896571094,
+        .coast_L_w_em_y_em = 0.8137345666606076,
+        .coast_L_w_em_y_w = -0.008359569960666302,
+        .coast_L_w_w_y_em = -0.0002322102766851753,
+        .coast_L_w_w_y_w = 0.2883187325916938,
+        .coast_f_w_w = 0.2209501838103807,
+        .stamp_J_em = 0.06,
+    },
 };
 
 /* Values that live within one step */
@@ -458,33 +461,36 @@ static inline void guards_coast_contact(Work *work)
     work->guard_0 = at_w_free > 0.0; /* driveline modes.coast_contact.transitions.no_contact.when */
 }
 
-static inline void series_drive_contact(const leaf_Self *self, Work *work)
+static inline void series_drive_contact(const leaf_Self *self, const volatile leaf_Cal *cal,
+    Work *work)
 {
     work->order = 1.0;
-    work->series_w_w[0] = (solved_drive_contact_A_w_w_w_w * self->state.w_w)
-        + (solved_drive_contact_A_w_w_w_em * self->state.w_em)
-        + (solved_drive_contact_A_w_w_theta_d * self->state.theta_d)
-        + (solved_drive_contact_A_w_w_theta_b * self->state.theta_b) + work->pull_w_w;
-    work->series_w_em[0] = (solved_drive_contact_A_w_em_w_w * self->state.w_w)
-        + (solved_drive_contact_A_w_em_w_em * self->state.w_em)
-        + (solved_drive_contact_A_w_em_theta_d * self->state.theta_d)
-        + (solved_drive_contact_A_w_em_theta_b * self->state.theta_b) + work->pull_w_em;
-    work->series_theta_d[0] = (solved_drive_contact_A_theta_d_w_w * self->state.w_w)
-        + (solved_drive_contact_A_theta_d_w_em * self->state.w_em) + work->pull_theta_d;
+    work->series_w_w[0] = (cal->solved.drive_contact_A_w_w_w_w * self->state.w_w)
+        + (cal->solved.drive_contact_A_w_w_w_em * self->state.w_em)
+        + (cal->solved.drive_contact_A_w_w_theta_d * self->state.theta_d)
+        + (cal->solved.drive_contact_A_w_w_theta_b * self->state.theta_b) + work->pull_w_w;
+    work->series_w_em[0] = (cal->solved.drive_contact_A_w_em_w_w * self->state.w_w)
+        + (cal->solved.drive_contact_A_w_em_w_em * self->state.w_em)
+        + (cal->solved.drive_contact_A_w_em_theta_d * self->state.theta_d)
+        + (cal->solved.drive_contact_A_w_em_theta_b * self->state.theta_b) + work->pull_w_em;
+    work->series_theta_d[0] = (cal->solved.drive_contact_A_theta_d_w_w * self->state.w_w)
+        + (cal->solved.drive_contact_A_theta_d_w_em * self->state.w_em) + work->pull_theta_d;
     work->series_theta_b[0] = work->pull_theta_b;
     for (int32_t term = 0; term < 23; term++) {
         work->order = work->order + 1.0;
-        work->series_w_w[term + 1] = ((solved_drive_contact_A_w_w_w_w * work->series_w_w[term])
-            + (solved_drive_contact_A_w_w_w_em * work->series_w_em[term])
-            + (solved_drive_contact_A_w_w_theta_d * work->series_theta_d[term])
-            + (solved_drive_contact_A_w_w_theta_b * work->series_theta_b[term])) / work->order;
-        work->series_w_em[term + 1] = ((solved_drive_contact_A_w_em_w_w * work->series_w_w[term])
-            + (solved_drive_contact_A_w_em_w_em * work->series_w_em[term])
-            + (solved_drive_contact_A_w_em_theta_d * work->series_theta_d[term])
-            + (solved_drive_contact_A_w_em_theta_b * work->series_theta_b[term])) / work->order;
+        work->series_w_w[term + 1] =
+            ((cal->solved.drive_contact_A_w_w_w_w * work->series_w_w[term])
+            + (cal->solved.drive_contact_A_w_w_w_em * work->series_w_em[term])
+            + (cal->solved.drive_contact_A_w_w_theta_d * work->series_theta_d[term])
+            + (cal->solved.drive_contact_A_w_w_theta_b * work->series_theta_b[term])) / work->order;
+        work->series_w_em[term + 1] =
+            ((cal->solved.drive_contact_A_w_em_w_w * work->series_w_w[term])
+            + (cal->solved.drive_contact_A_w_em_w_em * work->series_w_em[term])
+            + (cal->solved.drive_contact_A_w_em_theta_d * work->series_theta_d[term])
+            + (cal->solved.drive_contact_A_w_em_theta_b * work->series_theta_b[term])) / work->order;
         work->series_theta_d[term + 1] =
-            ((solved_drive_contact_A_theta_d_w_w * work->series_w_w[term])
-            + (solved_drive_contact_A_theta_d_w_em * work->series_w_em[term])) / work->order;
+            ((cal->solved.drive_contact_A_theta_d_w_w * work->series_w_w[term])
+            + (cal->solved.drive_contact_A_theta_d_w_em * work->series_w_em[term])) / work->order;
         work->series_theta_b[term + 1] = 0.0 / work->order;
     }
 }
@@ -507,97 +513,100 @@ static inline void point(const leaf_Self *self, Work *work)
     work->at_theta_b = self->state.theta_b + (work->s * work->sum_theta_b);
 }
 
-static inline void step_drive_contact(const leaf_Self *self, Work *work)
+static inline void step_drive_contact(const leaf_Self *self, const volatile leaf_Cal *cal,
+    Work *work)
 {
     work->at_w_w = self->state.w_w;
     work->at_w_em = self->state.w_em;
     work->at_theta_d = self->state.theta_d;
     work->at_theta_b = self->state.theta_b;
     rates_drive_contact(self, work);
-    work->pull_w_w = work->rate_w_w - ((solved_drive_contact_A_w_w_w_w * work->at_w_w)
-        + (solved_drive_contact_A_w_w_w_em * work->at_w_em)
-        + (solved_drive_contact_A_w_w_theta_d * work->at_theta_d)
-        + (solved_drive_contact_A_w_w_theta_b * work->at_theta_b));
-    work->pull_w_em = work->rate_w_em - ((solved_drive_contact_A_w_em_w_w * work->at_w_w)
-        + (solved_drive_contact_A_w_em_w_em * work->at_w_em)
-        + (solved_drive_contact_A_w_em_theta_d * work->at_theta_d)
-        + (solved_drive_contact_A_w_em_theta_b * work->at_theta_b));
-    work->pull_theta_d = work->rate_theta_d - ((solved_drive_contact_A_theta_d_w_w * work->at_w_w)
-        + (solved_drive_contact_A_theta_d_w_em * work->at_w_em));
+    work->pull_w_w = work->rate_w_w - ((cal->solved.drive_contact_A_w_w_w_w * work->at_w_w)
+        + (cal->solved.drive_contact_A_w_w_w_em * work->at_w_em)
+        + (cal->solved.drive_contact_A_w_w_theta_d * work->at_theta_d)
+        + (cal->solved.drive_contact_A_w_w_theta_b * work->at_theta_b));
+    work->pull_w_em = work->rate_w_em - ((cal->solved.drive_contact_A_w_em_w_w * work->at_w_w)
+        + (cal->solved.drive_contact_A_w_em_w_em * work->at_w_em)
+        + (cal->solved.drive_contact_A_w_em_theta_d * work->at_theta_d)
+        + (cal->solved.drive_contact_A_w_em_theta_b * work->at_theta_b));
+    work->pull_theta_d =
+        work->rate_theta_d - ((cal->solved.drive_contact_A_theta_d_w_w * work->at_w_w)
+        + (cal->solved.drive_contact_A_theta_d_w_em * work->at_w_em));
     work->pull_theta_b = work->rate_theta_b;
     if (work->h == 0.001) {
-        work->at_w_w = (solved_drive_contact_Eh_w_w_w_w * self->state.w_w)
-            + (solved_drive_contact_Eh_w_w_w_em * self->state.w_em)
-            + (solved_drive_contact_Eh_w_w_theta_d * self->state.theta_d)
-            + (solved_drive_contact_Eh_w_w_theta_b * self->state.theta_b)
-            + (solved_drive_contact_Fh_w_w_w_w * work->pull_w_w)
-            + (solved_drive_contact_Fh_w_w_w_em * work->pull_w_em)
-            + (solved_drive_contact_Fh_w_w_theta_d * work->pull_theta_d)
-            + (solved_drive_contact_Fh_w_w_theta_b * work->pull_theta_b);
-        work->at_w_em = (solved_drive_contact_Eh_w_em_w_w * self->state.w_w)
-            + (solved_drive_contact_Eh_w_em_w_em * self->state.w_em)
-            + (solved_drive_contact_Eh_w_em_theta_d * self->state.theta_d)
-            + (solved_drive_contact_Eh_w_em_theta_b * self->state.theta_b)
-            + (solved_drive_contact_Fh_w_em_w_w * work->pull_w_w)
-            + (solved_drive_contact_Fh_w_em_w_em * work->pull_w_em)
-            + (solved_drive_contact_Fh_w_em_theta_d * work->pull_theta_d)
-            + (solved_drive_contact_Fh_w_em_theta_b * work->pull_theta_b);
-        work->at_theta_d = (solved_drive_contact_Eh_theta_d_w_w * self->state.w_w)
-            + (solved_drive_contact_Eh_theta_d_w_em * self->state.w_em)
-            + (solved_drive_contact_Eh_theta_d_theta_d * self->state.theta_d)
-            + (solved_drive_contact_Eh_theta_d_theta_b * self->state.theta_b)
-            + (solved_drive_contact_Fh_theta_d_w_w * work->pull_w_w)
-            + (solved_drive_contact_Fh_theta_d_w_em * work->pull_w_em)
-            + (solved_drive_contact_Fh_theta_d_theta_d * work->pull_theta_d)
-            + (solved_drive_contact_Fh_theta_d_theta_b * work->pull_theta_b);
-        work->at_theta_b = (solved_drive_contact_Eh_theta_b_theta_b * self->state.theta_b)
-            + (solved_drive_contact_Fh_theta_b_theta_b * work->pull_theta_b);
+        work->at_w_w = (cal->solved.drive_contact_Eh_w_w_w_w * self->state.w_w)
+            + (cal->solved.drive_contact_Eh_w_w_w_em * self->state.w_em)
+            + (cal->solved.drive_contact_Eh_w_w_theta_d * self->state.theta_d)
+            + (cal->solved.drive_contact_Eh_w_w_theta_b * self->state.theta_b)
+            + (cal->solved.drive_contact_Fh_w_w_w_w * work->pull_w_w)
+            + (cal->solved.drive_contact_Fh_w_w_w_em * work->pull_w_em)
+            + (cal->solved.drive_contact_Fh_w_w_theta_d * work->pull_theta_d)
+            + (cal->solved.drive_contact_Fh_w_w_theta_b * work->pull_theta_b);
+        work->at_w_em = (cal->solved.drive_contact_Eh_w_em_w_w * self->state.w_w)
+            + (cal->solved.drive_contact_Eh_w_em_w_em * self->state.w_em)
+            + (cal->solved.drive_contact_Eh_w_em_theta_d * self->state.theta_d)
+            + (cal->solved.drive_contact_Eh_w_em_theta_b * self->state.theta_b)
+            + (cal->solved.drive_contact_Fh_w_em_w_w * work->pull_w_w)
+            + (cal->solved.drive_contact_Fh_w_em_w_em * work->pull_w_em)
+            + (cal->solved.drive_contact_Fh_w_em_theta_d * work->pull_theta_d)
+            + (cal->solved.drive_contact_Fh_w_em_theta_b * work->pull_theta_b);
+        work->at_theta_d = (cal->solved.drive_contact_Eh_theta_d_w_w * self->state.w_w)
+            + (cal->solved.drive_contact_Eh_theta_d_w_em * self->state.w_em)
+            + (cal->solved.drive_contact_Eh_theta_d_theta_d * self->state.theta_d)
+            + (cal->solved.drive_contact_Eh_theta_d_theta_b * self->state.theta_b)
+            + (cal->solved.drive_contact_Fh_theta_d_w_w * work->pull_w_w)
+            + (cal->solved.drive_contact_Fh_theta_d_w_em * work->pull_w_em)
+            + (cal->solved.drive_contact_Fh_theta_d_theta_d * work->pull_theta_d)
+            + (cal->solved.drive_contact_Fh_theta_d_theta_b * work->pull_theta_b);
+        work->at_theta_b = (cal->solved.drive_contact_Eh_theta_b_theta_b * self->state.theta_b)
+            + (cal->solved.drive_contact_Fh_theta_b_theta_b * work->pull_theta_b);
     } else {
-        series_drive_contact(self, work);
+        series_drive_contact(self, cal, work);
         work->s = 0.5 * work->h;
         point(self, work);
     }
     rates_drive_contact(self, work);
-    work->pull_w_w = work->rate_w_w - ((solved_drive_contact_A_w_w_w_w * work->at_w_w)
-        + (solved_drive_contact_A_w_w_w_em * work->at_w_em)
-        + (solved_drive_contact_A_w_w_theta_d * work->at_theta_d)
-        + (solved_drive_contact_A_w_w_theta_b * work->at_theta_b));
-    work->pull_w_em = work->rate_w_em - ((solved_drive_contact_A_w_em_w_w * work->at_w_w)
-        + (solved_drive_contact_A_w_em_w_em * work->at_w_em)
-        + (solved_drive_contact_A_w_em_theta_d * work->at_theta_d)
-        + (solved_drive_contact_A_w_em_theta_b * work->at_theta_b));
-    work->pull_theta_d = work->rate_theta_d - ((solved_drive_contact_A_theta_d_w_w * work->at_w_w)
-        + (solved_drive_contact_A_theta_d_w_em * work->at_w_em));
+    work->pull_w_w = work->rate_w_w - ((cal->solved.drive_contact_A_w_w_w_w * work->at_w_w)
+        + (cal->solved.drive_contact_A_w_w_w_em * work->at_w_em)
+        + (cal->solved.drive_contact_A_w_w_theta_d * work->at_theta_d)
+        + (cal->solved.drive_contact_A_w_w_theta_b * work->at_theta_b));
+    work->pull_w_em = work->rate_w_em - ((cal->solved.drive_contact_A_w_em_w_w * work->at_w_w)
+        + (cal->solved.drive_contact_A_w_em_w_em * work->at_w_em)
+        + (cal->solved.drive_contact_A_w_em_theta_d * work->at_theta_d)
+        + (cal->solved.drive_contact_A_w_em_theta_b * work->at_theta_b));
+    work->pull_theta_d =
+        work->rate_theta_d - ((cal->solved.drive_contact_A_theta_d_w_w * work->at_w_w)
+        + (cal->solved.drive_contact_A_theta_d_w_em * work->at_w_em));
     work->pull_theta_b = work->rate_theta_b;
     if (work->h == 0.001) {
-        work->end_w_w = (solved_drive_contact_E_w_w_w_w * self->state.w_w)
-            + (solved_drive_contact_E_w_w_w_em * self->state.w_em)
-            + (solved_drive_contact_E_w_w_theta_d * self->state.theta_d)
-            + (solved_drive_contact_E_w_w_theta_b * self->state.theta_b)
-            + (solved_drive_contact_F_w_w_w_w * work->pull_w_w)
-            + (solved_drive_contact_F_w_w_w_em * work->pull_w_em)
-            + (solved_drive_contact_F_w_w_theta_d * work->pull_theta_d)
-            + (solved_drive_contact_F_w_w_theta_b * work->pull_theta_b);
-        work->end_w_em = (solved_drive_contact_E_w_em_w_w * self->state.w_w)
-            + (solved_drive_contact_E_w_em_w_em * self->state.w_em)
-            + (solved_drive_contact_E_w_em_theta_d * self->state.theta_d)
-            + (solved_drive_contact_E_w_em_theta_b * self->state.theta_b)
-            + (solved_drive_contact_F_w_em_w_w * work->pull_w_w)
-            + (solved_drive_contact_F_w_em_w_em * work->pull_w_em)
-            + (solved_drive_contact_F_w_em_theta_d * work->pull_theta_d)
-            + (solved_drive_contact_F_w_em_theta_b * work->pull_theta_b);
-        work->end_theta_d = (solved_drive_contact_E_theta_d_w_w * self->state.w_w)
-            + (solved_drive_contact_E_theta_d_w_em * self->state.w_em)
-            + (solved_drive_contact_E_theta_d_theta_d * self->state.theta_d)
-            + (solved_drive_contact_E_theta_d_theta_b * self->state.theta_b)
-            + (solved_drive_contact_F_theta_d_w_w * work->pull_w_w)
-            + (solved_drive_contact_F_theta_d_w_em * work->pull_w_em)
-            + (solved_drive_contact_F_theta_d_theta_d * work->pull_theta_d)
-            + (solved_drive_contact_F_theta_d_theta_b * work->pull_theta_b);
-        work->end_theta_b = (solved_drive_contact_E_theta_b_theta_b * self->state.theta_b)
-            + (solved_drive_contact_F_theta_b_theta_b * work->pull_theta_b);
+        work->end_w_w = (cal->solved.drive_contact_E_w_w_w_w * self->state.w_w)
+            + (cal->solved.drive_contact_E_w_w_w_em * self->state.w_em)
+            + (cal->solved.drive_contact_E_w_w_theta_d * self->state.theta_d)
+            + (cal->solved.drive_contact_E_w_w_theta_b * self->state.theta_b)
+            + (cal->solved.drive_contact_F_w_w_w_w * work->pull_w_w)
+            + (cal->solved.drive_contact_F_w_w_w_em * work->pull_w_em)
+            + (cal->solved.drive_contact_F_w_w_theta_d * work->pull_theta_d)
+            + (cal->solved.drive_contact_F_w_w_theta_b * work->pull_theta_b);
+        work->end_w_em = (cal->solved.drive_contact_E_w_em_w_w * self->state.w_w)
+            + (cal->solved.drive_contact_E_w_em_w_em * self->state.w_em)
+            + (cal->solved.drive_contact_E_w_em_theta_d * self->state.theta_d)
+            + (cal->solved.drive_contact_E_w_em_theta_b * self->state.theta_b)
+            + (cal->solved.drive_contact_F_w_em_w_w * work->pull_w_w)
+            + (cal->solved.drive_contact_F_w_em_w_em * work->pull_w_em)
+            + (cal->solved.drive_contact_F_w_em_theta_d * work->pull_theta_d)
+            + (cal->solved.drive_contact_F_w_em_theta_b * work->pull_theta_b);
+        work->end_theta_d = (cal->solved.drive_contact_E_theta_d_w_w * self->state.w_w)
+            + (cal->solved.drive_contact_E_theta_d_w_em * self->state.w_em)
+            + (cal->solved.drive_contact_E_theta_d_theta_d * self->state.theta_d)
+            + (cal->solved.drive_contact_E_theta_d_theta_b * self->state.theta_b)
+            + (cal->solved.drive_contact_F_theta_d_w_w * work->pull_w_w)
+            + (cal->solved.drive_contact_F_theta_d_w_em * work->pull_w_em)
+            + (cal->solved.drive_contact_F_theta_d_theta_d * work->pull_theta_d)
+            + (cal->solved.drive_contact_F_theta_d_theta_b * work->pull_theta_b);
+        work->end_theta_b = (cal->solved.drive_contact_E_theta_b_theta_b * self->state.theta_b)
+            + (cal->solved.drive_contact_F_theta_b_theta_b * work->pull_theta_b);
     } else {
-        series_drive_contact(self, work);
+        series_drive_contact(self, cal, work);
         work->s = work->h;
         point(self, work);
         work->end_w_w = work->at_w_w;
@@ -607,103 +616,109 @@ static inline void step_drive_contact(const leaf_Self *self, Work *work)
     }
 }
 
-static inline void series_no_contact(const leaf_Self *self, Work *work)
+static inline void series_no_contact(const leaf_Self *self, const volatile leaf_Cal *cal,
+    Work *work)
 {
     work->order = 1.0;
-    work->series_w_w[0] = (solved_no_contact_A_w_w_w_w * self->state.w_w) + work->pull_w_w;
-    work->series_w_em[0] = (solved_no_contact_A_w_em_w_em * self->state.w_em) + work->pull_w_em;
-    work->series_theta_d[0] = (solved_no_contact_A_theta_d_w_w * self->state.w_w)
-        + (solved_no_contact_A_theta_d_w_em * self->state.w_em) + work->pull_theta_d;
-    work->series_theta_b[0] = (solved_no_contact_A_theta_b_w_w * self->state.w_w)
-        + (solved_no_contact_A_theta_b_w_em * self->state.w_em)
-        + (solved_no_contact_A_theta_b_theta_d * self->state.theta_d)
-        + (solved_no_contact_A_theta_b_theta_b * self->state.theta_b) + work->pull_theta_b;
+    work->series_w_w[0] = (cal->solved.no_contact_A_w_w_w_w * self->state.w_w) + work->pull_w_w;
+    work->series_w_em[0] =
+        (cal->solved.no_contact_A_w_em_w_em * self->state.w_em) + work->pull_w_em;
+    work->series_theta_d[0] = (cal->solved.no_contact_A_theta_d_w_w * self->state.w_w)
+        + (cal->solved.no_contact_A_theta_d_w_em * self->state.w_em) + work->pull_theta_d;
+    work->series_theta_b[0] = (cal->solved.no_contact_A_theta_b_w_w * self->state.w_w)
+        + (cal->solved.no_contact_A_theta_b_w_em * self->state.w_em)
+        + (cal->solved.no_contact_A_theta_b_theta_d * self->state.theta_d)
+        + (cal->solved.no_contact_A_theta_b_theta_b * self->state.theta_b) + work->pull_theta_b;
     for (int32_t term = 0; term < 23; term++) {
         work->order = work->order + 1.0;
         work->series_w_w[term + 1] =
-            solved_no_contact_A_w_w_w_w * work->series_w_w[term] / work->order;
+            cal->solved.no_contact_A_w_w_w_w * work->series_w_w[term] / work->order;
         work->series_w_em[term + 1] =
-            solved_no_contact_A_w_em_w_em * work->series_w_em[term] / work->order;
+            cal->solved.no_contact_A_w_em_w_em * work->series_w_em[term] / work->order;
         work->series_theta_d[term + 1] =
-            ((solved_no_contact_A_theta_d_w_w * work->series_w_w[term])
-            + (solved_no_contact_A_theta_d_w_em * work->series_w_em[term])) / work->order;
+            ((cal->solved.no_contact_A_theta_d_w_w * work->series_w_w[term])
+            + (cal->solved.no_contact_A_theta_d_w_em * work->series_w_em[term])) / work->order;
         work->series_theta_b[term + 1] =
-            ((solved_no_contact_A_theta_b_w_w * work->series_w_w[term])
-            + (solved_no_contact_A_theta_b_w_em * work->series_w_em[term])
-            + (solved_no_contact_A_theta_b_theta_d * work->series_theta_d[term])
-            + (solved_no_contact_A_theta_b_theta_b * work->series_theta_b[term])) / work->order;
+            ((cal->solved.no_contact_A_theta_b_w_w * work->series_w_w[term])
+            + (cal->solved.no_contact_A_theta_b_w_em * work->series_w_em[term])
+            + (cal->solved.no_contact_A_theta_b_theta_d * work->series_theta_d[term])
+            + (cal->solved.no_contact_A_theta_b_theta_b * work->series_theta_b[term])) / work->order;
     }
 }
 
-static inline void step_no_contact(const leaf_Self *self, Work *work)
+static inline void step_no_contact(const leaf_Self *self, const volatile leaf_Cal *cal, Work *work)
 {
     work->at_w_w = self->state.w_w;
     work->at_w_em = self->state.w_em;
     work->at_theta_d = self->state.theta_d;
     work->at_theta_b = self->state.theta_b;
     rates_no_contact(self, work);
-    work->pull_w_w = work->rate_w_w - (solved_no_contact_A_w_w_w_w * work->at_w_w);
-    work->pull_w_em = work->rate_w_em - (solved_no_contact_A_w_em_w_em * work->at_w_em);
-    work->pull_theta_d = work->rate_theta_d - ((solved_no_contact_A_theta_d_w_w * work->at_w_w)
-        + (solved_no_contact_A_theta_d_w_em * work->at_w_em));
-    work->pull_theta_b = work->rate_theta_b - ((solved_no_contact_A_theta_b_w_w * work->at_w_w)
-        + (solved_no_contact_A_theta_b_w_em * work->at_w_em)
-        + (solved_no_contact_A_theta_b_theta_d * work->at_theta_d)
-        + (solved_no_contact_A_theta_b_theta_b * work->at_theta_b));
+    work->pull_w_w = work->rate_w_w - (cal->solved.no_contact_A_w_w_w_w * work->at_w_w);
+    work->pull_w_em = work->rate_w_em - (cal->solved.no_contact_A_w_em_w_em * work->at_w_em);
+    work->pull_theta_d =
+        work->rate_theta_d - ((cal->solved.no_contact_A_theta_d_w_w * work->at_w_w)
+        + (cal->solved.no_contact_A_theta_d_w_em * work->at_w_em));
+    work->pull_theta_b =
+        work->rate_theta_b - ((cal->solved.no_contact_A_theta_b_w_w * work->at_w_w)
+        + (cal->solved.no_contact_A_theta_b_w_em * work->at_w_em)
+        + (cal->solved.no_contact_A_theta_b_theta_d * work->at_theta_d)
+        + (cal->solved.no_contact_A_theta_b_theta_b * work->at_theta_b));
     if (work->h == 0.001) {
-        work->at_w_w = (solved_no_contact_Eh_w_w_w_w * self->state.w_w)
-            + (solved_no_contact_Fh_w_w_w_w * work->pull_w_w);
-        work->at_w_em = (solved_no_contact_Eh_w_em_w_em * self->state.w_em)
-            + (solved_no_contact_Fh_w_em_w_em * work->pull_w_em);
-        work->at_theta_d = (solved_no_contact_Eh_theta_d_w_w * self->state.w_w)
-            + (solved_no_contact_Eh_theta_d_w_em * self->state.w_em)
-            + (solved_no_contact_Eh_theta_d_theta_d * self->state.theta_d)
-            + (solved_no_contact_Fh_theta_d_w_w * work->pull_w_w)
-            + (solved_no_contact_Fh_theta_d_w_em * work->pull_w_em)
-            + (solved_no_contact_Fh_theta_d_theta_d * work->pull_theta_d);
-        work->at_theta_b = (solved_no_contact_Eh_theta_b_w_w * self->state.w_w)
-            + (solved_no_contact_Eh_theta_b_w_em * self->state.w_em)
-            + (solved_no_contact_Eh_theta_b_theta_d * self->state.theta_d)
-            + (solved_no_contact_Eh_theta_b_theta_b * self->state.theta_b)
-            + (solved_no_contact_Fh_theta_b_w_w * work->pull_w_w)
-            + (solved_no_contact_Fh_theta_b_w_em * work->pull_w_em)
-            + (solved_no_contact_Fh_theta_b_theta_d * work->pull_theta_d)
-            + (solved_no_contact_Fh_theta_b_theta_b * work->pull_theta_b);
+        work->at_w_w = (cal->solved.no_contact_Eh_w_w_w_w * self->state.w_w)
+            + (cal->solved.no_contact_Fh_w_w_w_w * work->pull_w_w);
+        work->at_w_em = (cal->solved.no_contact_Eh_w_em_w_em * self->state.w_em)
+            + (cal->solved.no_contact_Fh_w_em_w_em * work->pull_w_em);
+        work->at_theta_d = (cal->solved.no_contact_Eh_theta_d_w_w * self->state.w_w)
+            + (cal->solved.no_contact_Eh_theta_d_w_em * self->state.w_em)
+            + (cal->solved.no_contact_Eh_theta_d_theta_d * self->state.theta_d)
+            + (cal->solved.no_contact_Fh_theta_d_w_w * work->pull_w_w)
+            + (cal->solved.no_contact_Fh_theta_d_w_em * work->pull_w_em)
+            + (cal->solved.no_contact_Fh_theta_d_theta_d * work->pull_theta_d);
+        work->at_theta_b = (cal->solved.no_contact_Eh_theta_b_w_w * self->state.w_w)
+            + (cal->solved.no_contact_Eh_theta_b_w_em * self->state.w_em)
+            + (cal->solved.no_contact_Eh_theta_b_theta_d * self->state.theta_d)
+            + (cal->solved.no_contact_Eh_theta_b_theta_b * self->state.theta_b)
+            + (cal->solved.no_contact_Fh_theta_b_w_w * work->pull_w_w)
+            + (cal->solved.no_contact_Fh_theta_b_w_em * work->pull_w_em)
+            + (cal->solved.no_contact_Fh_theta_b_theta_d * work->pull_theta_d)
+            + (cal->solved.no_contact_Fh_theta_b_theta_b * work->pull_theta_b);
     } else {
-        series_no_contact(self, work);
+        series_no_contact(self, cal, work);
         work->s = 0.5 * work->h;
         point(self, work);
     }
     rates_no_contact(self, work);
-    work->pull_w_w = work->rate_w_w - (solved_no_contact_A_w_w_w_w * work->at_w_w);
-    work->pull_w_em = work->rate_w_em - (solved_no_contact_A_w_em_w_em * work->at_w_em);
-    work->pull_theta_d = work->rate_theta_d - ((solved_no_contact_A_theta_d_w_w * work->at_w_w)
-        + (solved_no_contact_A_theta_d_w_em * work->at_w_em));
-    work->pull_theta_b = work->rate_theta_b - ((solved_no_contact_A_theta_b_w_w * work->at_w_w)
-        + (solved_no_contact_A_theta_b_w_em * work->at_w_em)
-        + (solved_no_contact_A_theta_b_theta_d * work->at_theta_d)
-        + (solved_no_contact_A_theta_b_theta_b * work->at_theta_b));
+    work->pull_w_w = work->rate_w_w - (cal->solved.no_contact_A_w_w_w_w * work->at_w_w);
+    work->pull_w_em = work->rate_w_em - (cal->solved.no_contact_A_w_em_w_em * work->at_w_em);
+    work->pull_theta_d =
+        work->rate_theta_d - ((cal->solved.no_contact_A_theta_d_w_w * work->at_w_w)
+        + (cal->solved.no_contact_A_theta_d_w_em * work->at_w_em));
+    work->pull_theta_b =
+        work->rate_theta_b - ((cal->solved.no_contact_A_theta_b_w_w * work->at_w_w)
+        + (cal->solved.no_contact_A_theta_b_w_em * work->at_w_em)
+        + (cal->solved.no_contact_A_theta_b_theta_d * work->at_theta_d)
+        + (cal->solved.no_contact_A_theta_b_theta_b * work->at_theta_b));
     if (work->h == 0.001) {
-        work->end_w_w = (solved_no_contact_E_w_w_w_w * self->state.w_w)
-            + (solved_no_contact_F_w_w_w_w * work->pull_w_w);
-        work->end_w_em = (solved_no_contact_E_w_em_w_em * self->state.w_em)
-            + (solved_no_contact_F_w_em_w_em * work->pull_w_em);
-        work->end_theta_d = (solved_no_contact_E_theta_d_w_w * self->state.w_w)
-            + (solved_no_contact_E_theta_d_w_em * self->state.w_em)
-            + (solved_no_contact_E_theta_d_theta_d * self->state.theta_d)
-            + (solved_no_contact_F_theta_d_w_w * work->pull_w_w)
-            + (solved_no_contact_F_theta_d_w_em * work->pull_w_em)
-            + (solved_no_contact_F_theta_d_theta_d * work->pull_theta_d);
-        work->end_theta_b = (solved_no_contact_E_theta_b_w_w * self->state.w_w)
-            + (solved_no_contact_E_theta_b_w_em * self->state.w_em)
-            + (solved_no_contact_E_theta_b_theta_d * self->state.theta_d)
-            + (solved_no_contact_E_theta_b_theta_b * self->state.theta_b)
-            + (solved_no_contact_F_theta_b_w_w * work->pull_w_w)
-            + (solved_no_contact_F_theta_b_w_em * work->pull_w_em)
-            + (solved_no_contact_F_theta_b_theta_d * work->pull_theta_d)
-            + (solved_no_contact_F_theta_b_theta_b * work->pull_theta_b);
+        work->end_w_w = (cal->solved.no_contact_E_w_w_w_w * self->state.w_w)
+            + (cal->solved.no_contact_F_w_w_w_w * work->pull_w_w);
+        work->end_w_em = (cal->solved.no_contact_E_w_em_w_em * self->state.w_em)
+            + (cal->solved.no_contact_F_w_em_w_em * work->pull_w_em);
+        work->end_theta_d = (cal->solved.no_contact_E_theta_d_w_w * self->state.w_w)
+            + (cal->solved.no_contact_E_theta_d_w_em * self->state.w_em)
+            + (cal->solved.no_contact_E_theta_d_theta_d * self->state.theta_d)
+            + (cal->solved.no_contact_F_theta_d_w_w * work->pull_w_w)
+            + (cal->solved.no_contact_F_theta_d_w_em * work->pull_w_em)
+            + (cal->solved.no_contact_F_theta_d_theta_d * work->pull_theta_d);
+        work->end_theta_b = (cal->solved.no_contact_E_theta_b_w_w * self->state.w_w)
+            + (cal->solved.no_contact_E_theta_b_w_em * self->state.w_em)
+            + (cal->solved.no_contact_E_theta_b_theta_d * self->state.theta_d)
+            + (cal->solved.no_contact_E_theta_b_theta_b * self->state.theta_b)
+            + (cal->solved.no_contact_F_theta_b_w_w * work->pull_w_w)
+            + (cal->solved.no_contact_F_theta_b_w_em * work->pull_w_em)
+            + (cal->solved.no_contact_F_theta_b_theta_d * work->pull_theta_d)
+            + (cal->solved.no_contact_F_theta_b_theta_b * work->pull_theta_b);
     } else {
-        series_no_contact(self, work);
+        series_no_contact(self, cal, work);
         work->s = work->h;
         point(self, work);
         work->end_w_w = work->at_w_w;
@@ -713,128 +728,134 @@ static inline void step_no_contact(const leaf_Self *self, Work *work)
     }
 }
 
-static inline void series_coast_contact(const leaf_Self *self, Work *work)
+static inline void series_coast_contact(const leaf_Self *self, const volatile leaf_Cal *cal,
+    Work *work)
 {
     work->order = 1.0;
-    work->series_w_w[0] = (solved_coast_contact_A_w_w_w_w * self->state.w_w)
-        + (solved_coast_contact_A_w_w_w_em * self->state.w_em)
-        + (solved_coast_contact_A_w_w_theta_d * self->state.theta_d)
-        + (solved_coast_contact_A_w_w_theta_b * self->state.theta_b) + work->pull_w_w;
-    work->series_w_em[0] = (solved_coast_contact_A_w_em_w_w * self->state.w_w)
-        + (solved_coast_contact_A_w_em_w_em * self->state.w_em)
-        + (solved_coast_contact_A_w_em_theta_d * self->state.theta_d)
-        + (solved_coast_contact_A_w_em_theta_b * self->state.theta_b) + work->pull_w_em;
-    work->series_theta_d[0] = (solved_coast_contact_A_theta_d_w_w * self->state.w_w)
-        + (solved_coast_contact_A_theta_d_w_em * self->state.w_em) + work->pull_theta_d;
+    work->series_w_w[0] = (cal->solved.coast_contact_A_w_w_w_w * self->state.w_w)
+        + (cal->solved.coast_contact_A_w_w_w_em * self->state.w_em)
+        + (cal->solved.coast_contact_A_w_w_theta_d * self->state.theta_d)
+        + (cal->solved.coast_contact_A_w_w_theta_b * self->state.theta_b) + work->pull_w_w;
+    work->series_w_em[0] = (cal->solved.coast_contact_A_w_em_w_w * self->state.w_w)
+        + (cal->solved.coast_contact_A_w_em_w_em * self->state.w_em)
+        + (cal->solved.coast_contact_A_w_em_theta_d * self->state.theta_d)
+        + (cal->solved.coast_contact_A_w_em_theta_b * self->state.theta_b) + work->pull_w_em;
+    work->series_theta_d[0] = (cal->solved.coast_contact_A_theta_d_w_w * self->state.w_w)
+        + (cal->solved.coast_contact_A_theta_d_w_em * self->state.w_em) + work->pull_theta_d;
     work->series_theta_b[0] = work->pull_theta_b;
     for (int32_t term = 0; term < 23; term++) {
         work->order = work->order + 1.0;
-        work->series_w_w[term + 1] = ((solved_coast_contact_A_w_w_w_w * work->series_w_w[term])
-            + (solved_coast_contact_A_w_w_w_em * work->series_w_em[term])
-            + (solved_coast_contact_A_w_w_theta_d * work->series_theta_d[term])
-            + (solved_coast_contact_A_w_w_theta_b * work->series_theta_b[term])) / work->order;
-        work->series_w_em[term + 1] = ((solved_coast_contact_A_w_em_w_w * work->series_w_w[term])
-            + (solved_coast_contact_A_w_em_w_em * work->series_w_em[term])
-            + (solved_coast_contact_A_w_em_theta_d * work->series_theta_d[term])
-            + (solved_coast_contact_A_w_em_theta_b * work->series_theta_b[term])) / work->order;
+        work->series_w_w[term + 1] =
+            ((cal->solved.coast_contact_A_w_w_w_w * work->series_w_w[term])
+            + (cal->solved.coast_contact_A_w_w_w_em * work->series_w_em[term])
+            + (cal->solved.coast_contact_A_w_w_theta_d * work->series_theta_d[term])
+            + (cal->solved.coast_contact_A_w_w_theta_b * work->series_theta_b[term])) / work->order;
+        work->series_w_em[term + 1] =
+            ((cal->solved.coast_contact_A_w_em_w_w * work->series_w_w[term])
+            + (cal->solved.coast_contact_A_w_em_w_em * work->series_w_em[term])
+            + (cal->solved.coast_contact_A_w_em_theta_d * work->series_theta_d[term])
+            + (cal->solved.coast_contact_A_w_em_theta_b * work->series_theta_b[term])) / work->order;
         work->series_theta_d[term + 1] =
-            ((solved_coast_contact_A_theta_d_w_w * work->series_w_w[term])
-            + (solved_coast_contact_A_theta_d_w_em * work->series_w_em[term])) / work->order;
+            ((cal->solved.coast_contact_A_theta_d_w_w * work->series_w_w[term])
+            + (cal->solved.coast_contact_A_theta_d_w_em * work->series_w_em[term])) / work->order;
         work->series_theta_b[term + 1] = 0.0 / work->order;
     }
 }
 
-static inline void step_coast_contact(const leaf_Self *self, Work *work)
+static inline void step_coast_contact(const leaf_Self *self, const volatile leaf_Cal *cal,
+    Work *work)
 {
     work->at_w_w = self->state.w_w;
     work->at_w_em = self->state.w_em;
     work->at_theta_d = self->state.theta_d;
     work->at_theta_b = self->state.theta_b;
     rates_coast_contact(self, work);
-    work->pull_w_w = work->rate_w_w - ((solved_coast_contact_A_w_w_w_w * work->at_w_w)
-        + (solved_coast_contact_A_w_w_w_em * work->at_w_em)
-        + (solved_coast_contact_A_w_w_theta_d * work->at_theta_d)
-        + (solved_coast_contact_A_w_w_theta_b * work->at_theta_b));
-    work->pull_w_em = work->rate_w_em - ((solved_coast_contact_A_w_em_w_w * work->at_w_w)
-        + (solved_coast_contact_A_w_em_w_em * work->at_w_em)
-        + (solved_coast_contact_A_w_em_theta_d * work->at_theta_d)
-        + (solved_coast_contact_A_w_em_theta_b * work->at_theta_b));
-    work->pull_theta_d = work->rate_theta_d - ((solved_coast_contact_A_theta_d_w_w * work->at_w_w)
-        + (solved_coast_contact_A_theta_d_w_em * work->at_w_em));
+    work->pull_w_w = work->rate_w_w - ((cal->solved.coast_contact_A_w_w_w_w * work->at_w_w)
+        + (cal->solved.coast_contact_A_w_w_w_em * work->at_w_em)
+        + (cal->solved.coast_contact_A_w_w_theta_d * work->at_theta_d)
+        + (cal->solved.coast_contact_A_w_w_theta_b * work->at_theta_b));
+    work->pull_w_em = work->rate_w_em - ((cal->solved.coast_contact_A_w_em_w_w * work->at_w_w)
+        + (cal->solved.coast_contact_A_w_em_w_em * work->at_w_em)
+        + (cal->solved.coast_contact_A_w_em_theta_d * work->at_theta_d)
+        + (cal->solved.coast_contact_A_w_em_theta_b * work->at_theta_b));
+    work->pull_theta_d =
+        work->rate_theta_d - ((cal->solved.coast_contact_A_theta_d_w_w * work->at_w_w)
+        + (cal->solved.coast_contact_A_theta_d_w_em * work->at_w_em));
     work->pull_theta_b = work->rate_theta_b;
     if (work->h == 0.001) {
-        work->at_w_w = (solved_coast_contact_Eh_w_w_w_w * self->state.w_w)
-            + (solved_coast_contact_Eh_w_w_w_em * self->state.w_em)
-            + (solved_coast_contact_Eh_w_w_theta_d * self->state.theta_d)
-            + (solved_coast_contact_Eh_w_w_theta_b * self->state.theta_b)
-            + (solved_coast_contact_Fh_w_w_w_w * work->pull_w_w)
-            + (solved_coast_contact_Fh_w_w_w_em * work->pull_w_em)
-            + (solved_coast_contact_Fh_w_w_theta_d * work->pull_theta_d)
-            + (solved_coast_contact_Fh_w_w_theta_b * work->pull_theta_b);
-        work->at_w_em = (solved_coast_contact_Eh_w_em_w_w * self->state.w_w)
-            + (solved_coast_contact_Eh_w_em_w_em * self->state.w_em)
-            + (solved_coast_contact_Eh_w_em_theta_d * self->state.theta_d)
-            + (solved_coast_contact_Eh_w_em_theta_b * self->state.theta_b)
-            + (solved_coast_contact_Fh_w_em_w_w * work->pull_w_w)
-            + (solved_coast_contact_Fh_w_em_w_em * work->pull_w_em)
-            + (solved_coast_contact_Fh_w_em_theta_d * work->pull_theta_d)
-            + (solved_coast_contact_Fh_w_em_theta_b * work->pull_theta_b);
-        work->at_theta_d = (solved_coast_contact_Eh_theta_d_w_w * self->state.w_w)
-            + (solved_coast_contact_Eh_theta_d_w_em * self->state.w_em)
-            + (solved_coast_contact_Eh_theta_d_theta_d * self->state.theta_d)
-            + (solved_coast_contact_Eh_theta_d_theta_b * self->state.theta_b)
-            + (solved_coast_contact_Fh_theta_d_w_w * work->pull_w_w)
-            + (solved_coast_contact_Fh_theta_d_w_em * work->pull_w_em)
-            + (solved_coast_contact_Fh_theta_d_theta_d * work->pull_theta_d)
-            + (solved_coast_contact_Fh_theta_d_theta_b * work->pull_theta_b);
-        work->at_theta_b = (solved_coast_contact_Eh_theta_b_theta_b * self->state.theta_b)
-            + (solved_coast_contact_Fh_theta_b_theta_b * work->pull_theta_b);
+        work->at_w_w = (cal->solved.coast_contact_Eh_w_w_w_w * self->state.w_w)
+            + (cal->solved.coast_contact_Eh_w_w_w_em * self->state.w_em)
+            + (cal->solved.coast_contact_Eh_w_w_theta_d * self->state.theta_d)
+            + (cal->solved.coast_contact_Eh_w_w_theta_b * self->state.theta_b)
+            + (cal->solved.coast_contact_Fh_w_w_w_w * work->pull_w_w)
+            + (cal->solved.coast_contact_Fh_w_w_w_em * work->pull_w_em)
+            + (cal->solved.coast_contact_Fh_w_w_theta_d * work->pull_theta_d)
+            + (cal->solved.coast_contact_Fh_w_w_theta_b * work->pull_theta_b);
+        work->at_w_em = (cal->solved.coast_contact_Eh_w_em_w_w * self->state.w_w)
+            + (cal->solved.coast_contact_Eh_w_em_w_em * self->state.w_em)
+            + (cal->solved.coast_contact_Eh_w_em_theta_d * self->state.theta_d)
+            + (cal->solved.coast_contact_Eh_w_em_theta_b * self->state.theta_b)
+            + (cal->solved.coast_contact_Fh_w_em_w_w * work->pull_w_w)
+            + (cal->solved.coast_contact_Fh_w_em_w_em * work->pull_w_em)
+            + (cal->solved.coast_contact_Fh_w_em_theta_d * work->pull_theta_d)
+            + (cal->solved.coast_contact_Fh_w_em_theta_b * work->pull_theta_b);
+        work->at_theta_d = (cal->solved.coast_contact_Eh_theta_d_w_w * self->state.w_w)
+            + (cal->solved.coast_contact_Eh_theta_d_w_em * self->state.w_em)
+            + (cal->solved.coast_contact_Eh_theta_d_theta_d * self->state.theta_d)
+            + (cal->solved.coast_contact_Eh_theta_d_theta_b * self->state.theta_b)
+            + (cal->solved.coast_contact_Fh_theta_d_w_w * work->pull_w_w)
+            + (cal->solved.coast_contact_Fh_theta_d_w_em * work->pull_w_em)
+            + (cal->solved.coast_contact_Fh_theta_d_theta_d * work->pull_theta_d)
+            + (cal->solved.coast_contact_Fh_theta_d_theta_b * work->pull_theta_b);
+        work->at_theta_b = (cal->solved.coast_contact_Eh_theta_b_theta_b * self->state.theta_b)
+            + (cal->solved.coast_contact_Fh_theta_b_theta_b * work->pull_theta_b);
     } else {
-        series_coast_contact(self, work);
+        series_coast_contact(self, cal, work);
         work->s = 0.5 * work->h;
         point(self, work);
     }
     rates_coast_contact(self, work);
-    work->pull_w_w = work->rate_w_w - ((solved_coast_contact_A_w_w_w_w * work->at_w_w)
-        + (solved_coast_contact_A_w_w_w_em * work->at_w_em)
-        + (solved_coast_contact_A_w_w_theta_d * work->at_theta_d)
-        + (solved_coast_contact_A_w_w_theta_b * work->at_theta_b));
-    work->pull_w_em = work->rate_w_em - ((solved_coast_contact_A_w_em_w_w * work->at_w_w)
-        + (solved_coast_contact_A_w_em_w_em * work->at_w_em)
-        + (solved_coast_contact_A_w_em_theta_d * work->at_theta_d)
-        + (solved_coast_contact_A_w_em_theta_b * work->at_theta_b));
-    work->pull_theta_d = work->rate_theta_d - ((solved_coast_contact_A_theta_d_w_w * work->at_w_w)
-        + (solved_coast_contact_A_theta_d_w_em * work->at_w_em));
+    work->pull_w_w = work->rate_w_w - ((cal->solved.coast_contact_A_w_w_w_w * work->at_w_w)
+        + (cal->solved.coast_contact_A_w_w_w_em * work->at_w_em)
+        + (cal->solved.coast_contact_A_w_w_theta_d * work->at_theta_d)
+        + (cal->solved.coast_contact_A_w_w_theta_b * work->at_theta_b));
+    work->pull_w_em = work->rate_w_em - ((cal->solved.coast_contact_A_w_em_w_w * work->at_w_w)
+        + (cal->solved.coast_contact_A_w_em_w_em * work->at_w_em)
+        + (cal->solved.coast_contact_A_w_em_theta_d * work->at_theta_d)
+        + (cal->solved.coast_contact_A_w_em_theta_b * work->at_theta_b));
+    work->pull_theta_d =
+        work->rate_theta_d - ((cal->solved.coast_contact_A_theta_d_w_w * work->at_w_w)
+        + (cal->solved.coast_contact_A_theta_d_w_em * work->at_w_em));
     work->pull_theta_b = work->rate_theta_b;
     if (work->h == 0.001) {
-        work->end_w_w = (solved_coast_contact_E_w_w_w_w * self->state.w_w)
-            + (solved_coast_contact_E_w_w_w_em * self->state.w_em)
-            + (solved_coast_contact_E_w_w_theta_d * self->state.theta_d)
-            + (solved_coast_contact_E_w_w_theta_b * self->state.theta_b)
-            + (solved_coast_contact_F_w_w_w_w * work->pull_w_w)
-            + (solved_coast_contact_F_w_w_w_em * work->pull_w_em)
-            + (solved_coast_contact_F_w_w_theta_d * work->pull_theta_d)
-            + (solved_coast_contact_F_w_w_theta_b * work->pull_theta_b);
-        work->end_w_em = (solved_coast_contact_E_w_em_w_w * self->state.w_w)
-            + (solved_coast_contact_E_w_em_w_em * self->state.w_em)
-            + (solved_coast_contact_E_w_em_theta_d * self->state.theta_d)
-            + (solved_coast_contact_E_w_em_theta_b * self->state.theta_b)
-            + (solved_coast_contact_F_w_em_w_w * work->pull_w_w)
-            + (solved_coast_contact_F_w_em_w_em * work->pull_w_em)
-            + (solved_coast_contact_F_w_em_theta_d * work->pull_theta_d)
-            + (solved_coast_contact_F_w_em_theta_b * work->pull_theta_b);
-        work->end_theta_d = (solved_coast_contact_E_theta_d_w_w * self->state.w_w)
-            + (solved_coast_contact_E_theta_d_w_em * self->state.w_em)
-            + (solved_coast_contact_E_theta_d_theta_d * self->state.theta_d)
-            + (solved_coast_contact_E_theta_d_theta_b * self->state.theta_b)
-            + (solved_coast_contact_F_theta_d_w_w * work->pull_w_w)
-            + (solved_coast_contact_F_theta_d_w_em * work->pull_w_em)
-            + (solved_coast_contact_F_theta_d_theta_d * work->pull_theta_d)
-            + (solved_coast_contact_F_theta_d_theta_b * work->pull_theta_b);
-        work->end_theta_b = (solved_coast_contact_E_theta_b_theta_b * self->state.theta_b)
-            + (solved_coast_contact_F_theta_b_theta_b * work->pull_theta_b);
+        work->end_w_w = (cal->solved.coast_contact_E_w_w_w_w * self->state.w_w)
+            + (cal->solved.coast_contact_E_w_w_w_em * self->state.w_em)
+            + (cal->solved.coast_contact_E_w_w_theta_d * self->state.theta_d)
+            + (cal->solved.coast_contact_E_w_w_theta_b * self->state.theta_b)
+            + (cal->solved.coast_contact_F_w_w_w_w * work->pull_w_w)
+            + (cal->solved.coast_contact_F_w_w_w_em * work->pull_w_em)
+            + (cal->solved.coast_contact_F_w_w_theta_d * work->pull_theta_d)
+            + (cal->solved.coast_contact_F_w_w_theta_b * work->pull_theta_b);
+        work->end_w_em = (cal->solved.coast_contact_E_w_em_w_w * self->state.w_w)
+            + (cal->solved.coast_contact_E_w_em_w_em * self->state.w_em)
+            + (cal->solved.coast_contact_E_w_em_theta_d * self->state.theta_d)
+            + (cal->solved.coast_contact_E_w_em_theta_b * self->state.theta_b)
+            + (cal->solved.coast_contact_F_w_em_w_w * work->pull_w_w)
+            + (cal->solved.coast_contact_F_w_em_w_em * work->pull_w_em)
+            + (cal->solved.coast_contact_F_w_em_theta_d * work->pull_theta_d)
+            + (cal->solved.coast_contact_F_w_em_theta_b * work->pull_theta_b);
+        work->end_theta_d = (cal->solved.coast_contact_E_theta_d_w_w * self->state.w_w)
+            + (cal->solved.coast_contact_E_theta_d_w_em * self->state.w_em)
+            + (cal->solved.coast_contact_E_theta_d_theta_d * self->state.theta_d)
+            + (cal->solved.coast_contact_E_theta_d_theta_b * self->state.theta_b)
+            + (cal->solved.coast_contact_F_theta_d_w_w * work->pull_w_w)
+            + (cal->solved.coast_contact_F_theta_d_w_em * work->pull_w_em)
+            + (cal->solved.coast_contact_F_theta_d_theta_d * work->pull_theta_d)
+            + (cal->solved.coast_contact_F_theta_d_theta_b * work->pull_theta_b);
+        work->end_theta_b = (cal->solved.coast_contact_E_theta_b_theta_b * self->state.theta_b)
+            + (cal->solved.coast_contact_F_theta_b_theta_b * work->pull_theta_b);
     } else {
-        series_coast_contact(self, work);
+        series_coast_contact(self, cal, work);
         work->s = work->h;
         point(self, work);
         work->end_w_w = work->at_w_w;
@@ -865,9 +886,9 @@ static inline void locate_drive_contact(const leaf_Self *self, Work *work)
     work->elapsed = ha_min(work->high, work->h);
 }
 
-static inline void move_drive_contact(leaf_Self *self, Work *work)
+static inline void move_drive_contact(leaf_Self *self, const volatile leaf_Cal *cal, Work *work)
 {
-    step_drive_contact(self, work);
+    step_drive_contact(self, cal, work);
     work->elapsed = work->h;
     work->at_w_w = work->end_w_w;
     work->at_w_em = work->end_w_em;
@@ -876,7 +897,7 @@ static inline void move_drive_contact(leaf_Self *self, Work *work)
     guards_drive_contact(work);
     work->crossed = work->guard_0;
     if (work->crossed) {
-        series_drive_contact(self, work);
+        series_drive_contact(self, cal, work);
         locate_drive_contact(self, work);
     }
     self->state.w_w = work->end_w_w;
@@ -921,9 +942,9 @@ static inline void locate_no_contact(const leaf_Self *self, Work *work)
     work->elapsed = ha_min(work->high, work->h);
 }
 
-static inline void move_no_contact(leaf_Self *self, Work *work)
+static inline void move_no_contact(leaf_Self *self, const volatile leaf_Cal *cal, Work *work)
 {
-    step_no_contact(self, work);
+    step_no_contact(self, cal, work);
     work->elapsed = work->h;
     work->at_w_w = work->end_w_w;
     work->at_w_em = work->end_w_em;
@@ -932,7 +953,7 @@ static inline void move_no_contact(leaf_Self *self, Work *work)
     guards_no_contact(work);
     work->crossed = work->guard_0 || work->guard_1;
     if (work->crossed) {
-        series_no_contact(self, work);
+        series_no_contact(self, cal, work);
         locate_no_contact(self, work);
     }
     self->state.w_w = work->end_w_w;
@@ -962,9 +983,9 @@ static inline void locate_coast_contact(const leaf_Self *self, Work *work)
     work->elapsed = ha_min(work->high, work->h);
 }
 
-static inline void move_coast_contact(leaf_Self *self, Work *work)
+static inline void move_coast_contact(leaf_Self *self, const volatile leaf_Cal *cal, Work *work)
 {
-    step_coast_contact(self, work);
+    step_coast_contact(self, cal, work);
     work->elapsed = work->h;
     work->at_w_w = work->end_w_w;
     work->at_w_em = work->end_w_em;
@@ -973,7 +994,7 @@ static inline void move_coast_contact(leaf_Self *self, Work *work)
     guards_coast_contact(work);
     work->crossed = work->guard_0;
     if (work->crossed) {
-        series_coast_contact(self, work);
+        series_coast_contact(self, cal, work);
         locate_coast_contact(self, work);
     }
     self->state.w_w = work->end_w_w;
@@ -999,6 +1020,8 @@ static inline void switch_no_contact(leaf_Self *self, const Work *work)
         /* driveline modes.no_contact.transitions.coast_contact.reset.theta_b */
         self->state.theta_b = -constant.alpha;
         self->run_mode = leaf_RUN_coast_contact;
+    } else {
+        /* nothing to do */
     }
 }
 
@@ -1009,33 +1032,34 @@ static inline void switch_coast_contact(leaf_Self *self, const Work *work)
     }
 }
 
-static inline void predict_drive(leaf_Self *self)
+static inline void predict_drive(leaf_Self *self, const volatile leaf_Cal *cal)
 {
     /* leaf modes.drive.observer.f.w_em */
     const double f_w_em = self->derived.k_hs_per_R_per_J_em * self->state.theta_b;
     /* leaf modes.drive.observer.f.w_w */
-    const double f_w_w = (-(constant.k_hs_per_J_v * self->state.theta_b)) + solved_drive_f_w_w;
+    const double f_w_w = (-(constant.k_hs_per_J_v * self->state.theta_b)) + cal->solved.drive_f_w_w;
     /* leaf modes.drive.observer */
-    const double predicted_theta_d = (solved_drive_Phi_theta_d_theta_d * self->state.theta_d)
-        + (solved_drive_Phi_theta_d_w_em * self->state.w_em)
-        + (solved_drive_Phi_theta_d_w_w * self->state.w_w)
-        + (solved_drive_Gamma_theta_d_T_em * self->before.T_em)
-        + (solved_drive_Gamma_theta_d_T_br * self->before.T_br)
-        + (solved_drive_G_theta_d_w_em * f_w_em) + (solved_drive_G_theta_d_w_w * f_w_w);
+    const double predicted_theta_d = (cal->solved.drive_Phi_theta_d_theta_d * self->state.theta_d)
+        + (cal->solved.drive_Phi_theta_d_w_em * self->state.w_em)
+        + (cal->solved.drive_Phi_theta_d_w_w * self->state.w_w)
+        + (cal->solved.drive_Gamma_theta_d_T_em * self->before.T_em)
+        + (cal->solved.drive_Gamma_theta_d_T_br * self->before.T_br)
+        + (cal->solved.drive_G_theta_d_w_em * f_w_em)
+        + (cal->solved.drive_G_theta_d_w_w * f_w_w);
     /* leaf modes.drive.observer */
-    const double predicted_w_em = (solved_drive_Phi_w_em_theta_d * self->state.theta_d)
-        + (solved_drive_Phi_w_em_w_em * self->state.w_em)
-        + (solved_drive_Phi_w_em_w_w * self->state.w_w)
-        + (solved_drive_Gamma_w_em_T_em * self->before.T_em)
-        + (solved_drive_Gamma_w_em_T_br * self->before.T_br)
-        + (solved_drive_G_w_em_w_em * f_w_em) + (solved_drive_G_w_em_w_w * f_w_w);
+    const double predicted_w_em = (cal->solved.drive_Phi_w_em_theta_d * self->state.theta_d)
+        + (cal->solved.drive_Phi_w_em_w_em * self->state.w_em)
+        + (cal->solved.drive_Phi_w_em_w_w * self->state.w_w)
+        + (cal->solved.drive_Gamma_w_em_T_em * self->before.T_em)
+        + (cal->solved.drive_Gamma_w_em_T_br * self->before.T_br)
+        + (cal->solved.drive_G_w_em_w_em * f_w_em) + (cal->solved.drive_G_w_em_w_w * f_w_w);
     /* leaf modes.drive.observer */
-    const double predicted_w_w = (solved_drive_Phi_w_w_theta_d * self->state.theta_d)
-        + (solved_drive_Phi_w_w_w_em * self->state.w_em)
-        + (solved_drive_Phi_w_w_w_w * self->state.w_w)
-        + (solved_drive_Gamma_w_w_T_em * self->before.T_em)
-        + (solved_drive_Gamma_w_w_T_br * self->before.T_br) + (solved_drive_G_w_w_w_em * f_w_em)
-        + (solved_drive_G_w_w_w_w * f_w_w);
+    const double predicted_w_w = (cal->solved.drive_Phi_w_w_theta_d * self->state.theta_d)
+        + (cal->solved.drive_Phi_w_w_w_em * self->state.w_em)
+        + (cal->solved.drive_Phi_w_w_w_w * self->state.w_w)
+        + (cal->solved.drive_Gamma_w_w_T_em * self->before.T_em)
+        + (cal->solved.drive_Gamma_w_w_T_br * self->before.T_br)
+        + (cal->solved.drive_G_w_w_w_em * f_w_em) + (cal->solved.drive_G_w_w_w_w * f_w_w);
     if (fabs(predicted_theta_d) <= 0.5) {
         self->state.theta_d = predicted_theta_d;
     } else {
@@ -1056,29 +1080,31 @@ static inline void predict_drive(leaf_Self *self)
     }
 }
 
-static inline void correct_drive(leaf_Self *self, const leaf_In *in)
+static inline void correct_drive(leaf_Self *self, const volatile leaf_Cal *cal, const leaf_In *in)
 {
     self->innovation.y_em = in->is_new.y_em ? (self->latched.y_em - self->state.w_em) : 0.0;
     self->innovation.y_w = in->is_new.y_w ? (self->latched.y_w - self->state.w_w) : 0.0;
     const double new_theta_d =
-        self->state.theta_d + ((solved_drive_L_theta_d_y_em * self->innovation.y_em)
-        + (solved_drive_L_theta_d_y_w * self->innovation.y_w));
+        self->state.theta_d + ((cal->solved.drive_L_theta_d_y_em * self->innovation.y_em)
+        + (cal->solved.drive_L_theta_d_y_w * self->innovation.y_w));
     if (fabs(new_theta_d) <= 0.5) {
         self->state.theta_d = new_theta_d;
     } else {
         self->faults |= leaf_FAULT_range_theta_d;
         self->state.theta_d = ha_clip(new_theta_d, -0.5, 0.5);
     }
-    const double new_w_em = self->state.w_em + ((solved_drive_L_w_em_y_em * self->innovation.y_em)
-        + (solved_drive_L_w_em_y_w * self->innovation.y_w));
+    const double new_w_em =
+        self->state.w_em + ((cal->solved.drive_L_w_em_y_em * self->innovation.y_em)
+        + (cal->solved.drive_L_w_em_y_w * self->innovation.y_w));
     if ((new_w_em >= (-400.0)) && (new_w_em <= 2400.0)) {
         self->state.w_em = new_w_em;
     } else {
         self->faults |= leaf_FAULT_range_w_em;
         self->state.w_em = ha_clip(new_w_em, -400.0, 2400.0);
     }
-    const double new_w_w = self->state.w_w + ((solved_drive_L_w_w_y_em * self->innovation.y_em)
-        + (solved_drive_L_w_w_y_w * self->innovation.y_w));
+    const double new_w_w =
+        self->state.w_w + ((cal->solved.drive_L_w_w_y_em * self->innovation.y_em)
+        + (cal->solved.drive_L_w_w_y_w * self->innovation.y_w));
     if ((new_w_w >= (-50.0)) && (new_w_w <= 300.0)) {
         self->state.w_w = new_w_w;
     } else {
@@ -1087,20 +1113,20 @@ static inline void correct_drive(leaf_Self *self, const leaf_In *in)
     }
 }
 
-static inline void run_gap(leaf_Self *self, Work *work)
+static inline void run_gap(leaf_Self *self, const volatile leaf_Cal *cal, Work *work)
 {
     work->left = 0.001; /* leaf modes.gap.runs */
     for (int32_t event = 0; (event < 5) && (work->left > 0.0); event++) {
         work->h = work->left;
         switch (self->run_mode) {
         case leaf_RUN_drive_contact:
-            move_drive_contact(self, work);
+            move_drive_contact(self, cal, work);
             break;
         case leaf_RUN_no_contact:
-            move_no_contact(self, work);
+            move_no_contact(self, cal, work);
             break;
         case leaf_RUN_coast_contact:
-            move_coast_contact(self, work);
+            move_coast_contact(self, cal, work);
             break;
         default:
             break;
@@ -1157,33 +1183,34 @@ static inline void run_gap(leaf_Self *self, Work *work)
     }
 }
 
-static inline void predict_coast(leaf_Self *self)
+static inline void predict_coast(leaf_Self *self, const volatile leaf_Cal *cal)
 {
     /* leaf modes.coast.observer.f.w_em */
     const double f_w_em = self->derived.k_hs_per_R_per_J_em * self->state.theta_b;
     /* leaf modes.coast.observer.f.w_w */
-    const double f_w_w = (-(constant.k_hs_per_J_v * self->state.theta_b)) + solved_coast_f_w_w;
+    const double f_w_w = (-(constant.k_hs_per_J_v * self->state.theta_b)) + cal->solved.coast_f_w_w;
     /* leaf modes.coast.observer */
-    const double predicted_theta_d = (solved_coast_Phi_theta_d_theta_d * self->state.theta_d)
-        + (solved_coast_Phi_theta_d_w_em * self->state.w_em)
-        + (solved_coast_Phi_theta_d_w_w * self->state.w_w)
-        + (solved_coast_Gamma_theta_d_T_em * self->before.T_em)
-        + (solved_coast_Gamma_theta_d_T_br * self->before.T_br)
-        + (solved_coast_G_theta_d_w_em * f_w_em) + (solved_coast_G_theta_d_w_w * f_w_w);
+    const double predicted_theta_d = (cal->solved.coast_Phi_theta_d_theta_d * self->state.theta_d)
+        + (cal->solved.coast_Phi_theta_d_w_em * self->state.w_em)
+        + (cal->solved.coast_Phi_theta_d_w_w * self->state.w_w)
+        + (cal->solved.coast_Gamma_theta_d_T_em * self->before.T_em)
+        + (cal->solved.coast_Gamma_theta_d_T_br * self->before.T_br)
+        + (cal->solved.coast_G_theta_d_w_em * f_w_em)
+        + (cal->solved.coast_G_theta_d_w_w * f_w_w);
     /* leaf modes.coast.observer */
-    const double predicted_w_em = (solved_coast_Phi_w_em_theta_d * self->state.theta_d)
-        + (solved_coast_Phi_w_em_w_em * self->state.w_em)
-        + (solved_coast_Phi_w_em_w_w * self->state.w_w)
-        + (solved_coast_Gamma_w_em_T_em * self->before.T_em)
-        + (solved_coast_Gamma_w_em_T_br * self->before.T_br)
-        + (solved_coast_G_w_em_w_em * f_w_em) + (solved_coast_G_w_em_w_w * f_w_w);
+    const double predicted_w_em = (cal->solved.coast_Phi_w_em_theta_d * self->state.theta_d)
+        + (cal->solved.coast_Phi_w_em_w_em * self->state.w_em)
+        + (cal->solved.coast_Phi_w_em_w_w * self->state.w_w)
+        + (cal->solved.coast_Gamma_w_em_T_em * self->before.T_em)
+        + (cal->solved.coast_Gamma_w_em_T_br * self->before.T_br)
+        + (cal->solved.coast_G_w_em_w_em * f_w_em) + (cal->solved.coast_G_w_em_w_w * f_w_w);
     /* leaf modes.coast.observer */
-    const double predicted_w_w = (solved_coast_Phi_w_w_theta_d * self->state.theta_d)
-        + (solved_coast_Phi_w_w_w_em * self->state.w_em)
-        + (solved_coast_Phi_w_w_w_w * self->state.w_w)
-        + (solved_coast_Gamma_w_w_T_em * self->before.T_em)
-        + (solved_coast_Gamma_w_w_T_br * self->before.T_br) + (solved_coast_G_w_w_w_em * f_w_em)
-        + (solved_coast_G_w_w_w_w * f_w_w);
+    const double predicted_w_w = (cal->solved.coast_Phi_w_w_theta_d * self->state.theta_d)
+        + (cal->solved.coast_Phi_w_w_w_em * self->state.w_em)
+        + (cal->solved.coast_Phi_w_w_w_w * self->state.w_w)
+        + (cal->solved.coast_Gamma_w_w_T_em * self->before.T_em)
+        + (cal->solved.coast_Gamma_w_w_T_br * self->before.T_br)
+        + (cal->solved.coast_G_w_w_w_em * f_w_em) + (cal->solved.coast_G_w_w_w_w * f_w_w);
     if (fabs(predicted_theta_d) <= 0.5) {
         self->state.theta_d = predicted_theta_d;
     } else {
@@ -1204,29 +1231,31 @@ static inline void predict_coast(leaf_Self *self)
     }
 }
 
-static inline void correct_coast(leaf_Self *self, const leaf_In *in)
+static inline void correct_coast(leaf_Self *self, const volatile leaf_Cal *cal, const leaf_In *in)
 {
     self->innovation.y_em = in->is_new.y_em ? (self->latched.y_em - self->state.w_em) : 0.0;
     self->innovation.y_w = in->is_new.y_w ? (self->latched.y_w - self->state.w_w) : 0.0;
     const double new_theta_d =
-        self->state.theta_d + ((solved_coast_L_theta_d_y_em * self->innovation.y_em)
-        + (solved_coast_L_theta_d_y_w * self->innovation.y_w));
+        self->state.theta_d + ((cal->solved.coast_L_theta_d_y_em * self->innovation.y_em)
+        + (cal->solved.coast_L_theta_d_y_w * self->innovation.y_w));
     if (fabs(new_theta_d) <= 0.5) {
         self->state.theta_d = new_theta_d;
     } else {
         self->faults |= leaf_FAULT_range_theta_d;
         self->state.theta_d = ha_clip(new_theta_d, -0.5, 0.5);
     }
-    const double new_w_em = self->state.w_em + ((solved_coast_L_w_em_y_em * self->innovation.y_em)
-        + (solved_coast_L_w_em_y_w * self->innovation.y_w));
+    const double new_w_em =
+        self->state.w_em + ((cal->solved.coast_L_w_em_y_em * self->innovation.y_em)
+        + (cal->solved.coast_L_w_em_y_w * self->innovation.y_w));
     if ((new_w_em >= (-400.0)) && (new_w_em <= 2400.0)) {
         self->state.w_em = new_w_em;
     } else {
         self->faults |= leaf_FAULT_range_w_em;
         self->state.w_em = ha_clip(new_w_em, -400.0, 2400.0);
     }
-    const double new_w_w = self->state.w_w + ((solved_coast_L_w_w_y_em * self->innovation.y_em)
-        + (solved_coast_L_w_w_y_w * self->innovation.y_w));
+    const double new_w_w =
+        self->state.w_w + ((cal->solved.coast_L_w_w_y_em * self->innovation.y_em)
+        + (cal->solved.coast_L_w_w_y_w * self->innovation.y_w));
     if ((new_w_w >= (-50.0)) && (new_w_w <= 300.0)) {
         self->state.w_w = new_w_w;
     } else {
@@ -1251,6 +1280,8 @@ static inline void jump_drive(leaf_Self *self)
         self->timer.drive_gap = 0U;
     } else if (self->timer.drive_gap < 2U) {
         self->timer.drive_gap++;
+    } else {
+        /* nothing to do */
     }
     if (self->timer.drive_gap > 1U) {
         self->timer.drive_gap = 0U;
@@ -1281,11 +1312,15 @@ static inline void jump_gap(leaf_Self *self)
         self->timer.gap_drive = 0U;
     } else if (self->timer.gap_drive < 2U) {
         self->timer.gap_drive++;
+    } else {
+        /* nothing to do */
     }
     if (self->run_mode != leaf_RUN_coast_contact) { /* leaf modes.gap.transitions.coast.when */
         self->timer.gap_coast = 0U;
     } else if (self->timer.gap_coast < 2U) {
         self->timer.gap_coast++;
+    } else {
+        /* nothing to do */
     }
     if (self->timer.gap_drive > 1U) {
         self->timer.gap_drive = 0U;
@@ -1297,6 +1332,8 @@ static inline void jump_gap(leaf_Self *self)
         self->timer.gap_coast = 0U;
         self->mode = leaf_MODE_coast;
         self->fired = 3U; /* leaf modes.gap.transitions.coast */
+    } else {
+        /* nothing to do */
     }
 }
 
@@ -1316,6 +1353,8 @@ static inline void jump_coast(leaf_Self *self)
         self->timer.coast_gap = 0U;
     } else if (self->timer.coast_gap < 2U) {
         self->timer.coast_gap++;
+    } else {
+        /* nothing to do */
     }
     if (self->timer.coast_gap > 1U) {
         self->timer.coast_gap = 0U;
@@ -1325,9 +1364,9 @@ static inline void jump_coast(leaf_Self *self)
     }
 }
 
-static inline void compare_stamps(leaf_Self *self, const leaf_Cal *cal)
+static inline void compare_stamps(leaf_Self *self, const volatile leaf_Cal *cal)
 {
-    if (cal->J_em != solved_stamp_J_em) {
+    if (cal->J_em != cal->solved.stamp_J_em) {
         self->faults |= leaf_FAULT_stale_calibration;
     }
 }
@@ -1352,7 +1391,7 @@ static inline void remember(leaf_Self *self)
     self->before.T_br = self->latched.T_br;
 }
 
-static inline void start(leaf_Self *self, const leaf_In *in)
+static inline void start(leaf_Self *self, const volatile leaf_Cal *cal, const leaf_In *in)
 {
     if (fabs(constant.alpha) <= 0.5) {
         self->state.theta_d = constant.alpha; /* leaf states.theta_d.initial */
@@ -1380,17 +1419,17 @@ static inline void start(leaf_Self *self, const leaf_In *in)
     }
     self->mode = leaf_MODE_drive;
     self->started = true;
-    correct_drive(self, in);
+    correct_drive(self, cal, in);
 }
 
-void leaf_Derive(const leaf_Cal *cal, leaf_Derived *derived)
+void leaf_Derive(const volatile leaf_Cal *cal, leaf_Derived *derived)
 {
     derived->per_J_em = 1.0 / cal->J_em; /* 1 / J_em */
     /* k_hs / R / J_em */
     derived->k_hs_per_R_per_J_em = constant.k_hs / constant.R / cal->J_em;
 }
 
-void leaf_Init(leaf_Self *self, const leaf_Cal *cal)
+void leaf_Init(leaf_Self *self, const volatile leaf_Cal *cal)
 {
     static const leaf_Self zero; /* every member 0 or false */
 
@@ -1406,19 +1445,18 @@ void leaf_Init(leaf_Self *self, const leaf_Cal *cal)
     compare_stamps(self, cal);
 }
 
-void leaf_Calibrate(leaf_Self *self, const leaf_Cal *cal)
+void leaf_Calibrate(leaf_Self *self, const volatile leaf_Cal *cal)
 {
     leaf_Derive(cal, &self->derived);
     compare_stamps(self, cal);
 }
 
-void leaf_Step(leaf_Self *self, const leaf_Cal *cal, const leaf_In *in,
-    leaf_Out *out)
+void leaf_Step(leaf_Self *self, const volatile leaf_Cal *cal,
+    const leaf_In *in, leaf_Out *out)
 {
     Work scratch = {0};
     Work *const work = &scratch;
 
-    (void)cal;
     self->fired = 0U;
     latch(self, in);
     self->innovation.y_em = 0.0;
@@ -1426,21 +1464,21 @@ void leaf_Step(leaf_Self *self, const leaf_Cal *cal, const leaf_In *in,
     if (self->started) {
         switch (self->mode) {
         case leaf_MODE_drive:
-            predict_drive(self);
-            correct_drive(self, in);
+            predict_drive(self, cal);
+            correct_drive(self, cal, in);
             break;
         case leaf_MODE_gap:
-            run_gap(self, work);
+            run_gap(self, cal, work);
             break;
         case leaf_MODE_coast:
-            predict_coast(self);
-            correct_coast(self, in);
+            predict_coast(self, cal);
+            correct_coast(self, cal, in);
             break;
         default:
             break;
         }
     } else {
-        start(self, in);
+        start(self, cal, in);
     }
     switch (self->mode) {
     case leaf_MODE_drive:

@@ -3,6 +3,7 @@
  * Program digest: aa5f52c9310c9f4a
  */
 #include "blind_driveline.h"
+#include "blind_driveline_MemMap.h"
 
 #include <float.h>
 #include <math.h>
@@ -46,7 +47,9 @@ static const struct {
     .k_per_c = 100.0, /* k / c */
 };
 
-const blind_driveline_Cal blind_driveline_default_cal = {
+const char blind_driveline_Version[] = blind_driveline_DIGEST;
+
+blind_driveline_CALIBRATION const volatile blind_driveline_Cal blind_driveline_default_cal = {
     .reserved = 0U,
 };
 
@@ -553,6 +556,8 @@ static inline void move_drive_contact(blind_driveline_Self *self, Work *work)
             work->end_theta_b = work->at_theta_b;
             work->end_w_s = work->at_w_s;
         }
+    } else {
+        /* nothing to do */
     }
     self->state.w_em = work->end_w_em;
     self->state.w_w = work->end_w_w;
@@ -626,6 +631,8 @@ static inline void move_no_contact(blind_driveline_Self *self, Work *work)
             work->end_theta_b = work->at_theta_b;
             work->end_w_s = work->at_w_s;
         }
+    } else {
+        /* nothing to do */
     }
     self->state.w_em = work->end_w_em;
     self->state.w_w = work->end_w_w;
@@ -683,6 +690,8 @@ static inline void move_coast_contact(blind_driveline_Self *self, Work *work)
             work->end_theta_b = work->at_theta_b;
             work->end_w_s = work->at_w_s;
         }
+    } else {
+        /* nothing to do */
     }
     self->state.w_em = work->end_w_em;
     self->state.w_w = work->end_w_w;
@@ -719,6 +728,7 @@ static inline void elapse(blind_driveline_Self *self, Work *work)
 
 static inline void load(void)
 {
+    /* nothing to do */
 }
 
 static inline void jump_drive_contact(blind_driveline_Self *self, Work *work)
@@ -743,6 +753,8 @@ static inline void jump_no_contact(blind_driveline_Self *self, Work *work)
         self->state.theta_b = -constant.alpha;
         self->mode = blind_driveline_MODE_coast_contact;
         self->fired = 3U; /* blind_driveline modes.no_contact.transitions.coast_contact */
+    } else {
+        /* nothing to do */
     }
 }
 
@@ -925,13 +937,13 @@ static inline void equations(blind_driveline_Self *self)
     }
 }
 
-void blind_driveline_Derive(const blind_driveline_Cal *cal, blind_driveline_Derived *derived)
+void blind_driveline_Derive(const volatile blind_driveline_Cal *cal, blind_driveline_Derived *derived)
 {
     (void)cal;
     derived->reserved = 0U;
 }
 
-void blind_driveline_Init(blind_driveline_Self *self, const blind_driveline_Cal *cal)
+void blind_driveline_Init(blind_driveline_Self *self, const volatile blind_driveline_Cal *cal)
 {
     static const blind_driveline_Self zero; /* every member 0 or false */
 
@@ -942,13 +954,13 @@ void blind_driveline_Init(blind_driveline_Self *self, const blind_driveline_Cal 
     self->faults = 0U;
 }
 
-void blind_driveline_Calibrate(blind_driveline_Self *self, const blind_driveline_Cal *cal)
+void blind_driveline_Calibrate(blind_driveline_Self *self, const volatile blind_driveline_Cal *cal)
 {
     blind_driveline_Derive(cal, &self->derived);
 }
 
-void blind_driveline_Step(blind_driveline_Self *self, const blind_driveline_Cal *cal, const blind_driveline_In *in,
-    blind_driveline_Out *out)
+void blind_driveline_Step(blind_driveline_Self *self, const volatile blind_driveline_Cal *cal,
+    const blind_driveline_In *in, blind_driveline_Out *out)
 {
     Work scratch;
     Work *const work = &scratch;

@@ -22,7 +22,7 @@ enum {
 #define blind_driveline_FAULT_zeno (1UL << 0)
 #define blind_driveline_FAULT_livelock (1UL << 1)
 
-/* Tunable parameters */
+/* The calibration page: tunable parameters */
 typedef struct {
     uint8_t reserved; /* there are none */
 } blind_driveline_Cal;
@@ -72,18 +72,21 @@ typedef struct {
     blind_driveline_Derived derived;
 } blind_driveline_Self;
 
-/* Default values of the tunable parameters */
-extern const blind_driveline_Cal blind_driveline_default_cal;
+/* The digest of the Program, which a tool compares with that of its description */
+extern const char blind_driveline_Version[17];
+
+/* The page with default values, in a section of its own: blind_driveline_MemMap.h */
+extern const volatile blind_driveline_Cal blind_driveline_default_cal;
 
 /* Before the first step */
-void blind_driveline_Init(blind_driveline_Self *self, const blind_driveline_Cal *cal);
+void blind_driveline_Init(blind_driveline_Self *self, const volatile blind_driveline_Cal *cal);
 
 /* After a change of the calibration page: X_Derive, and a fault if solved numbers do not fit it */
-void blind_driveline_Calibrate(blind_driveline_Self *self, const blind_driveline_Cal *cal);
-void blind_driveline_Derive(const blind_driveline_Cal *cal, blind_driveline_Derived *derived);
+void blind_driveline_Calibrate(blind_driveline_Self *self, const volatile blind_driveline_Cal *cal);
+void blind_driveline_Derive(const volatile blind_driveline_Cal *cal, blind_driveline_Derived *derived);
 
 /* 1/1000 s of flow under the inputs of the step before, then those of now */
-void blind_driveline_Step(blind_driveline_Self *self, const blind_driveline_Cal *cal, const blind_driveline_In *in,
-    blind_driveline_Out *out);
+void blind_driveline_Step(blind_driveline_Self *self, const volatile blind_driveline_Cal *cal,
+    const blind_driveline_In *in, blind_driveline_Out *out);
 
 #endif

@@ -3,6 +3,7 @@
  * Program digest: 089b3759f03d6906
  */
 #include "bmw_i3.h"
+#include "bmw_i3_MemMap.h"
 
 #include <float.h>
 #include <math.h>
@@ -28,7 +29,9 @@ static const struct {
     .per_m = 0.000689655172413793, /* 1 / m */
 };
 
-const bmw_i3_Cal bmw_i3_default_cal = {
+const char bmw_i3_Version[] = bmw_i3_DIGEST;
+
+bmw_i3_CALIBRATION const volatile bmw_i3_Cal bmw_i3_default_cal = {
     .reserved = 0U,
 };
 
@@ -58,6 +61,7 @@ static inline void rates_always(const bmw_i3_Self *self, Work *work)
 
 static inline void guards_always(void)
 {
+    /* nothing to do */
 }
 
 static inline void step_always(const bmw_i3_Self *self, Work *work)
@@ -115,6 +119,7 @@ static inline void elapse(bmw_i3_Self *self, Work *work)
 
 static inline void load(void)
 {
+    /* nothing to do */
 }
 
 static inline void jump_always(void)
@@ -205,13 +210,13 @@ static inline void equations(bmw_i3_Self *self)
     }
 }
 
-void bmw_i3_Derive(const bmw_i3_Cal *cal, bmw_i3_Derived *derived)
+void bmw_i3_Derive(const volatile bmw_i3_Cal *cal, bmw_i3_Derived *derived)
 {
     (void)cal;
     derived->reserved = 0U;
 }
 
-void bmw_i3_Init(bmw_i3_Self *self, const bmw_i3_Cal *cal)
+void bmw_i3_Init(bmw_i3_Self *self, const volatile bmw_i3_Cal *cal)
 {
     static const bmw_i3_Self zero; /* every member 0 or false */
 
@@ -222,13 +227,13 @@ void bmw_i3_Init(bmw_i3_Self *self, const bmw_i3_Cal *cal)
     self->faults = 0U;
 }
 
-void bmw_i3_Calibrate(bmw_i3_Self *self, const bmw_i3_Cal *cal)
+void bmw_i3_Calibrate(bmw_i3_Self *self, const volatile bmw_i3_Cal *cal)
 {
     bmw_i3_Derive(cal, &self->derived);
 }
 
-void bmw_i3_Step(bmw_i3_Self *self, const bmw_i3_Cal *cal, const bmw_i3_In *in,
-    bmw_i3_Out *out)
+void bmw_i3_Step(bmw_i3_Self *self, const volatile bmw_i3_Cal *cal,
+    const bmw_i3_In *in, bmw_i3_Out *out)
 {
     Work scratch;
     Work *const work = &scratch;

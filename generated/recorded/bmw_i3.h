@@ -20,7 +20,7 @@ enum {
 #define bmw_i3_FAULT_zeno (1UL << 0)
 #define bmw_i3_FAULT_livelock (1UL << 1)
 
-/* Tunable parameters */
+/* The calibration page: tunable parameters */
 typedef struct {
     uint8_t reserved; /* there are none */
 } bmw_i3_Cal;
@@ -59,18 +59,21 @@ typedef struct {
     bmw_i3_Derived derived;
 } bmw_i3_Self;
 
-/* Default values of the tunable parameters */
-extern const bmw_i3_Cal bmw_i3_default_cal;
+/* The digest of the Program, which a tool compares with that of its description */
+extern const char bmw_i3_Version[17];
+
+/* The page with default values, in a section of its own: bmw_i3_MemMap.h */
+extern const volatile bmw_i3_Cal bmw_i3_default_cal;
 
 /* Before the first step */
-void bmw_i3_Init(bmw_i3_Self *self, const bmw_i3_Cal *cal);
+void bmw_i3_Init(bmw_i3_Self *self, const volatile bmw_i3_Cal *cal);
 
 /* After a change of the calibration page: X_Derive, and a fault if solved numbers do not fit it */
-void bmw_i3_Calibrate(bmw_i3_Self *self, const bmw_i3_Cal *cal);
-void bmw_i3_Derive(const bmw_i3_Cal *cal, bmw_i3_Derived *derived);
+void bmw_i3_Calibrate(bmw_i3_Self *self, const volatile bmw_i3_Cal *cal);
+void bmw_i3_Derive(const volatile bmw_i3_Cal *cal, bmw_i3_Derived *derived);
 
 /* 1/20 s of flow under the inputs of the step before, then those of now */
-void bmw_i3_Step(bmw_i3_Self *self, const bmw_i3_Cal *cal, const bmw_i3_In *in,
-    bmw_i3_Out *out);
+void bmw_i3_Step(bmw_i3_Self *self, const volatile bmw_i3_Cal *cal,
+    const bmw_i3_In *in, bmw_i3_Out *out);
 
 #endif

@@ -3,6 +3,7 @@
  * Program digest: 94f0621a9d45ff48
  */
 #include "brfd_damper.h"
+#include "brfd_damper_MemMap.h"
 
 #include <float.h>
 
@@ -27,7 +28,9 @@ static const struct {
     .c_b = 5000.0, /* kg/s; brfd_damper parameters.c_b; 1000.0 to 50000.0; damping of the band */
 };
 
-const brfd_damper_Cal brfd_damper_default_cal = {
+const char brfd_damper_Version[] = brfd_damper_DIGEST;
+
+brfd_damper_CALIBRATION const volatile brfd_damper_Cal brfd_damper_default_cal = {
     .reserved = 0U,
 };
 
@@ -234,6 +237,8 @@ static inline void move_stick(brfd_damper_Self *self, Work *work)
             work->crossed = true;
             work->end_z = work->at_z;
         }
+    } else {
+        /* nothing to do */
     }
     self->state.z = work->end_z;
 }
@@ -275,6 +280,8 @@ static inline void move_slip_up(brfd_damper_Self *self, Work *work)
             work->crossed = true;
             work->end_z = work->at_z;
         }
+    } else {
+        /* nothing to do */
     }
     self->state.z = work->end_z;
 }
@@ -316,6 +323,8 @@ static inline void move_slip_lo(brfd_damper_Self *self, Work *work)
             work->crossed = true;
             work->end_z = work->at_z;
         }
+    } else {
+        /* nothing to do */
     }
     self->state.z = work->end_z;
 }
@@ -348,6 +357,7 @@ static inline void elapse(brfd_damper_Self *self, Work *work)
 
 static inline void load(void)
 {
+    /* nothing to do */
 }
 
 static inline void jump_stick(brfd_damper_Self *self, Work *work)
@@ -359,6 +369,8 @@ static inline void jump_stick(brfd_damper_Self *self, Work *work)
     } else if (work->guard_1) {
         self->mode = brfd_damper_MODE_slip_lo;
         self->fired = 2U; /* brfd_damper modes.stick.transitions.slip_lo */
+    } else {
+        /* nothing to do */
     }
 }
 
@@ -507,13 +519,13 @@ static inline void equations(brfd_damper_Self *self)
     }
 }
 
-void brfd_damper_Derive(const brfd_damper_Cal *cal, brfd_damper_Derived *derived)
+void brfd_damper_Derive(const volatile brfd_damper_Cal *cal, brfd_damper_Derived *derived)
 {
     (void)cal;
     derived->reserved = 0U;
 }
 
-void brfd_damper_Init(brfd_damper_Self *self, const brfd_damper_Cal *cal)
+void brfd_damper_Init(brfd_damper_Self *self, const volatile brfd_damper_Cal *cal)
 {
     static const brfd_damper_Self zero; /* every member 0 or false */
 
@@ -524,13 +536,13 @@ void brfd_damper_Init(brfd_damper_Self *self, const brfd_damper_Cal *cal)
     self->faults = 0U;
 }
 
-void brfd_damper_Calibrate(brfd_damper_Self *self, const brfd_damper_Cal *cal)
+void brfd_damper_Calibrate(brfd_damper_Self *self, const volatile brfd_damper_Cal *cal)
 {
     brfd_damper_Derive(cal, &self->derived);
 }
 
-void brfd_damper_Step(brfd_damper_Self *self, const brfd_damper_Cal *cal, const brfd_damper_In *in,
-    brfd_damper_Out *out)
+void brfd_damper_Step(brfd_damper_Self *self, const volatile brfd_damper_Cal *cal,
+    const brfd_damper_In *in, brfd_damper_Out *out)
 {
     Work scratch;
     Work *const work = &scratch;

@@ -22,7 +22,7 @@ enum {
 #define brfd_damper_FAULT_zeno (1UL << 0)
 #define brfd_damper_FAULT_livelock (1UL << 1)
 
-/* Tunable parameters */
+/* The calibration page: tunable parameters */
 typedef struct {
     uint8_t reserved; /* there are none */
 } brfd_damper_Cal;
@@ -65,18 +65,21 @@ typedef struct {
     brfd_damper_Derived derived;
 } brfd_damper_Self;
 
-/* Default values of the tunable parameters */
-extern const brfd_damper_Cal brfd_damper_default_cal;
+/* The digest of the Program, which a tool compares with that of its description */
+extern const char brfd_damper_Version[17];
+
+/* The page with default values, in a section of its own: brfd_damper_MemMap.h */
+extern const volatile brfd_damper_Cal brfd_damper_default_cal;
 
 /* Before the first step */
-void brfd_damper_Init(brfd_damper_Self *self, const brfd_damper_Cal *cal);
+void brfd_damper_Init(brfd_damper_Self *self, const volatile brfd_damper_Cal *cal);
 
 /* After a change of the calibration page: X_Derive, and a fault if solved numbers do not fit it */
-void brfd_damper_Calibrate(brfd_damper_Self *self, const brfd_damper_Cal *cal);
-void brfd_damper_Derive(const brfd_damper_Cal *cal, brfd_damper_Derived *derived);
+void brfd_damper_Calibrate(brfd_damper_Self *self, const volatile brfd_damper_Cal *cal);
+void brfd_damper_Derive(const volatile brfd_damper_Cal *cal, brfd_damper_Derived *derived);
 
 /* 1/1000 s of flow under the inputs of the step before, then those of now */
-void brfd_damper_Step(brfd_damper_Self *self, const brfd_damper_Cal *cal, const brfd_damper_In *in,
-    brfd_damper_Out *out);
+void brfd_damper_Step(brfd_damper_Self *self, const volatile brfd_damper_Cal *cal,
+    const brfd_damper_In *in, brfd_damper_Out *out);
 
 #endif

@@ -3,6 +3,7 @@
  * Program digest: 4710e2867f932c6d
  */
 #include "emps.h"
+#include "emps_MemMap.h"
 
 #include <float.h>
 
@@ -29,7 +30,9 @@ static const struct {
     .per_T_dr = 2000.0, /* 1 / T_dr */
 };
 
-const emps_Cal emps_default_cal = {
+const char emps_Version[] = emps_DIGEST;
+
+emps_CALIBRATION const volatile emps_Cal emps_default_cal = {
     .reserved = 0U,
 };
 
@@ -67,6 +70,7 @@ static inline void rates_always(const emps_Self *self, Work *work)
 
 static inline void guards_always(void)
 {
+    /* nothing to do */
 }
 
 static inline void step_always(const emps_Self *self, Work *work)
@@ -144,6 +148,7 @@ static inline void elapse(emps_Self *self, Work *work)
 
 static inline void load(void)
 {
+    /* nothing to do */
 }
 
 static inline void jump_always(void)
@@ -240,13 +245,13 @@ static inline void equations(emps_Self *self)
     }
 }
 
-void emps_Derive(const emps_Cal *cal, emps_Derived *derived)
+void emps_Derive(const volatile emps_Cal *cal, emps_Derived *derived)
 {
     (void)cal;
     derived->reserved = 0U;
 }
 
-void emps_Init(emps_Self *self, const emps_Cal *cal)
+void emps_Init(emps_Self *self, const volatile emps_Cal *cal)
 {
     static const emps_Self zero; /* every member 0 or false */
 
@@ -257,13 +262,13 @@ void emps_Init(emps_Self *self, const emps_Cal *cal)
     self->faults = 0U;
 }
 
-void emps_Calibrate(emps_Self *self, const emps_Cal *cal)
+void emps_Calibrate(emps_Self *self, const volatile emps_Cal *cal)
 {
     emps_Derive(cal, &self->derived);
 }
 
-void emps_Step(emps_Self *self, const emps_Cal *cal, const emps_In *in,
-    emps_Out *out)
+void emps_Step(emps_Self *self, const volatile emps_Cal *cal,
+    const emps_In *in, emps_Out *out)
 {
     Work scratch;
     Work *const work = &scratch;

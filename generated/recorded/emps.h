@@ -20,7 +20,7 @@ enum {
 #define emps_FAULT_zeno (1UL << 0)
 #define emps_FAULT_livelock (1UL << 1)
 
-/* Tunable parameters */
+/* The calibration page: tunable parameters */
 typedef struct {
     uint8_t reserved; /* there are none */
 } emps_Cal;
@@ -60,18 +60,21 @@ typedef struct {
     emps_Derived derived;
 } emps_Self;
 
-/* Default values of the tunable parameters */
-extern const emps_Cal emps_default_cal;
+/* The digest of the Program, which a tool compares with that of its description */
+extern const char emps_Version[17];
+
+/* The page with default values, in a section of its own: emps_MemMap.h */
+extern const volatile emps_Cal emps_default_cal;
 
 /* Before the first step */
-void emps_Init(emps_Self *self, const emps_Cal *cal);
+void emps_Init(emps_Self *self, const volatile emps_Cal *cal);
 
 /* After a change of the calibration page: X_Derive, and a fault if solved numbers do not fit it */
-void emps_Calibrate(emps_Self *self, const emps_Cal *cal);
-void emps_Derive(const emps_Cal *cal, emps_Derived *derived);
+void emps_Calibrate(emps_Self *self, const volatile emps_Cal *cal);
+void emps_Derive(const volatile emps_Cal *cal, emps_Derived *derived);
 
 /* 1/1000 s of flow under the inputs of the step before, then those of now */
-void emps_Step(emps_Self *self, const emps_Cal *cal, const emps_In *in,
-    emps_Out *out);
+void emps_Step(emps_Self *self, const volatile emps_Cal *cal,
+    const emps_In *in, emps_Out *out);
 
 #endif

@@ -3,6 +3,7 @@
  * Program digest: dadd383abeaffb61
  */
 #include "leaf_motor_side.h"
+#include "leaf_motor_side_MemMap.h"
 
 #include <float.h>
 
@@ -33,7 +34,9 @@ static const struct {
     .per_J_em = 20.0, /* 1 / J_em */
 };
 
-const leaf_motor_side_Cal leaf_motor_side_default_cal = {
+const char leaf_motor_side_Version[] = leaf_motor_side_DIGEST;
+
+leaf_motor_side_CALIBRATION const volatile leaf_motor_side_Cal leaf_motor_side_default_cal = {
     .reserved = 0U,
 };
 
@@ -69,6 +72,7 @@ static inline void rates_always(const leaf_motor_side_Self *self, Work *work)
 
 static inline void guards_always(void)
 {
+    /* nothing to do */
 }
 
 static inline void step_always(const leaf_motor_side_Self *self, Work *work)
@@ -140,6 +144,7 @@ static inline void elapse(leaf_motor_side_Self *self, Work *work)
 
 static inline void load(void)
 {
+    /* nothing to do */
 }
 
 static inline void jump_always(void)
@@ -236,13 +241,13 @@ static inline void equations(leaf_motor_side_Self *self)
     }
 }
 
-void leaf_motor_side_Derive(const leaf_motor_side_Cal *cal, leaf_motor_side_Derived *derived)
+void leaf_motor_side_Derive(const volatile leaf_motor_side_Cal *cal, leaf_motor_side_Derived *derived)
 {
     (void)cal;
     derived->reserved = 0U;
 }
 
-void leaf_motor_side_Init(leaf_motor_side_Self *self, const leaf_motor_side_Cal *cal)
+void leaf_motor_side_Init(leaf_motor_side_Self *self, const volatile leaf_motor_side_Cal *cal)
 {
     static const leaf_motor_side_Self zero; /* every member 0 or false */
 
@@ -253,13 +258,13 @@ void leaf_motor_side_Init(leaf_motor_side_Self *self, const leaf_motor_side_Cal 
     self->faults = 0U;
 }
 
-void leaf_motor_side_Calibrate(leaf_motor_side_Self *self, const leaf_motor_side_Cal *cal)
+void leaf_motor_side_Calibrate(leaf_motor_side_Self *self, const volatile leaf_motor_side_Cal *cal)
 {
     leaf_motor_side_Derive(cal, &self->derived);
 }
 
-void leaf_motor_side_Step(leaf_motor_side_Self *self, const leaf_motor_side_Cal *cal, const leaf_motor_side_In *in,
-    leaf_motor_side_Out *out)
+void leaf_motor_side_Step(leaf_motor_side_Self *self, const volatile leaf_motor_side_Cal *cal,
+    const leaf_motor_side_In *in, leaf_motor_side_Out *out)
 {
     Work scratch;
     Work *const work = &scratch;

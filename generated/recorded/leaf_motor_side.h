@@ -20,7 +20,7 @@ enum {
 #define leaf_motor_side_FAULT_zeno (1UL << 0)
 #define leaf_motor_side_FAULT_livelock (1UL << 1)
 
-/* Tunable parameters */
+/* The calibration page: tunable parameters */
 typedef struct {
     uint8_t reserved; /* there are none */
 } leaf_motor_side_Cal;
@@ -63,18 +63,21 @@ typedef struct {
     leaf_motor_side_Derived derived;
 } leaf_motor_side_Self;
 
-/* Default values of the tunable parameters */
-extern const leaf_motor_side_Cal leaf_motor_side_default_cal;
+/* The digest of the Program, which a tool compares with that of its description */
+extern const char leaf_motor_side_Version[17];
+
+/* The page with default values, in a section of its own: leaf_motor_side_MemMap.h */
+extern const volatile leaf_motor_side_Cal leaf_motor_side_default_cal;
 
 /* Before the first step */
-void leaf_motor_side_Init(leaf_motor_side_Self *self, const leaf_motor_side_Cal *cal);
+void leaf_motor_side_Init(leaf_motor_side_Self *self, const volatile leaf_motor_side_Cal *cal);
 
 /* After a change of the calibration page: X_Derive, and a fault if solved numbers do not fit it */
-void leaf_motor_side_Calibrate(leaf_motor_side_Self *self, const leaf_motor_side_Cal *cal);
-void leaf_motor_side_Derive(const leaf_motor_side_Cal *cal, leaf_motor_side_Derived *derived);
+void leaf_motor_side_Calibrate(leaf_motor_side_Self *self, const volatile leaf_motor_side_Cal *cal);
+void leaf_motor_side_Derive(const volatile leaf_motor_side_Cal *cal, leaf_motor_side_Derived *derived);
 
 /* 1/500 s of flow under the inputs of the step before, then those of now */
-void leaf_motor_side_Step(leaf_motor_side_Self *self, const leaf_motor_side_Cal *cal, const leaf_motor_side_In *in,
-    leaf_motor_side_Out *out);
+void leaf_motor_side_Step(leaf_motor_side_Self *self, const volatile leaf_motor_side_Cal *cal,
+    const leaf_motor_side_In *in, leaf_motor_side_Out *out);
 
 #endif

@@ -3,6 +3,7 @@
  * Program digest: edb7e554c63b5430
  */
 #include "leaf_vehicle.h"
+#include "leaf_vehicle_MemMap.h"
 
 #include <float.h>
 #include <math.h>
@@ -38,7 +39,9 @@ static const struct {
     .per_J_v = 0.0053657625138623126, /* 1 / J_v */
 };
 
-const leaf_vehicle_Cal leaf_vehicle_default_cal = {
+const char leaf_vehicle_Version[] = leaf_vehicle_DIGEST;
+
+leaf_vehicle_CALIBRATION const volatile leaf_vehicle_Cal leaf_vehicle_default_cal = {
     .reserved = 0U,
 };
 
@@ -81,6 +84,7 @@ static inline void rates_always(const leaf_vehicle_Self *self, Work *work)
 
 static inline void guards_always(void)
 {
+    /* nothing to do */
 }
 
 static inline void step_always(const leaf_vehicle_Self *self, Work *work)
@@ -161,6 +165,7 @@ static inline void elapse(leaf_vehicle_Self *self, Work *work)
 
 static inline void load(void)
 {
+    /* nothing to do */
 }
 
 static inline void jump_always(void)
@@ -262,13 +267,13 @@ static inline void equations(leaf_vehicle_Self *self)
     }
 }
 
-void leaf_vehicle_Derive(const leaf_vehicle_Cal *cal, leaf_vehicle_Derived *derived)
+void leaf_vehicle_Derive(const volatile leaf_vehicle_Cal *cal, leaf_vehicle_Derived *derived)
 {
     (void)cal;
     derived->reserved = 0U;
 }
 
-void leaf_vehicle_Init(leaf_vehicle_Self *self, const leaf_vehicle_Cal *cal)
+void leaf_vehicle_Init(leaf_vehicle_Self *self, const volatile leaf_vehicle_Cal *cal)
 {
     static const leaf_vehicle_Self zero; /* every member 0 or false */
 
@@ -279,13 +284,13 @@ void leaf_vehicle_Init(leaf_vehicle_Self *self, const leaf_vehicle_Cal *cal)
     self->faults = 0U;
 }
 
-void leaf_vehicle_Calibrate(leaf_vehicle_Self *self, const leaf_vehicle_Cal *cal)
+void leaf_vehicle_Calibrate(leaf_vehicle_Self *self, const volatile leaf_vehicle_Cal *cal)
 {
     leaf_vehicle_Derive(cal, &self->derived);
 }
 
-void leaf_vehicle_Step(leaf_vehicle_Self *self, const leaf_vehicle_Cal *cal, const leaf_vehicle_In *in,
-    leaf_vehicle_Out *out)
+void leaf_vehicle_Step(leaf_vehicle_Self *self, const volatile leaf_vehicle_Cal *cal,
+    const leaf_vehicle_In *in, leaf_vehicle_Out *out)
 {
     Work scratch;
     Work *const work = &scratch;

@@ -20,7 +20,7 @@ enum {
 #define leaf_vehicle_FAULT_zeno (1UL << 0)
 #define leaf_vehicle_FAULT_livelock (1UL << 1)
 
-/* Tunable parameters */
+/* The calibration page: tunable parameters */
 typedef struct {
     uint8_t reserved; /* there are none */
 } leaf_vehicle_Cal;
@@ -62,18 +62,21 @@ typedef struct {
     leaf_vehicle_Derived derived;
 } leaf_vehicle_Self;
 
-/* Default values of the tunable parameters */
-extern const leaf_vehicle_Cal leaf_vehicle_default_cal;
+/* The digest of the Program, which a tool compares with that of its description */
+extern const char leaf_vehicle_Version[17];
+
+/* The page with default values, in a section of its own: leaf_vehicle_MemMap.h */
+extern const volatile leaf_vehicle_Cal leaf_vehicle_default_cal;
 
 /* Before the first step */
-void leaf_vehicle_Init(leaf_vehicle_Self *self, const leaf_vehicle_Cal *cal);
+void leaf_vehicle_Init(leaf_vehicle_Self *self, const volatile leaf_vehicle_Cal *cal);
 
 /* After a change of the calibration page: X_Derive, and a fault if solved numbers do not fit it */
-void leaf_vehicle_Calibrate(leaf_vehicle_Self *self, const leaf_vehicle_Cal *cal);
-void leaf_vehicle_Derive(const leaf_vehicle_Cal *cal, leaf_vehicle_Derived *derived);
+void leaf_vehicle_Calibrate(leaf_vehicle_Self *self, const volatile leaf_vehicle_Cal *cal);
+void leaf_vehicle_Derive(const volatile leaf_vehicle_Cal *cal, leaf_vehicle_Derived *derived);
 
 /* 1/500 s of flow under the inputs of the step before, then those of now */
-void leaf_vehicle_Step(leaf_vehicle_Self *self, const leaf_vehicle_Cal *cal, const leaf_vehicle_In *in,
-    leaf_vehicle_Out *out);
+void leaf_vehicle_Step(leaf_vehicle_Self *self, const volatile leaf_vehicle_Cal *cal,
+    const leaf_vehicle_In *in, leaf_vehicle_Out *out);
 
 #endif

@@ -161,6 +161,7 @@ def test_float32_has_mathematics_of_its_own_without_a_double() -> None:
     assert sorted(files) == [
         "estimator_float32.c",
         "estimator_float32.h",
+        "estimator_float32_MemMap.h",
         "ha_mathf.c",
         "ha_mathf.h",
     ]

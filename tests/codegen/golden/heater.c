@@ -3,6 +3,7 @@
  * Program digest: 9af9e56bcc1b099d
  */
 #include "heater.h"
+#include "heater_MemMap.h"
 
 #include <float.h>
 #include <math.h>
@@ -30,7 +31,9 @@ static const struct {
     .P_loss_t_tick = 0.7000000000000001, /* P_loss * t_tick */
 };
 
-const heater_Cal heater_default_cal = {
+const char heater_Version[] = heater_DIGEST;
+
+heater_CALIBRATION const volatile heater_Cal heater_default_cal = {
     .P_max = 200.0,
 };
 
@@ -46,6 +49,8 @@ static inline void jump_rest(heater_Self *self, const heater_In *in)
         self->timer.rest_heating = 0U;
     } else if (self->timer.rest_heating < 4U) {
         self->timer.rest_heating++;
+    } else {
+        /* nothing to do */
     }
     if (self->timer.rest_heating > 3U) {
         const double reset_heat = 0.1; /* heater modes.rest.transitions.heating.reset.heat */
@@ -61,7 +66,7 @@ static inline void jump_rest(heater_Self *self, const heater_In *in)
     }
 }
 
-static inline void equations_heating(heater_Self *self, const heater_Cal *cal)
+static inline void equations_heating(heater_Self *self, const volatile heater_Cal *cal)
 {
     self->equation.low = self->latched.T < constant.T_on; /* heater equations.low */
     /* heater modes.heating.equations.P */
@@ -104,6 +109,7 @@ static inline void latch(heater_Self *self, const heater_In *in)
 
 static inline void remember(void)
 {
+    /* nothing to do */
 }
 
 static inline void start(heater_Self *self)
@@ -119,13 +125,13 @@ static inline void start(heater_Self *self)
     self->started = true;
 }
 
-void heater_Derive(const heater_Cal *cal, heater_Derived *derived)
+void heater_Derive(const volatile heater_Cal *cal, heater_Derived *derived)
 {
     (void)cal;
     derived->reserved = 0U;
 }
 
-void heater_Init(heater_Self *self, const heater_Cal *cal)
+void heater_Init(heater_Self *self, const volatile heater_Cal *cal)
 {
     static const heater_Self zero; /* every member 0 or false */
 
@@ -137,17 +143,18 @@ void heater_Init(heater_Self *self, const heater_Cal *cal)
     self->latched.T = 200.0;
 }
 
-void heater_Calibrate(heater_Self *self, const heater_Cal *cal)
+void heater_Calibrate(heater_Self *self, const volatile heater_Cal *cal)
 {
     heater_Derive(cal, &self->derived);
 }
 
-void heater_Step(heater_Self *self, const heater_Cal *cal, const heater_In *in,
-    heater_Out *out)
+void heater_Step(heater_Self *self, const volatile heater_Cal *cal,
+    const heater_In *in, heater_Out *out)
 {
     self->fired = 0U;
     latch(self, in);
     if (self->started) {
+        /* nothing to do */
     } else {
         start(self);
     }

@@ -21,7 +21,7 @@ enum {
 #define heater_FAULT_range_T (1UL << 0)
 #define heater_FAULT_range_heat (1UL << 1)
 
-/* Tunable parameters */
+/* The calibration page: tunable parameters */
 typedef struct {
     double P_max; /* W; heater parameters.P_max; 50.0 to 400.0 */
 } heater_Cal;
@@ -64,18 +64,21 @@ typedef struct {
     heater_Derived derived;
 } heater_Self;
 
-/* Default values of the tunable parameters */
-extern const heater_Cal heater_default_cal;
+/* The digest of the Program, which a tool compares with that of its description */
+extern const char heater_Version[17];
+
+/* The page with default values, in a section of its own: heater_MemMap.h */
+extern const volatile heater_Cal heater_default_cal;
 
 /* Before the first step */
-void heater_Init(heater_Self *self, const heater_Cal *cal);
+void heater_Init(heater_Self *self, const volatile heater_Cal *cal);
 
 /* After a change of the calibration page: X_Derive, and a fault if solved numbers do not fit it */
-void heater_Calibrate(heater_Self *self, const heater_Cal *cal);
-void heater_Derive(const heater_Cal *cal, heater_Derived *derived);
+void heater_Calibrate(heater_Self *self, const volatile heater_Cal *cal);
+void heater_Derive(const volatile heater_Cal *cal, heater_Derived *derived);
 
 /* One tick of 1/10 s */
-void heater_Step(heater_Self *self, const heater_Cal *cal, const heater_In *in,
-    heater_Out *out);
+void heater_Step(heater_Self *self, const volatile heater_Cal *cal,
+    const heater_In *in, heater_Out *out);
 
 #endif

@@ -1,0 +1,118 @@
+"""Member: the members of the structures of a module, with what is told of each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from codegen.comment import comment as safe
+from codegen.expression import literal
+from codegen.names import CNames, c_member, c_type
+from codegen.usage import ON_PAGE
+from language.number import NumberType, decimal
+from language.program import Constant, Program, Variable
+from language.units import shown_unit
+
+GROUPS = ("state", "discrete", "latched", "equation", "before", "innovation", "timer", "check")
+"""Nested structs of the instance, in order."""
+
+
+@dataclass(frozen=True)
+class Page:
+    """A calibration page: the `qualifiers` of what points to it, and the constants it `holds`."""
+
+    qualifiers: str
+    holds: frozenset[str]
+
+    @property
+    def holds_solved(self) -> bool:
+        """Tell whether solved numbers are calibrated with what they were solved for."""
+        return "solved" in self.holds
+
+
+CONSTANTS = Page("const", ON_PAGE)
+"""Nobody writes to it while it is read, and solved numbers are constants: on this machine."""
+PAGE = Page("const volatile", ON_PAGE | {"solved"})
+"""On an ECU: a tool may write to it, also the solved numbers with what they were solved for."""
+
+
+@dataclass(frozen=True)
+class Field:
+    """A member of a struct with its comment."""
+
+    type: str
+    name: str
+    comment: str
+    value: str = ""
+    size: int = 0
+
+
+def page_of(program: Program) -> list[Field]:
+    """Return the members of the calibration page, tables among them, with their defaults."""
+    return [_constant(c, program.number) for c in program.constants if c.kind == "tunable"]
+
+
+def members(program: Program, page: Page) -> dict[str, Any]:
+    """The members of the structures."""
+    number, constants, variables = program.number, program.constants, program.variables
+    solved = [_constant(c, number) for c in constants if c.kind == "solved"]
+    return {
+        "calibration": page_of(program),
+        "derived": [_constant(c, number) for c in constants if c.kind == "derived"],
+        "constants": [_constant(c, number) for c in constants if c.name.startswith("constant.")],
+        "axes": [_constant(c, number) for c in constants if c.name.startswith("axis.")],
+        "solved": [] if page.holds_solved else solved,
+        "solved_on_page": solved if page.holds_solved else [],
+        "page": f"{page.qualifiers} {program.name}_Cal",
+        "inputs": [field_of(v, number) for v in program.inputs],
+        "is_new": [field_of(v, number) for v in variables if v.name.startswith("is_new.")],
+        "groups": _groups(program),
+        "memory": [field_of(v, number) for v in variables if v.name.startswith("memory.")],
+        "outputs": _outputs(program),
+    }
+
+
+def field_of(variable: Variable, number: NumberType) -> Field:
+    """Return a variable as a member."""
+    comment = shown_unit(variable.unit) if variable.type == "real" else variable.about
+    if variable.type == "real" and variable.about:
+        comment = f"{shown_unit(variable.unit)}; {variable.about}"
+    member = c_member(variable.name)
+    return Field(c_type(variable, number), member, safe(comment), size=variable.size)
+
+
+def _constant(constant: Constant, number: NumberType) -> Field:
+    comment = "; ".join(text for text in (shown_unit(constant.unit), constant.key) if text)
+    if constant.range:
+        low, high = constant.range
+        comment += f"; {decimal(low, number)} to {decimal(high, number)}"
+    value = literal(constant.value, number)
+    if constant.items:
+        value = f"{{{', '.join(literal(item, number) for item in constant.items)}}}"
+    kind = c_type(Variable(constant.name, constant.type, values=constant.values), number)
+    comment = "; ".join(text for text in (comment, constant.about) if text)
+    return Field(kind, c_member(constant.name), safe(comment), value, len(constant.items))
+
+
+def _groups(program: Program) -> list[tuple[str, list[Field]]]:
+    found = []
+    for group in GROUPS:
+        inside = [v for v in program.variables if v.name.startswith(f"{group}.")]
+        fields = [field_of(v, program.number) for v in inside]
+        if fields:
+            found.append((group, fields))
+    return found
+
+
+def _outputs(program: Program) -> list[dict[str, str]]:
+    types = {v.name: c_type(v, program.number) for v in program.variables}
+    place = CNames(program)
+    return [
+        {
+            "type": types[wire.source],
+            "name": wire.name,
+            "unit": shown_unit(wire.unit),
+            "source": place(wire.source),
+        }
+        for wire in program.outputs
+    ]
