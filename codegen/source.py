@@ -23,8 +23,8 @@ from codegen.names import (
     value_constant,
 )
 from codegen.rendering import render, version
+from codegen.scratch import STEP, Scratch, scratch_of, without_work
 from codegen.statement import INDENT, WIDTH, Writer
-from codegen.unassigned import unassigned
 from codegen.usage import Usage, locals_of, usages
 from language.functions import FUNCTIONS_OF
 from language.invariant import GROUP, INVARIANTS
@@ -76,6 +76,9 @@ def module_context(program: Program, page: Page = CONSTANTS) -> dict[str, Any]:
     kinds = {variable.name: c_type(variable, program.number) for variable in program.variables}
     called = {name.removeprefix("call ") for name in reads(program.blocks.values()) if " " in name}
     shared = _work(program, local)
+    scratch = scratch_of(program, shared, used, page.holds_solved)
+    if scratch and scratch.block != STEP:
+        used = without_work(used, (scratch.block, STEP))
     blocks = [
         _block(program, name, local[name], used, kinds, page) for name in _callees_first(program)
     ]
@@ -83,7 +86,7 @@ def module_context(program: Program, page: Page = CONSTANTS) -> dict[str, Any]:
         **_names(program),
         **members(program, page),
         "work": [field_of(variable, number) for variable in shared],
-        "begun": _begun(program, shared, kinds),
+        "scratch": scratch and {"block": scratch.block, "begun": _begun(program, scratch, kinds)},
         "blocks": [block for block in blocks if block["name"] not in ENTRIES],
         "entries": {block["name"]: block for block in blocks if block["name"] in ENTRIES},
         "has_stamps": "compare_stamps" in program.blocks,
@@ -140,17 +143,13 @@ def _work(program: Program, local: Mapping[str, Iterable[str]]) -> list[Variable
 
 
 def _begun(
-    program: Program, shared: list[Variable], kinds: Mapping[str, str]
+    program: Program, scratch: Scratch, kinds: Mapping[str, str]
 ) -> list[tuple[str, str]] | None:
     """Return what is set when a step begins, and to what; None where all of it is."""
-    if "step" not in program.blocks:
-        return None
-    names = unassigned(program, "step", frozenset(variable.name for variable in shared))
-    early = [variable for variable in shared if variable.name in names]
-    if any(variable.size for variable in early):
+    if scratch.is_cleared:
         return None
     zero = {"bool": "false", REAL[program.number]: literal(0.0, program.number)}
-    return [(c_member(v.name), zero.get(kinds[v.name], "0")) for v in early]
+    return [(c_member(v.name), zero.get(kinds[v.name], "0")) for v in scratch.early]
 
 
 def _block(

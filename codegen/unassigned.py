@@ -5,10 +5,11 @@ Only these are set when X_Step begins; all others are set on every way to where 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from language.operation import (
     Assign,
+    Binary,
     Block,
     Branch,
     Choose,
@@ -43,6 +44,7 @@ class _Way:
         self.shared = shared
         self.sizes = {v.name: v.size for v in program.variables if v.size}
         self.known: dict[tuple[str, Set], Set] = {}
+        self.turn: dict[str, int] = {}
         self.found: set[str] = set()
 
     def run(self, block: Block, done: Set) -> Set:
@@ -57,8 +59,9 @@ class _Way:
         match op:
             case Assign(target, _, _):
                 return done | {target}
-            case Store(array, Value(index), _):
-                return done | {f"{array}[{index}]"}
+            case Store(array, index, _):
+                place = _number(index, self.turn)
+                return done if place is None else done | {f"{array}[{place}]"}
             case Branch(_, then, other):
                 return self.run(then, done) & self.run(other, done)
             case Choose(selector, cases):
@@ -67,7 +70,7 @@ class _Way:
                     self.run(case, done)  # none of them may be taken
                 return done
             case Loop(count, index, body) if count:
-                return self.run(body, done | {index})
+                return self._loop(count, index, body, done | {index})
             case Run(name):
                 if (name, done) not in self.known:
                     self.known[name, done] = self.run(self.program.blocks[name], done)
@@ -75,18 +78,42 @@ class _Way:
             case _:
                 return done
 
+    def _loop(self, count: int, index: str, body: Block, done: Set) -> Set:
+        """Follow each turn of a loop that fills arrays, and the first of any other."""
+        if not any(isinstance(op, Store) for op in body):
+            return self.run(body, done)
+        for turn in range(count):
+            self.turn[index] = turn
+            done = self.run(body, done)
+        del self.turn[index]
+        return done
+
     def _read(self, expr: Expr, done: Set) -> None:
         for part in subexpressions(expr):
             if isinstance(part, Ref) and part.name in self.shared - done:
                 self.found.add(part.name)
             if isinstance(part, Item) and part.name in self.shared:
-                elements = set(_elements(part, self.sizes[part.name]))
+                elements = set(_elements(part, self.sizes[part.name], self.turn))
                 self.found.update({part.name} if elements - done else ())
 
 
-def _elements(item: Item, size: int) -> Iterator[str]:
-    match item.index:
-        case Value(index):
-            yield f"{item.name}[{index}]"
+def _elements(item: Item, size: int, turn: Mapping[str, int]) -> Iterator[str]:
+    place = _number(item.index, turn)
+    places = range(size) if place is None else (place,)
+    yield from (f"{item.name}[{k}]" for k in places)
+
+
+def _number(index: Expr, turn: Mapping[str, int]) -> int | None:
+    """Return what an index is in a turn of loops; None if that hangs on something else."""
+    match index:
+        case Value(value):
+            return int(value)
+        case Ref(name):
+            return turn.get(name)
+        case Binary("+" | "-" as operator, left, right):
+            first, second = _number(left, turn), _number(right, turn)
+            if first is None or second is None:
+                return None
+            return first + second if operator == "+" else first - second
         case _:
-            yield from (f"{item.name}[{k}]" for k in range(size))
+            return None

@@ -14,6 +14,7 @@ from language.check_memory import uses_memory
 from language.evaluate import Scalar
 from language.field import (
     Field,
+    at_state,
     by_mode,
     field_blocks,
     field_variables,
@@ -133,7 +134,8 @@ def _through_events(automaton: Automaton, field: Field, run: ModelRun, length: E
     """One substep, segment by segment, at most `events` jumps."""
     may_jump = Compare("<", Ref("work.event"), whole(run.events))
     at_limit: Block = (FaultBit(EVENT_LIMIT), Assign("work.left", real(0.0)))
-    after: Block = (Branch(may_jump, (by_mode(field, "switch"),), at_limit),)
+    look = (*at_state(field), by_mode(field, "guards"))
+    after: Block = (Branch(may_jump, (*look, by_mode(field, "switch")), at_limit),)
     segment: Block = (
         Assign("work.h", Ref("work.left")),
         by_mode(field, "move"),

@@ -340,8 +340,11 @@ static inline void equations_gap(estimator_simple_Self *self)
         + (constant.c_hs * (self->equation.w_d - self->equation.w_b));
 }
 
-static inline void jump_gap(estimator_simple_Self *self, Work *work)
+static inline void jump_gap(estimator_simple_Self *self)
 {
+    Work scratch;
+    Work *const work = &scratch;
+
     if (!(self->latched.T_req > 0.0)) { /* estimator_simple modes.gap.transitions.drive.when */
         self->timer.gap_drive = 0U;
     } else if (self->timer.gap_drive < 2U) {
@@ -586,9 +589,6 @@ void estimator_simple_Calibrate(estimator_simple_Self *self, const volatile esti
 void estimator_simple_Step(estimator_simple_Self *self, const volatile estimator_simple_Cal *cal,
     const estimator_simple_In *in, estimator_simple_Out *out)
 {
-    Work scratch;
-    Work *const work = &scratch;
-
     self->fired = 0U;
     latch(self, in);
     self->innovation.y_em = 0.0;
@@ -627,7 +627,7 @@ void estimator_simple_Step(estimator_simple_Self *self, const volatile estimator
         jump_drive(self);
         break;
     case estimator_simple_MODE_gap:
-        jump_gap(self, work);
+        jump_gap(self);
         break;
     case estimator_simple_MODE_coast:
         jump_coast(self);

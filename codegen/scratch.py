@@ -1,0 +1,63 @@
+"""Scratch: the block of a module in which the values live that are there within one step only.
+
+That is `step`, unless all of them are for one block that it runs, once, on some ways only: an
+observer's run of a model. Then the steps that do not take that way have no part in it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Container, Mapping
+from dataclasses import dataclass
+
+from codegen.unassigned import unassigned
+from codegen.usage import Usage
+from language.operation import Loop, Run
+from language.program import Program, Variable
+from language.traversal import reads, walk
+
+STEP = "step"
+
+
+@dataclass(frozen=True)
+class Scratch:
+    """The block that has it, and which of its values are set `early`: when it begins."""
+
+    block: str
+    early: tuple[Variable, ...]
+
+    @property
+    def is_cleared(self) -> bool:
+        """Tell whether all of it is 0 when the block begins: there are arrays among the early."""
+        return any(variable.size for variable in self.early)
+
+
+def scratch_of(
+    program: Program, shared: list[Variable], used: Mapping[str, Usage], inside: bool
+) -> Scratch | None:
+    """Return where the `shared` values of a step live; None where there are none.
+
+    `inside` allows for a block that `step` runs.
+    """
+    if not shared or STEP not in program.blocks:
+        return None
+    known = frozenset(variable.name for variable in shared)
+    block = _only(program, known, used) if inside else STEP
+    names = unassigned(program, block, known)
+    return Scratch(block, tuple(v for v in shared if v.name in names))
+
+
+def _only(program: Program, shared: frozenset[str], used: Mapping[str, Usage]) -> str:
+    """Return the one block that `step` runs once and that has all of the values; else `step`."""
+    step = program.blocks[STEP]
+    is_plain = not shared & reads([step]) and not any(isinstance(op, Loop) for op in walk(step))
+    runs = [op.block for op in walk(step) if isinstance(op, Run)]
+    callers = [name for name in runs if "work" in used[name].needs]
+    return callers[0] if is_plain and len(callers) == 1 else STEP
+
+
+def without_work(used: Mapping[str, Usage], blocks: Container[str]) -> dict[str, Usage]:
+    """Return what blocks need from outside, where some have the values of a step themselves."""
+    return {
+        name: Usage(one.needs - {"work"}, one.writes - {"work"}) if name in blocks else one
+        for name, one in used.items()
+    }

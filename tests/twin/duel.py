@@ -1,0 +1,72 @@
+"""Duel: generated C against a twin of the same spec that was written by hand (NOTES.md)."""
+
+from __future__ import annotations
+
+import shutil
+import struct
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+from codegen.build import FLAGS, WARNINGS, linked
+from codegen.harness import fed, write_harness
+from codegen.machine import CORTEX_M4F, HOST, Machine, emulated
+from lockstep.compare import Tape
+
+HERE = Path(__file__).parent
+COUNTING = ("-icount", "shift=0")
+"""Of the emulator: one instruction takes 1 ns."""
+RUN: dict[str, Callable[[Path, bytes], bytes]] = {
+    HOST.name: HOST.run,
+    CORTEX_M4F.name: partial(emulated, options=COUNTING),
+}
+CLOCK = {HOST.name: "clock_host.c", CORTEX_M4F.name: "clock_target.c"}
+
+
+@dataclass(frozen=True)
+class Duel:
+    """How many values `differing`, and what a step takes, of each round (generated, twin):
+    nanoseconds, or on a target instructions.
+    """
+
+    steps: int
+    differing: int
+    rounds: tuple[tuple[float, float], ...]
+
+    @property
+    def best(self) -> tuple[float, float]:
+        """What the generated code and the twin take at best."""
+        generated, twin = zip(*self.rounds, strict=True)
+        return min(generated), min(twin)
+
+    @property
+    def ratio(self) -> float:
+        """What the generated code takes over what the twin does."""
+        generated, twin = self.best
+        return generated / twin
+
+
+def duel(
+    tape: Tape, twin: str, rounds: int, machine: Machine = HOST, flags: Sequence[str] = FLAGS
+) -> Duel:
+    """Run the generated C of a tape's Program and a twin on its inputs, turn by turn."""
+    with tempfile.TemporaryDirectory(prefix="modewright-") as name:
+        folder = Path(name)
+        own = [HERE / f"{twin}_twin.c", HERE / f"{twin}_sides.c", HERE / "duel.c"]
+        own.append(HERE / CLOCK[machine.name])
+        sources = [p for p in write_harness(tape.program, folder, machine) if p.name != "main.c"]
+        for path in (*own, HERE / "duel.h", HERE / f"{twin}_twin.h"):
+            shutil.copyfile(path, folder / path.name)
+        sources += [folder / path.name for path in own]
+        quiet = [word for word in WARNINGS if word != "-Wundef"]
+        words = [*machine.command(None), *flags, *quiet, *map(str, sources)]
+        linked([*words, *machine.link(folder / "harness")], folder / "duel")
+        records = struct.pack("<2d", len(tape.inputs), rounds)
+        size = 8 * len(fed(tape.program))
+        records += b"".join(record[:size] for record in tape.inputs)
+        found = RUN[machine.name](folder / "duel", records)
+    steps, differing, *took = struct.unpack(f"<{len(found) // 8}q", found)
+    pairs = zip(took[::2], took[1::2], strict=True)
+    return Duel(steps, differing, tuple((a / steps, b / steps) for a, b in pairs))
