@@ -504,14 +504,15 @@ typedef struct {
     pull p;
 } piece;
 
-/* Where the gap is left within h: *end, the time until there; *met: which flank, as it looks
- * one MERGE later (that is what the transition of the list reads). */
+/* Where the gap is left within h: q->end, the time until there; *met: the flank met at q->end, before
+ * and after.  Bits: only points where a guard held are kept, so the list's guards there are known. */
 RARE static float locate_in_gap(piece *q, const series *c, float h, int32_t *met)
 {
     point at;
     float low = 0.0F;
     float high = h;
-    int32_t first = GAP;
+    int32_t first = GAP; /* the flank met at high, by the sums */
+    int32_t later;       /* and one MERGE later */
     rests r;
     int i;
 
@@ -531,20 +532,22 @@ RARE static float locate_in_gap(piece *q, const series *c, float h, int32_t *met
             low = s;
         }
     }
-    if (high == h) { /* never met: the guards at the end of the sum, not of the step */
+    if (first != GAP) {
+        *met = first;
+    } else { /* never met: the end of the step is kept, but the sums are asked there */
         first = flank_met_at(&at, c, &r, &q->x, high);
     }
-    *met = flank_met_at(&at, c, &r, &q->x, high + MERGE);
-    if ((*met != GAP) && (*met != first)) {
+    later = flank_met_at(&at, c, &r, &q->x, high + MERGE);
+    if ((later != GAP) && (later != first)) {
         high = high + MERGE;
         q->end = at;
+        *met = later;
     }
     return (high < h) ? high : h;
 }
 
-/* Where the flank is left within h; *left: as it looks at the last point tried (that is what the
- * transition of the list reads). */
-RARE static float locate_on_flank(piece *q, const series *c, float h, int32_t flank, bool *left)
+/* Where the flank is left within h: q->end, the time until there.  Bits: the guard holds there. */
+RARE static float locate_on_flank(piece *q, const series *c, float h, int32_t flank)
 {
     point at;
     float low = 0.0F;
@@ -552,13 +555,11 @@ RARE static float locate_on_flank(piece *q, const series *c, float h, int32_t fl
     int i;
 
     at.theta_b = q->x.theta_b;
-    *left = false;
     for (i = 0; i < HALVINGS; i++) {
         const float s = low + (0.5F * (high - low));
 
         point_at(&at, c, &q->x, s);
-        *left = flank_left(&at, flank);
-        if (*left) {
+        if (flank_left(&at, flank)) {
             high = s;
             q->end = at;
         } else {
@@ -570,8 +571,8 @@ RARE static float locate_on_flank(piece *q, const series *c, float h, int32_t fl
 
 /* estimator modes.gap.runs: the rest of a period in which the driveline changes its mode, or is
  * not in its gap.  x is the begin of the period; in the gap end and p are those of the whole period,
- * known to cross.  Returns the end of the period. */
-RARE static point run_through_events(estimator_twin *self, point x, point end, pull p)
+ * known to cross: at end the flank `met` is met.  Returns the end of the period. */
+RARE static point run_through_events(estimator_twin *self, point x, point end, pull p, int32_t met)
 {
     piece whole;
     piece *const q = &whole;
@@ -598,28 +599,18 @@ RARE static point run_through_events(estimator_twin *self, point x, point end, p
 
     for (event = 0; crossed; event++) {
         if (self->run_mode == GAP) {
-            int32_t met;
-
             h = h - locate_in_gap(q, &c, h, &met);
-            if (event == PIECES - 1) {
-                self->faults |= ESTIMATOR_TWIN_FAULT_EVENT_LIMIT;
-                break;
-            }
-            if (met != GAP) { /* driveline modes.no_contact.transitions.*.reset.theta_b */
-                self->run_mode = met;
-                q->end.theta_b = (met == DRIVE) ? ALPHA : -ALPHA;
-            }
         } else {
-            bool left;
-
-            h = h - locate_on_flank(q, &c, h, self->run_mode, &left);
-            if (event == PIECES - 1) {
-                self->faults |= ESTIMATOR_TWIN_FAULT_EVENT_LIMIT;
-                break;
-            }
-            if (left) {
-                self->run_mode = GAP;
-            }
+            met = GAP;
+            h = h - locate_on_flank(q, &c, h, self->run_mode);
+        }
+        if (event == PIECES - 1) {
+            self->faults |= ESTIMATOR_TWIN_FAULT_EVENT_LIMIT;
+            break;
+        }
+        self->run_mode = met;
+        if (met != GAP) { /* driveline modes.no_contact.transitions.*.reset.theta_b */
+            q->end.theta_b = (met == DRIVE) ? ALPHA : -ALPHA;
         }
         if (!(h > 0.0F)) {
             break;
@@ -636,7 +627,8 @@ RARE static point run_through_events(estimator_twin *self, point x, point end, p
             expand_in_gap(&c, &q->x, &q->p);
             q->end.theta_b = whole_sum(c.theta_b, q->x.theta_b, h);
             point_at(&q->end, &c, &q->x, h);
-            crossed = (flank_met(&q->end) != GAP);
+            met = flank_met(&q->end);
+            crossed = (met != GAP);
         } else {
             q->p = pull_on_flank(self, &q->x);
             expand_on_flank(&c, &q->x, &q->p);
@@ -710,11 +702,15 @@ RARE static void tick_in_gap(estimator_twin *self, const estimator_twin_in *in, 
         const pull second = pull_in_gap_at(self, &middle);
 
         end = period_in_gap(&x, &second);
-        if (UNLIKELY(!(fabsf(end.theta_b) < ALPHA)) && (flank_met(&end) != GAP)) {
-            end = run_through_events(self, x, end, second);
+        if (UNLIKELY(!(fabsf(end.theta_b) < ALPHA))) {
+            const int32_t met = flank_met(&end);
+
+            if (met != GAP) {
+                end = run_through_events(self, x, end, second, met);
+            }
         }
     } else {
-        end = run_through_events(self, x, x, (pull){0});
+        end = run_through_events(self, x, x, (pull){0}, GAP);
     }
 
     HOLD_IN(self, end.w_w, W_W_LOW, W_W_HIGH, ESTIMATOR_TWIN_FAULT_RANGE_W_W);
