@@ -23,7 +23,7 @@ for python in $(PYTHON) python3 python3.14 python3.13 python3.12 python3.11 ""; 
 done
 endef
 
-.PHONY: help setup system-packages demo test target-test verify verify-part prove-diagnosis bench check
+.PHONY: help setup system-packages demo test target-test prove verify verify-part prove-diagnosis bench check
 .PHONY: format generate lock clean
 .PHONY: check-lock check-format check-lint check-types check-floors check-specs check-tests check-generated
 
@@ -36,8 +36,9 @@ setup: $(STAMP) ## build .venv with everything, this project included
 $(STAMP): pyproject.toml uv.lock tools/set_up.py
 	@$(find_python); exec $$python tools/set_up.py
 
-# A compiler for the target and its C library, its emulator, a second compiler for this machine.
-SYSTEM_PACKAGES := gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm clang-19
+# A compiler for the target and its C library, its emulator, a second compiler for this machine,
+# rules of MISRA C, value analysis.
+SYSTEM_PACKAGES := gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm clang-19 cppcheck frama-c-base
 SUDO := $(if $(filter 0,$(shell id -u)),,sudo)
 
 system-packages: ## install what the target needs (Debian, Ubuntu), if it is not there
@@ -63,6 +64,9 @@ test: setup ## run the tests, the same way everywhere
 target-test: setup ## compare the C on an emulated Cortex-M4F with the engine
 	$(BIN)/pytest -n 2 -q tests/target $(ARGS)
 
+prove: setup ## check the C of every sampled automaton by compilers, cppcheck and Frama-C
+	$(BIN)/python tests/verify/proofs.py $(ARGS)
+
 verify: setup ## measure every acceptance figure; with recordings: ARGS="--recordings DIR"
 	$(BIN)/python tests/verify/first_drive.py $(ARGS)
 	$(BIN)/python tests/verify/complete.py
@@ -80,6 +84,8 @@ verify: setup ## measure every acceptance figure; with recordings: ARGS="--recor
 	$(BIN)/python tests/verify/tip_out.py
 	$(BIN)/python tests/verify/kept_stages.py
 	$(BIN)/python tests/verify/target_bits.py
+	$(BIN)/python tests/verify/proofs.py
+	$(BIN)/python tests/verify/twins.py
 	$(BIN)/python tests/verify/machines.py $(ARGS)
 
 verify-part: setup ## measure a fixed part of the figures, as CI does

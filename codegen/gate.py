@@ -7,24 +7,35 @@ another, so where all of them are inside, which is nearly always, one branch tak
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import reduce
 
+from language.number import NumberType
 from language.operation import Assign, Binary, Block, Branch, Call, Compare, Expr, Ref, Run, Value
 from language.program import Program
 from language.substitution import with_expressions
 
+LARGEST: Mapping[NumberType, float] = {
+    "float64": 1.7976931348623157e308,
+    "float32": 3.4028234663852886e38,
+}
 LATCH = "latch"
 APART = "latch_apart"
 """What takes the inputs one by one."""
 
 
-def gated(program: Program) -> Program:
-    """Return a Program that takes its inputs at once where all are within their ranges."""
+def gated(program: Program, by_amount: bool = True) -> Program:
+    """Return a Program that takes its inputs at once where all are within their ranges.
+
+    `by_amount` compares |x| where a range has two equal ends; tools that follow ranges through code
+    know x better without it.
+    """
+    largest = LARGEST[program.number]
     words = frozenset(variable.name for variable in program.variables if variable.values)
 
     def fewer(expr: Expr) -> Expr:
-        return centred(_unsigned(expr, words))
+        plain = _finite(_unsigned(expr, words), largest)
+        return centred(plain) if by_amount else plain
 
     blocks = {name: with_expressions(block, fewer) for name, block in program.blocks.items()}
     taken = blocks.get(LATCH, ())
@@ -43,6 +54,15 @@ def centred(expr: Expr) -> Expr:
             "and", Compare(">=", value, Value(float(low))), Compare("<=", same, Value(float(high)))
         ) if value == same and low == -high <= 0:
             return Compare("<=", Call("abs", (value,)), Value(high))
+    return expr
+
+
+def _finite(expr: Expr, largest: float) -> Expr:
+    """Return `x - x >= 0`, true for what is finite, as a range that ends at the largest number."""
+    match expr:
+        case Compare(">=", Binary("-", value, same), Value(0.0)) if value == same:
+            low, high = Value(-largest), Value(largest)
+            return _both(Compare(">=", value, low), Compare("<=", value, high))
     return expr
 
 

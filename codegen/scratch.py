@@ -16,19 +16,29 @@ from language.program import Program, Variable
 from language.traversal import reads, walk
 
 STEP = "step"
+MOST_ON_STACK = 128
+"""Bytes; more is kept in the instance, whose place the caller knows."""
 
 
 @dataclass(frozen=True)
 class Scratch:
-    """The block that has it, and which of its values are set `early`: when it begins."""
+    """The block that has it, its size [bytes], and which of its values are set `early`: when it
+    begins.
+    """
 
     block: str
+    size: int
     early: tuple[Variable, ...]
 
     @property
     def is_cleared(self) -> bool:
         """Tell whether all of it is 0 when the block begins: there are arrays among the early."""
         return any(variable.size for variable in self.early)
+
+    @property
+    def is_in_instance(self) -> bool:
+        """Tell whether it is a part of the instance, not of the stack."""
+        return self.size > MOST_ON_STACK
 
 
 def scratch_of(
@@ -43,7 +53,9 @@ def scratch_of(
     known = frozenset(variable.name for variable in shared)
     block = _only(program, known, used) if inside else STEP
     names = unassigned(program, block, known)
-    return Scratch(block, tuple(v for v in shared if v.name in names))
+    each = 8 if program.number == "float64" else 4
+    size = sum(each * max(1, variable.size) for variable in shared)
+    return Scratch(block, size, tuple(v for v in shared if v.name in names))
 
 
 def _only(program: Program, shared: frozenset[str], used: Mapping[str, Usage]) -> str:

@@ -41,14 +41,18 @@ ENTRIES = ("init", "derive", "step")
 INLINE = ("min", "max", "clip", "sign", "pow2", "whole", "lookup", "lookup2")
 
 
-def c_files(program: Program) -> dict[str, str]:
+def c_files(program: Program, by_amount: bool = True) -> dict[str, str]:
     """Return the generated files of a Program by name: one that has a `step`.
 
-    A continuous automaton has none where an input varies inside a step: then ValueError.
+    `by_amount` as in `gated`. A continuous automaton has none where an input varies inside a step:
+    then ValueError.
     """
     if "step" not in program.blocks:
         raise ValueError(f"inputs of {program.name} vary inside a step: it has no C")
-    context = {**module_context(gated(stepped(program)), PAGE), "digest": digest(program)}
+    context = {
+        **module_context(gated(stepped(program), by_amount), PAGE),
+        "digest": digest(program),
+    }
     files = {
         f"{program.name}.h": render("module.h.jinja", context),
         f"{program.name}_MemMap.h": render("memory_map.h.jinja", context),
@@ -80,13 +84,15 @@ def module_context(program: Program, page: Page = CONSTANTS) -> dict[str, Any]:
     if scratch and scratch.block != STEP:
         used = without_work(used, (scratch.block, STEP))
     blocks = [
-        _block(program, name, local[name], used, kinds, page) for name in _callees_first(program)
+        _block(program, name, local[name], used, kinds, page, scratch)
+        for name in _callees_first(program)
     ]
     return {
         **_names(program),
         **members(program, page),
         "work": [field_of(variable, number) for variable in shared],
-        "scratch": scratch and {"block": scratch.block, "begun": _begun(program, scratch, kinds)},
+        "scratch": scratch and _scratch(program, scratch, kinds),
+        "work_type": _work_type(program, page, scratch),
         "blocks": [block for block in blocks if block["name"] not in ENTRIES],
         "entries": {block["name"]: block for block in blocks if block["name"] in ENTRIES},
         "has_stamps": "compare_stamps" in program.blocks,
@@ -142,6 +148,20 @@ def _work(program: Program, local: Mapping[str, Iterable[str]]) -> list[Variable
     return [v for v in program.variables if v.name.startswith("work.") and v.name not in inside]
 
 
+def _work_type(program: Program, page: Page, scratch: Scratch | None) -> str:
+    """Return the type of a step's values: where others see it, with the name of the module."""
+    is_seen = page.holds_solved and scratch is not None and scratch.is_in_instance
+    return f"{program.name}_Work" if is_seen else "Work"
+
+
+def _scratch(program: Program, scratch: Scratch, kinds: Mapping[str, str]) -> dict[str, Any]:
+    return {
+        "block": scratch.block,
+        "begun": _begun(program, scratch, kinds),
+        "is_in_instance": scratch.is_in_instance,
+    }
+
+
 def _begun(
     program: Program, scratch: Scratch, kinds: Mapping[str, str]
 ) -> list[tuple[str, str]] | None:
@@ -159,6 +179,7 @@ def _block(
     used: Mapping[str, Usage],
     kinds: Mapping[str, str],
     page: Page,
+    scratch: Scratch | None,
 ) -> dict[str, Any]:
     place = CNames(program, local, SOLVED_ON_PAGE if page.holds_solved else SOLVED_APART)
     writer = Writer(program, used, local, place, kinds)
@@ -166,7 +187,7 @@ def _block(
         "self": f"{program.name}_Self",
         "cal": f"{program.name}_Cal",
         "in": f"{program.name}_In",
-        "work": "Work",
+        "work": _work_type(program, page, scratch),
     }
     qualifiers = dict.fromkeys(types, "const ") | {"cal": f"{page.qualifiers} "}
     usage = used[name]

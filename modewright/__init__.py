@@ -51,6 +51,7 @@ __all__ = [
     "load",
     "lockstep",
     "plot",
+    "prove",
     "read",
     "render_all",
     "replay",

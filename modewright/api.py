@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from codegen.build import optimised
 from codegen.machine import HOST, MACHINES
+from codegen.proofs.all import CHECKS, proofs
+from codegen.proofs.proof import Proof
 from codegen.source import c_files
 from engine.recording import Recording, read_recording
 from engine.replay import Replay, replay as replay_recording, used_columns
@@ -121,12 +123,33 @@ def generate(
     calibrations: Sequence[str] = (),
 ) -> dict[str, str]:
     """Return the C files of an automaton by name. Raises SpecError."""
+    return c_files(_generated(reference, values, root, calibrations))
+
+
+def prove(
+    reference: str,
+    values: Values | None = None,
+    root: Path | None = None,
+    calibrations: Sequence[str] = (),
+    checks: Sequence[str] = CHECKS,
+) -> Iterator[Proof]:
+    """Yield what tools of others say of the C of an automaton: some of the checks, in turn.
+
+    Raises SpecError, ToolMissing.
+    """
+    yield from proofs(_generated(reference, values, root, calibrations), checks)
+
+
+def _generated(
+    reference: str, values: Values | None, root: Path | None, calibrations: Sequence[str]
+) -> Program:
+    """Return the Program that C is made of."""
     project = Project(root or Path())
     document = _document(reference, project, calibrations)
     automaton = automaton_of(document, project, _scalars(values))
     if automaton.is_sampled:
         require_ranges(automaton)
-    return c_files(program_of(automaton))
+    return program_of(automaton)
 
 
 def lockstep(

@@ -29,6 +29,7 @@ from modewright.commands.lockstep import lockstep
 from modewright.commands.lsp import lsp
 from modewright.commands.new import new
 from modewright.commands.plot import plot
+from modewright.commands.prove import prove
 from modewright.commands.recording import recording
 from modewright.commands.replay import replay
 from modewright.commands.schema import schema
@@ -45,7 +46,7 @@ YOUNG_OBJECTS = 100_000
 """New objects after which garbage is looked for: trees of expressions have no circles."""
 COMMANDS = (
     new, check, test, trace, diagnose, fit, effects, simulate, sweep, lockstep, replay, plot,
-    compare, graph, generate, explain, diff, format, schema, lsp, demo, doctor,
+    compare, graph, generate, prove, explain, diff, format, schema, lsp, demo, doctor,
 )  # fmt: skip
 
 app = typer.Typer(

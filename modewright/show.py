@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from codegen.proofs.proof import Proof
 from engine.difference import ModeSequence, RunDifference
 from engine.trajectory import Event, Trajectory
 from lockstep.compare import Verdict
@@ -82,6 +83,25 @@ def print_verdicts(console: Console, verdicts: Sequence[Verdict]) -> None:
             console.print(f"{verdict.name}: {verdict.note}", soft_wrap=True, highlight=False)
         if verdict.first:
             console.print(f"first difference: {verdict.first}", soft_wrap=True, highlight=False)
+
+
+def print_proofs(console: Console, proofs: Sequence[Proof]) -> None:
+    """Print what tools say of generated C, and each thing that they found."""
+    table = Table(box=None, pad_edge=False)
+    for title in ("check", "tool", "of", "found"):
+        table.add_column(title, overflow="fold")
+    for proof in proofs:
+        count = str(len(proof.findings)) if proof.findings else "nothing"
+        table.add_row(proof.check, proof.tool, proof.about, count)
+    console.print(table)
+    for proof in proofs:
+        for finding in proof.findings:
+            console.print(f"{proof.check}: {finding}", soft_wrap=True, highlight=False)
+
+
+def proof_json(proof: Proof) -> dict[str, Any]:
+    """Return what a machine wants of a check of generated C."""
+    return {**vars(proof), "findings": list(proof.findings), "holds": proof.holds}
 
 
 def trajectory_json(trajectory: Trajectory) -> dict[str, Any]:

@@ -54,44 +54,7 @@ driveline_CALIBRATION const volatile driveline_Cal driveline_default_cal = {
     .J_em = 0.05,
 };
 
-/* Values that live within one step */
-typedef struct {
-    double at_w_w;
-    double rate_w_w;
-    double at_w_em;
-    double rate_w_em;
-    double at_theta_d;
-    double rate_theta_d;
-    double at_theta_b;
-    double rate_theta_b;
-    bool guard_0;
-    bool guard_1;
-    double merge;
-    double left;
-    bool is_wait;
-    bool event;
-    bool is_settling;
-    double h;
-    double elapsed;
-    bool crossed;
-    double s;
-    double low;
-    double high;
-    double end_w_w;
-    double series_w_w[3];
-    double end_w_em;
-    double series_w_em[3];
-    double end_theta_d;
-    double series_theta_d[3];
-    double end_theta_b;
-    double series_theta_b[3];
-    double k1_w_w;
-    double k1_w_em;
-    double k1_theta_d;
-    double k1_theta_b;
-} Work;
-
-static inline void rates_drive_contact(const driveline_Self *self, Work *work)
+static inline void rates_drive_contact(const driveline_Self *self, driveline_Work *work)
 {
     /* driveline equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
@@ -117,7 +80,7 @@ static inline void rates_drive_contact(const driveline_Self *self, Work *work)
     work->rate_theta_b = at_w_b; /* driveline flow.theta_b */
 }
 
-static inline void guards_drive_contact(Work *work)
+static inline void guards_drive_contact(driveline_Work *work)
 {
     /* driveline equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
@@ -127,7 +90,7 @@ static inline void guards_drive_contact(Work *work)
     work->guard_0 = at_w_free < 0.0; /* driveline modes.drive_contact.transitions.no_contact.when */
 }
 
-static inline void rates_no_contact(const driveline_Self *self, Work *work)
+static inline void rates_no_contact(const driveline_Self *self, driveline_Work *work)
 {
     /* driveline equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
@@ -156,7 +119,7 @@ static inline void rates_no_contact(const driveline_Self *self, Work *work)
     work->rate_theta_b = at_w_b; /* driveline flow.theta_b */
 }
 
-static inline void guards_no_contact(Work *work)
+static inline void guards_no_contact(driveline_Work *work)
 {
     /* driveline equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
@@ -169,7 +132,7 @@ static inline void guards_no_contact(Work *work)
     work->guard_1 = (work->at_theta_b <= (-constant.alpha)) && (at_w_free < 0.0);
 }
 
-static inline void rates_coast_contact(const driveline_Self *self, Work *work)
+static inline void rates_coast_contact(const driveline_Self *self, driveline_Work *work)
 {
     /* driveline equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
@@ -195,7 +158,7 @@ static inline void rates_coast_contact(const driveline_Self *self, Work *work)
     work->rate_theta_b = at_w_b; /* driveline flow.theta_b */
 }
 
-static inline void guards_coast_contact(Work *work)
+static inline void guards_coast_contact(driveline_Work *work)
 {
     /* driveline equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
@@ -205,7 +168,7 @@ static inline void guards_coast_contact(Work *work)
     work->guard_0 = at_w_free > 0.0; /* driveline modes.coast_contact.transitions.no_contact.when */
 }
 
-static inline void step_drive_contact(const driveline_Self *self, Work *work)
+static inline void step_drive_contact(const driveline_Self *self, driveline_Work *work)
 {
     work->at_w_w = self->state.w_w;
     work->at_w_em = self->state.w_em;
@@ -256,7 +219,7 @@ static inline void step_drive_contact(const driveline_Self *self, Work *work)
         + (2.0 * k3_theta_b) + k4_theta_b));
 }
 
-static inline void series_drive_contact(const driveline_Self *self, Work *work)
+static inline void series_drive_contact(const driveline_Self *self, driveline_Work *work)
 {
     work->at_w_w = work->end_w_w;
     work->at_w_em = work->end_w_em;
@@ -286,7 +249,7 @@ static inline void series_drive_contact(const driveline_Self *self, Work *work)
         (work->k1_theta_b + work->rate_theta_b - (2.0 * slope_theta_b)) / h_squared;
 }
 
-static inline void step_no_contact(const driveline_Self *self, Work *work)
+static inline void step_no_contact(const driveline_Self *self, driveline_Work *work)
 {
     work->at_w_w = self->state.w_w;
     work->at_w_em = self->state.w_em;
@@ -337,7 +300,7 @@ static inline void step_no_contact(const driveline_Self *self, Work *work)
         + (2.0 * k3_theta_b) + k4_theta_b));
 }
 
-static inline void series_no_contact(const driveline_Self *self, Work *work)
+static inline void series_no_contact(const driveline_Self *self, driveline_Work *work)
 {
     work->at_w_w = work->end_w_w;
     work->at_w_em = work->end_w_em;
@@ -367,7 +330,7 @@ static inline void series_no_contact(const driveline_Self *self, Work *work)
         (work->k1_theta_b + work->rate_theta_b - (2.0 * slope_theta_b)) / h_squared;
 }
 
-static inline void step_coast_contact(const driveline_Self *self, Work *work)
+static inline void step_coast_contact(const driveline_Self *self, driveline_Work *work)
 {
     work->at_w_w = self->state.w_w;
     work->at_w_em = self->state.w_em;
@@ -418,7 +381,7 @@ static inline void step_coast_contact(const driveline_Self *self, Work *work)
         + (2.0 * k3_theta_b) + k4_theta_b));
 }
 
-static inline void series_coast_contact(const driveline_Self *self, Work *work)
+static inline void series_coast_contact(const driveline_Self *self, driveline_Work *work)
 {
     work->at_w_w = work->end_w_w;
     work->at_w_em = work->end_w_em;
@@ -448,7 +411,7 @@ static inline void series_coast_contact(const driveline_Self *self, Work *work)
         (work->k1_theta_b + work->rate_theta_b - (2.0 * slope_theta_b)) / h_squared;
 }
 
-static inline void point(const driveline_Self *self, Work *work)
+static inline void point(const driveline_Self *self, driveline_Work *work)
 {
     work->at_w_w = self->state.w_w + (work->s * ((((work->series_w_w[2] * work->s)
         + work->series_w_w[1]) * work->s) + work->series_w_w[0]));
@@ -460,7 +423,7 @@ static inline void point(const driveline_Self *self, Work *work)
         + work->series_theta_b[1]) * work->s) + work->series_theta_b[0]));
 }
 
-static inline void locate_drive_contact(const driveline_Self *self, Work *work)
+static inline void locate_drive_contact(const driveline_Self *self, driveline_Work *work)
 {
     work->low = 0.0;
     work->high = work->h;
@@ -481,7 +444,7 @@ static inline void locate_drive_contact(const driveline_Self *self, Work *work)
     work->elapsed = ha_min(work->high, work->h);
 }
 
-static inline void move_drive_contact(driveline_Self *self, Work *work)
+static inline void move_drive_contact(driveline_Self *self, driveline_Work *work)
 {
     step_drive_contact(self, work);
     work->elapsed = work->h;
@@ -515,7 +478,7 @@ static inline void move_drive_contact(driveline_Self *self, Work *work)
     self->state.theta_b = work->end_theta_b;
 }
 
-static inline void locate_no_contact(const driveline_Self *self, Work *work)
+static inline void locate_no_contact(const driveline_Self *self, driveline_Work *work)
 {
     work->low = 0.0;
     work->high = work->h;
@@ -551,7 +514,7 @@ static inline void locate_no_contact(const driveline_Self *self, Work *work)
     work->elapsed = ha_min(work->high, work->h);
 }
 
-static inline void move_no_contact(driveline_Self *self, Work *work)
+static inline void move_no_contact(driveline_Self *self, driveline_Work *work)
 {
     step_no_contact(self, work);
     work->elapsed = work->h;
@@ -585,7 +548,7 @@ static inline void move_no_contact(driveline_Self *self, Work *work)
     self->state.theta_b = work->end_theta_b;
 }
 
-static inline void locate_coast_contact(const driveline_Self *self, Work *work)
+static inline void locate_coast_contact(const driveline_Self *self, driveline_Work *work)
 {
     work->low = 0.0;
     work->high = work->h;
@@ -606,7 +569,7 @@ static inline void locate_coast_contact(const driveline_Self *self, Work *work)
     work->elapsed = ha_min(work->high, work->h);
 }
 
-static inline void move_coast_contact(driveline_Self *self, Work *work)
+static inline void move_coast_contact(driveline_Self *self, driveline_Work *work)
 {
     step_coast_contact(self, work);
     work->elapsed = work->h;
@@ -649,14 +612,14 @@ static inline void latch(driveline_Self *self, const driveline_In *in)
     self->before.m_g_r_w_sin_slope = constant.m_g_r_w * ha_sin(self->before.slope);
 }
 
-static inline void limit(const driveline_Self *self, Work *work)
+static inline void limit(const driveline_Self *self, driveline_Work *work)
 {
     work->h = work->left;
     work->merge = 9.094947017729282e-13 * ha_max(self->time + work->h, 0.00025);
     work->is_wait = false;
 }
 
-static inline void elapse(driveline_Self *self, Work *work)
+static inline void elapse(driveline_Self *self, driveline_Work *work)
 {
     if (work->crossed && ((work->h - work->elapsed) <= work->merge)) {
         work->elapsed = work->h;
@@ -674,7 +637,7 @@ static inline void load(void)
     /* nothing to do */
 }
 
-static inline void jump_drive_contact(driveline_Self *self, Work *work)
+static inline void jump_drive_contact(driveline_Self *self, driveline_Work *work)
 {
     guards_drive_contact(work);
     if (work->guard_0) {
@@ -683,7 +646,7 @@ static inline void jump_drive_contact(driveline_Self *self, Work *work)
     }
 }
 
-static inline void jump_no_contact(driveline_Self *self, Work *work)
+static inline void jump_no_contact(driveline_Self *self, driveline_Work *work)
 {
     guards_no_contact(work);
     if (work->guard_0) {
@@ -701,7 +664,7 @@ static inline void jump_no_contact(driveline_Self *self, Work *work)
     }
 }
 
-static inline void jump_coast_contact(driveline_Self *self, Work *work)
+static inline void jump_coast_contact(driveline_Self *self, driveline_Work *work)
 {
     guards_coast_contact(work);
     if (work->guard_0) {
@@ -710,7 +673,7 @@ static inline void jump_coast_contact(driveline_Self *self, Work *work)
     }
 }
 
-static inline void jump(driveline_Self *self, Work *work)
+static inline void jump(driveline_Self *self, driveline_Work *work)
 {
     self->fired = 0U;
     work->at_w_w = self->state.w_w;
@@ -732,7 +695,7 @@ static inline void jump(driveline_Self *self, Work *work)
     }
 }
 
-static inline void watch(driveline_Self *self, Work *work)
+static inline void watch(driveline_Self *self, driveline_Work *work)
 {
     work->at_w_w = self->state.w_w;
     work->at_w_em = self->state.w_em;
@@ -758,7 +721,7 @@ static inline void watch(driveline_Self *self, Work *work)
     load();
 }
 
-static inline void settle(driveline_Self *self, Work *work)
+static inline void settle(driveline_Self *self, driveline_Work *work)
 {
     work->is_settling = true;
     for (int32_t micro_step = 0; (micro_step < 4) && (work->is_settling); micro_step++) {
@@ -772,7 +735,7 @@ static inline void settle(driveline_Self *self, Work *work)
     watch(self, work);
 }
 
-static inline void segment(driveline_Self *self, Work *work)
+static inline void segment(driveline_Self *self, driveline_Work *work)
 {
     limit(self, work);
     switch (self->mode) {
@@ -915,8 +878,7 @@ void driveline_Calibrate(driveline_Self *self, const volatile driveline_Cal *cal
 void driveline_Step(driveline_Self *self, const volatile driveline_Cal *cal,
     const driveline_In *in, driveline_Out *out)
 {
-    Work scratch;
-    Work *const work = &scratch;
+    driveline_Work *const work = &self->work;
 
     work->event = false;
     work->elapsed = 0.0;

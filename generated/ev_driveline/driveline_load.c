@@ -54,49 +54,7 @@ driveline_load_CALIBRATION const volatile driveline_load_Cal driveline_load_defa
     .J_em = 0.05,
 };
 
-/* Values that live within one step */
-typedef struct {
-    double at_w_w;
-    double rate_w_w;
-    double at_w_em;
-    double rate_w_em;
-    double at_theta_d;
-    double rate_theta_d;
-    double at_theta_b;
-    double rate_theta_b;
-    double at_T_l;
-    double rate_T_l;
-    bool guard_0;
-    bool guard_1;
-    double merge;
-    double left;
-    bool is_wait;
-    bool event;
-    bool is_settling;
-    double h;
-    double elapsed;
-    bool crossed;
-    double s;
-    double low;
-    double high;
-    double end_w_w;
-    double series_w_w[3];
-    double end_w_em;
-    double series_w_em[3];
-    double end_theta_d;
-    double series_theta_d[3];
-    double end_theta_b;
-    double series_theta_b[3];
-    double end_T_l;
-    double series_T_l[3];
-    double k1_w_w;
-    double k1_w_em;
-    double k1_theta_d;
-    double k1_theta_b;
-    double k1_T_l;
-} Work;
-
-static inline void rates_drive_contact(const driveline_load_Self *self, Work *work)
+static inline void rates_drive_contact(const driveline_load_Self *self, driveline_load_Work *work)
 {
     /* driveline_load equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
@@ -124,7 +82,7 @@ static inline void rates_drive_contact(const driveline_load_Self *self, Work *wo
     work->rate_T_l = 0.0; /* driveline_load flow.T_l */
 }
 
-static inline void guards_drive_contact(Work *work)
+static inline void guards_drive_contact(driveline_load_Work *work)
 {
     /* driveline_load equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
@@ -135,7 +93,7 @@ static inline void guards_drive_contact(Work *work)
     work->guard_0 = at_w_free < 0.0;
 }
 
-static inline void rates_no_contact(const driveline_load_Self *self, Work *work)
+static inline void rates_no_contact(const driveline_load_Self *self, driveline_load_Work *work)
 {
     /* driveline_load equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
@@ -166,7 +124,7 @@ static inline void rates_no_contact(const driveline_load_Self *self, Work *work)
     work->rate_T_l = 0.0; /* driveline_load flow.T_l */
 }
 
-static inline void guards_no_contact(Work *work)
+static inline void guards_no_contact(driveline_load_Work *work)
 {
     /* driveline_load equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
@@ -179,7 +137,7 @@ static inline void guards_no_contact(Work *work)
     work->guard_1 = (work->at_theta_b <= (-constant.alpha)) && (at_w_free < 0.0);
 }
 
-static inline void rates_coast_contact(const driveline_load_Self *self, Work *work)
+static inline void rates_coast_contact(const driveline_load_Self *self, driveline_load_Work *work)
 {
     /* driveline_load equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
@@ -207,7 +165,7 @@ static inline void rates_coast_contact(const driveline_load_Self *self, Work *wo
     work->rate_T_l = 0.0; /* driveline_load flow.T_l */
 }
 
-static inline void guards_coast_contact(Work *work)
+static inline void guards_coast_contact(driveline_load_Work *work)
 {
     /* driveline_load equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
@@ -218,7 +176,7 @@ static inline void guards_coast_contact(Work *work)
     work->guard_0 = at_w_free > 0.0;
 }
 
-static inline void step_drive_contact(const driveline_load_Self *self, Work *work)
+static inline void step_drive_contact(const driveline_load_Self *self, driveline_load_Work *work)
 {
     work->at_w_w = self->state.w_w;
     work->at_w_em = self->state.w_em;
@@ -279,7 +237,7 @@ static inline void step_drive_contact(const driveline_load_Self *self, Work *wor
         self->state.T_l + (h_per_6 * (work->k1_T_l + (2.0 * k2_T_l) + (2.0 * k3_T_l) + k4_T_l));
 }
 
-static inline void series_drive_contact(const driveline_load_Self *self, Work *work)
+static inline void series_drive_contact(const driveline_load_Self *self, driveline_load_Work *work)
 {
     work->at_w_w = work->end_w_w;
     work->at_w_em = work->end_w_em;
@@ -314,7 +272,7 @@ static inline void series_drive_contact(const driveline_load_Self *self, Work *w
     work->series_T_l[2] = (work->k1_T_l + work->rate_T_l - (2.0 * slope_T_l)) / h_squared;
 }
 
-static inline void step_no_contact(const driveline_load_Self *self, Work *work)
+static inline void step_no_contact(const driveline_load_Self *self, driveline_load_Work *work)
 {
     work->at_w_w = self->state.w_w;
     work->at_w_em = self->state.w_em;
@@ -375,7 +333,7 @@ static inline void step_no_contact(const driveline_load_Self *self, Work *work)
         self->state.T_l + (h_per_6 * (work->k1_T_l + (2.0 * k2_T_l) + (2.0 * k3_T_l) + k4_T_l));
 }
 
-static inline void series_no_contact(const driveline_load_Self *self, Work *work)
+static inline void series_no_contact(const driveline_load_Self *self, driveline_load_Work *work)
 {
     work->at_w_w = work->end_w_w;
     work->at_w_em = work->end_w_em;
@@ -410,7 +368,7 @@ static inline void series_no_contact(const driveline_load_Self *self, Work *work
     work->series_T_l[2] = (work->k1_T_l + work->rate_T_l - (2.0 * slope_T_l)) / h_squared;
 }
 
-static inline void step_coast_contact(const driveline_load_Self *self, Work *work)
+static inline void step_coast_contact(const driveline_load_Self *self, driveline_load_Work *work)
 {
     work->at_w_w = self->state.w_w;
     work->at_w_em = self->state.w_em;
@@ -471,7 +429,7 @@ static inline void step_coast_contact(const driveline_load_Self *self, Work *wor
         self->state.T_l + (h_per_6 * (work->k1_T_l + (2.0 * k2_T_l) + (2.0 * k3_T_l) + k4_T_l));
 }
 
-static inline void series_coast_contact(const driveline_load_Self *self, Work *work)
+static inline void series_coast_contact(const driveline_load_Self *self, driveline_load_Work *work)
 {
     work->at_w_w = work->end_w_w;
     work->at_w_em = work->end_w_em;
@@ -506,7 +464,7 @@ static inline void series_coast_contact(const driveline_load_Self *self, Work *w
     work->series_T_l[2] = (work->k1_T_l + work->rate_T_l - (2.0 * slope_T_l)) / h_squared;
 }
 
-static inline void point(const driveline_load_Self *self, Work *work)
+static inline void point(const driveline_load_Self *self, driveline_load_Work *work)
 {
     work->at_w_w = self->state.w_w + (work->s * ((((work->series_w_w[2] * work->s)
         + work->series_w_w[1]) * work->s) + work->series_w_w[0]));
@@ -520,7 +478,7 @@ static inline void point(const driveline_load_Self *self, Work *work)
         + work->series_T_l[1]) * work->s) + work->series_T_l[0]));
 }
 
-static inline void locate_drive_contact(const driveline_load_Self *self, Work *work)
+static inline void locate_drive_contact(const driveline_load_Self *self, driveline_load_Work *work)
 {
     work->low = 0.0;
     work->high = work->h;
@@ -542,7 +500,7 @@ static inline void locate_drive_contact(const driveline_load_Self *self, Work *w
     work->elapsed = ha_min(work->high, work->h);
 }
 
-static inline void move_drive_contact(driveline_load_Self *self, Work *work)
+static inline void move_drive_contact(driveline_load_Self *self, driveline_load_Work *work)
 {
     step_drive_contact(self, work);
     work->elapsed = work->h;
@@ -579,7 +537,7 @@ static inline void move_drive_contact(driveline_load_Self *self, Work *work)
     self->state.T_l = work->end_T_l;
 }
 
-static inline void locate_no_contact(const driveline_load_Self *self, Work *work)
+static inline void locate_no_contact(const driveline_load_Self *self, driveline_load_Work *work)
 {
     work->low = 0.0;
     work->high = work->h;
@@ -617,7 +575,7 @@ static inline void locate_no_contact(const driveline_load_Self *self, Work *work
     work->elapsed = ha_min(work->high, work->h);
 }
 
-static inline void move_no_contact(driveline_load_Self *self, Work *work)
+static inline void move_no_contact(driveline_load_Self *self, driveline_load_Work *work)
 {
     step_no_contact(self, work);
     work->elapsed = work->h;
@@ -654,7 +612,7 @@ static inline void move_no_contact(driveline_load_Self *self, Work *work)
     self->state.T_l = work->end_T_l;
 }
 
-static inline void locate_coast_contact(const driveline_load_Self *self, Work *work)
+static inline void locate_coast_contact(const driveline_load_Self *self, driveline_load_Work *work)
 {
     work->low = 0.0;
     work->high = work->h;
@@ -676,7 +634,7 @@ static inline void locate_coast_contact(const driveline_load_Self *self, Work *w
     work->elapsed = ha_min(work->high, work->h);
 }
 
-static inline void move_coast_contact(driveline_load_Self *self, Work *work)
+static inline void move_coast_contact(driveline_load_Self *self, driveline_load_Work *work)
 {
     step_coast_contact(self, work);
     work->elapsed = work->h;
@@ -722,14 +680,14 @@ static inline void latch(driveline_load_Self *self, const driveline_load_In *in)
     self->before.m_g_r_w_sin_slope = constant.m_g_r_w * ha_sin(self->before.slope);
 }
 
-static inline void limit(const driveline_load_Self *self, Work *work)
+static inline void limit(const driveline_load_Self *self, driveline_load_Work *work)
 {
     work->h = work->left;
     work->merge = 9.094947017729282e-13 * ha_max(self->time + work->h, 0.00025);
     work->is_wait = false;
 }
 
-static inline void elapse(driveline_load_Self *self, Work *work)
+static inline void elapse(driveline_load_Self *self, driveline_load_Work *work)
 {
     if (work->crossed && ((work->h - work->elapsed) <= work->merge)) {
         work->elapsed = work->h;
@@ -747,7 +705,7 @@ static inline void load(void)
     /* nothing to do */
 }
 
-static inline void jump_drive_contact(driveline_load_Self *self, Work *work)
+static inline void jump_drive_contact(driveline_load_Self *self, driveline_load_Work *work)
 {
     guards_drive_contact(work);
     if (work->guard_0) {
@@ -756,7 +714,7 @@ static inline void jump_drive_contact(driveline_load_Self *self, Work *work)
     }
 }
 
-static inline void jump_no_contact(driveline_load_Self *self, Work *work)
+static inline void jump_no_contact(driveline_load_Self *self, driveline_load_Work *work)
 {
     guards_no_contact(work);
     if (work->guard_0) {
@@ -774,7 +732,7 @@ static inline void jump_no_contact(driveline_load_Self *self, Work *work)
     }
 }
 
-static inline void jump_coast_contact(driveline_load_Self *self, Work *work)
+static inline void jump_coast_contact(driveline_load_Self *self, driveline_load_Work *work)
 {
     guards_coast_contact(work);
     if (work->guard_0) {
@@ -783,7 +741,7 @@ static inline void jump_coast_contact(driveline_load_Self *self, Work *work)
     }
 }
 
-static inline void jump(driveline_load_Self *self, Work *work)
+static inline void jump(driveline_load_Self *self, driveline_load_Work *work)
 {
     self->fired = 0U;
     work->at_w_w = self->state.w_w;
@@ -806,7 +764,7 @@ static inline void jump(driveline_load_Self *self, Work *work)
     }
 }
 
-static inline void watch(driveline_load_Self *self, Work *work)
+static inline void watch(driveline_load_Self *self, driveline_load_Work *work)
 {
     work->at_w_w = self->state.w_w;
     work->at_w_em = self->state.w_em;
@@ -833,7 +791,7 @@ static inline void watch(driveline_load_Self *self, Work *work)
     load();
 }
 
-static inline void settle(driveline_load_Self *self, Work *work)
+static inline void settle(driveline_load_Self *self, driveline_load_Work *work)
 {
     work->is_settling = true;
     for (int32_t micro_step = 0; (micro_step < 4) && (work->is_settling); micro_step++) {
@@ -847,7 +805,7 @@ static inline void settle(driveline_load_Self *self, Work *work)
     watch(self, work);
 }
 
-static inline void segment(driveline_load_Self *self, Work *work)
+static inline void segment(driveline_load_Self *self, driveline_load_Work *work)
 {
     limit(self, work);
     switch (self->mode) {
@@ -994,8 +952,7 @@ void driveline_load_Calibrate(driveline_load_Self *self, const volatile drivelin
 void driveline_load_Step(driveline_load_Self *self, const volatile driveline_load_Cal *cal,
     const driveline_load_In *in, driveline_load_Out *out)
 {
-    Work scratch;
-    Work *const work = &scratch;
+    driveline_load_Work *const work = &self->work;
 
     work->event = false;
     work->elapsed = 0.0;

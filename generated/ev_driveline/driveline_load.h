@@ -49,6 +49,48 @@ typedef struct {
     int16_t mode; /* 1 */
 } driveline_load_Out;
 
+/* Values that live within one step */
+typedef struct {
+    double at_w_w;
+    double rate_w_w;
+    double at_w_em;
+    double rate_w_em;
+    double at_theta_d;
+    double rate_theta_d;
+    double at_theta_b;
+    double rate_theta_b;
+    double at_T_l;
+    double rate_T_l;
+    bool guard_0;
+    bool guard_1;
+    double merge;
+    double left;
+    bool is_wait;
+    bool event;
+    bool is_settling;
+    double h;
+    double elapsed;
+    bool crossed;
+    double s;
+    double low;
+    double high;
+    double end_w_w;
+    double series_w_w[3];
+    double end_w_em;
+    double series_w_em[3];
+    double end_theta_d;
+    double series_theta_d[3];
+    double end_theta_b;
+    double series_theta_b[3];
+    double end_T_l;
+    double series_T_l[3];
+    double k1_w_w;
+    double k1_w_em;
+    double k1_theta_d;
+    double k1_theta_b;
+    double k1_T_l;
+} driveline_load_Work;
+
 /* One instance: allocated by the caller, written by this module alone */
 typedef struct {
     struct {
@@ -81,6 +123,7 @@ typedef struct {
     double time; /* s; time since the start: for tolerances only */
     uint32_t faults; /* latched fault bits */
     driveline_load_Derived derived;
+    driveline_load_Work work;
 } driveline_load_Self;
 
 /* The digest of the Program, which a tool compares with that of its description */

@@ -284,44 +284,6 @@ estimator_float32_CALIBRATION const volatile estimator_float32_Cal estimator_flo
     },
 };
 
-/* Values that live within one step */
-typedef struct {
-    float left;
-    float at_w_w;
-    float rate_w_w;
-    float at_w_em;
-    float rate_w_em;
-    float at_theta_d;
-    float rate_theta_d;
-    float at_theta_b;
-    float rate_theta_b;
-    bool guard_0;
-    bool guard_1;
-    float h;
-    float elapsed;
-    bool crossed;
-    float s;
-    float low;
-    float high;
-    float end_w_w;
-    float sum_w_w;
-    float series_w_w[17];
-    float end_w_em;
-    float sum_w_em;
-    float series_w_em[17];
-    float end_theta_d;
-    float sum_theta_d;
-    float series_theta_d[17];
-    float end_theta_b;
-    float sum_theta_b;
-    float series_theta_b[17];
-    float pull_w_w;
-    float pull_w_em;
-    float pull_theta_d;
-    float pull_theta_b;
-    float order;
-} Work;
-
 static inline void latch_apart(estimator_float32_Self *self, const estimator_float32_In *in)
 {
     if ((in->y_em >= (-400.0F)) && (in->y_em <= 2400.0F)) {
@@ -350,7 +312,8 @@ static inline void latch_apart(estimator_float32_Self *self, const estimator_flo
     }
 }
 
-static inline void rates_drive_contact(const estimator_float32_Self *self, Work *work)
+static inline void rates_drive_contact(const estimator_float32_Self *self,
+    estimator_float32_Work *work)
 {
     /* driveline equations.w_d */
     const float at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
@@ -375,7 +338,7 @@ static inline void rates_drive_contact(const estimator_float32_Self *self, Work 
     work->rate_theta_b = at_w_b; /* driveline flow.theta_b */
 }
 
-static inline void guards_drive_contact(Work *work)
+static inline void guards_drive_contact(estimator_float32_Work *work)
 {
     /* driveline equations.w_d */
     const float at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
@@ -386,7 +349,8 @@ static inline void guards_drive_contact(Work *work)
     work->guard_0 = at_w_free < 0.0F;
 }
 
-static inline void rates_no_contact(const estimator_float32_Self *self, Work *work)
+static inline void rates_no_contact(const estimator_float32_Self *self,
+    estimator_float32_Work *work)
 {
     /* driveline equations.w_d */
     const float at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
@@ -413,7 +377,7 @@ static inline void rates_no_contact(const estimator_float32_Self *self, Work *wo
     work->rate_theta_b = at_w_b; /* driveline flow.theta_b */
 }
 
-static inline void guards_no_contact(Work *work)
+static inline void guards_no_contact(estimator_float32_Work *work)
 {
     /* driveline equations.w_d */
     const float at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
@@ -426,7 +390,8 @@ static inline void guards_no_contact(Work *work)
     work->guard_1 = (work->at_theta_b <= (-constant.alpha)) && (at_w_free < 0.0F);
 }
 
-static inline void rates_coast_contact(const estimator_float32_Self *self, Work *work)
+static inline void rates_coast_contact(const estimator_float32_Self *self,
+    estimator_float32_Work *work)
 {
     /* driveline equations.w_d */
     const float at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
@@ -451,7 +416,7 @@ static inline void rates_coast_contact(const estimator_float32_Self *self, Work 
     work->rate_theta_b = at_w_b; /* driveline flow.theta_b */
 }
 
-static inline void guards_coast_contact(Work *work)
+static inline void guards_coast_contact(estimator_float32_Work *work)
 {
     /* driveline equations.w_d */
     const float at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
@@ -463,7 +428,7 @@ static inline void guards_coast_contact(Work *work)
 }
 
 static inline void series_drive_contact(const estimator_float32_Self *self,
-    const volatile estimator_float32_Cal *cal, Work *work)
+    const volatile estimator_float32_Cal *cal, estimator_float32_Work *work)
 {
     work->order = 1.0F;
     work->series_w_w[0] = (cal->solved.drive_contact_A_w_w_w_w * self->state.w_w)
@@ -496,7 +461,7 @@ static inline void series_drive_contact(const estimator_float32_Self *self,
     }
 }
 
-static inline void point(const estimator_float32_Self *self, Work *work)
+static inline void point(const estimator_float32_Self *self, estimator_float32_Work *work)
 {
     work->sum_w_w = 0.0F;
     work->sum_w_em = 0.0F;
@@ -515,7 +480,7 @@ static inline void point(const estimator_float32_Self *self, Work *work)
 }
 
 static inline void step_drive_contact(const estimator_float32_Self *self,
-    const volatile estimator_float32_Cal *cal, Work *work)
+    const volatile estimator_float32_Cal *cal, estimator_float32_Work *work)
 {
     work->at_w_w = self->state.w_w;
     work->at_w_em = self->state.w_em;
@@ -618,7 +583,7 @@ static inline void step_drive_contact(const estimator_float32_Self *self,
 }
 
 static inline void series_no_contact(const estimator_float32_Self *self,
-    const volatile estimator_float32_Cal *cal, Work *work)
+    const volatile estimator_float32_Cal *cal, estimator_float32_Work *work)
 {
     work->order = 1.0F;
     work->series_w_w[0] = (cal->solved.no_contact_A_w_w_w_w * self->state.w_w) + work->pull_w_w;
@@ -648,7 +613,7 @@ static inline void series_no_contact(const estimator_float32_Self *self,
 }
 
 static inline void step_no_contact(const estimator_float32_Self *self,
-    const volatile estimator_float32_Cal *cal, Work *work)
+    const volatile estimator_float32_Cal *cal, estimator_float32_Work *work)
 {
     work->at_w_w = self->state.w_w;
     work->at_w_em = self->state.w_em;
@@ -731,7 +696,7 @@ static inline void step_no_contact(const estimator_float32_Self *self,
 }
 
 static inline void series_coast_contact(const estimator_float32_Self *self,
-    const volatile estimator_float32_Cal *cal, Work *work)
+    const volatile estimator_float32_Cal *cal, estimator_float32_Work *work)
 {
     work->order = 1.0F;
     work->series_w_w[0] = (cal->solved.coast_contact_A_w_w_w_w * self->state.w_w)
@@ -765,7 +730,7 @@ static inline void series_coast_contact(const estimator_float32_Self *self,
 }
 
 static inline void step_coast_contact(const estimator_float32_Self *self,
-    const volatile estimator_float32_Cal *cal, Work *work)
+    const volatile estimator_float32_Cal *cal, estimator_float32_Work *work)
 {
     work->at_w_w = self->state.w_w;
     work->at_w_em = self->state.w_em;
@@ -867,7 +832,8 @@ static inline void step_coast_contact(const estimator_float32_Self *self,
     }
 }
 
-static inline void locate_drive_contact(const estimator_float32_Self *self, Work *work)
+static inline void locate_drive_contact(const estimator_float32_Self *self,
+    estimator_float32_Work *work)
 {
     work->low = 0.0F;
     work->high = work->h;
@@ -889,7 +855,7 @@ static inline void locate_drive_contact(const estimator_float32_Self *self, Work
 }
 
 static inline void move_drive_contact(estimator_float32_Self *self,
-    const volatile estimator_float32_Cal *cal, Work *work)
+    const volatile estimator_float32_Cal *cal, estimator_float32_Work *work)
 {
     step_drive_contact(self, cal, work);
     work->elapsed = work->h;
@@ -909,7 +875,8 @@ static inline void move_drive_contact(estimator_float32_Self *self,
     self->state.theta_b = work->end_theta_b;
 }
 
-static inline void locate_no_contact(const estimator_float32_Self *self, Work *work)
+static inline void locate_no_contact(const estimator_float32_Self *self,
+    estimator_float32_Work *work)
 {
     work->low = 0.0F;
     work->high = work->h;
@@ -946,7 +913,7 @@ static inline void locate_no_contact(const estimator_float32_Self *self, Work *w
 }
 
 static inline void move_no_contact(estimator_float32_Self *self,
-    const volatile estimator_float32_Cal *cal, Work *work)
+    const volatile estimator_float32_Cal *cal, estimator_float32_Work *work)
 {
     step_no_contact(self, cal, work);
     work->elapsed = work->h;
@@ -966,7 +933,8 @@ static inline void move_no_contact(estimator_float32_Self *self,
     self->state.theta_b = work->end_theta_b;
 }
 
-static inline void locate_coast_contact(const estimator_float32_Self *self, Work *work)
+static inline void locate_coast_contact(const estimator_float32_Self *self,
+    estimator_float32_Work *work)
 {
     work->low = 0.0F;
     work->high = work->h;
@@ -988,7 +956,7 @@ static inline void locate_coast_contact(const estimator_float32_Self *self, Work
 }
 
 static inline void move_coast_contact(estimator_float32_Self *self,
-    const volatile estimator_float32_Cal *cal, Work *work)
+    const volatile estimator_float32_Cal *cal, estimator_float32_Work *work)
 {
     step_coast_contact(self, cal, work);
     work->elapsed = work->h;
@@ -1008,14 +976,16 @@ static inline void move_coast_contact(estimator_float32_Self *self,
     self->state.theta_b = work->end_theta_b;
 }
 
-static inline void switch_drive_contact(estimator_float32_Self *self, const Work *work)
+static inline void switch_drive_contact(estimator_float32_Self *self,
+    const estimator_float32_Work *work)
 {
     if (work->guard_0) {
         self->run_mode = estimator_float32_RUN_no_contact;
     }
 }
 
-static inline void switch_no_contact(estimator_float32_Self *self, const Work *work)
+static inline void switch_no_contact(estimator_float32_Self *self,
+    const estimator_float32_Work *work)
 {
     if (work->guard_0) {
         /* driveline modes.no_contact.transitions.drive_contact.reset.theta_b */
@@ -1030,7 +1000,8 @@ static inline void switch_no_contact(estimator_float32_Self *self, const Work *w
     }
 }
 
-static inline void switch_coast_contact(estimator_float32_Self *self, const Work *work)
+static inline void switch_coast_contact(estimator_float32_Self *self,
+    const estimator_float32_Work *work)
 {
     if (work->guard_0) {
         self->run_mode = estimator_float32_RUN_no_contact;
@@ -1121,8 +1092,7 @@ static inline void correct_drive(estimator_float32_Self *self,
 
 static inline void run_gap(estimator_float32_Self *self, const volatile estimator_float32_Cal *cal)
 {
-    Work scratch;
-    Work *const work = &scratch;
+    estimator_float32_Work *const work = &self->work;
 
     work->guard_0 = false;
     work->guard_1 = false;

@@ -295,6 +295,44 @@ typedef struct {
     float T_hs; /* N*m */
 } estimator_float32_Out;
 
+/* Values that live within one step */
+typedef struct {
+    float left;
+    float at_w_w;
+    float rate_w_w;
+    float at_w_em;
+    float rate_w_em;
+    float at_theta_d;
+    float rate_theta_d;
+    float at_theta_b;
+    float rate_theta_b;
+    bool guard_0;
+    bool guard_1;
+    float h;
+    float elapsed;
+    bool crossed;
+    float s;
+    float low;
+    float high;
+    float end_w_w;
+    float sum_w_w;
+    float series_w_w[17];
+    float end_w_em;
+    float sum_w_em;
+    float series_w_em[17];
+    float end_theta_d;
+    float sum_theta_d;
+    float series_theta_d[17];
+    float end_theta_b;
+    float sum_theta_b;
+    float series_theta_b[17];
+    float pull_w_w;
+    float pull_w_em;
+    float pull_theta_d;
+    float pull_theta_b;
+    float order;
+} estimator_float32_Work;
+
 /* One instance: allocated by the caller, written by this module alone */
 typedef struct {
     struct {
@@ -334,6 +372,7 @@ typedef struct {
     uint32_t faults; /* latched fault bits */
     int16_t run_mode; /* mode of the run of driveline */
     estimator_float32_Derived derived;
+    estimator_float32_Work work;
 } estimator_float32_Self;
 
 /* The digest of the Program, which a tool compares with that of its description */

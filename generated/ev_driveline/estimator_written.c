@@ -282,44 +282,6 @@ estimator_written_CALIBRATION const volatile estimator_written_Cal estimator_wri
     },
 };
 
-/* Values that live within one step */
-typedef struct {
-    double left;
-    double at_w_w;
-    double rate_w_w;
-    double at_w_em;
-    double rate_w_em;
-    double at_theta_d;
-    double rate_theta_d;
-    double at_theta_b;
-    double rate_theta_b;
-    bool guard_0;
-    bool guard_1;
-    double h;
-    double elapsed;
-    bool crossed;
-    double s;
-    double low;
-    double high;
-    double end_w_w;
-    double sum_w_w;
-    double series_w_w[27];
-    double end_w_em;
-    double sum_w_em;
-    double series_w_em[27];
-    double end_theta_d;
-    double sum_theta_d;
-    double series_theta_d[27];
-    double end_theta_b;
-    double sum_theta_b;
-    double series_theta_b[27];
-    double pull_w_w;
-    double pull_w_em;
-    double pull_theta_d;
-    double pull_theta_b;
-    double order;
-} Work;
-
 static inline void latch_apart(estimator_written_Self *self, const estimator_written_In *in)
 {
     if ((in->y_em >= (-400.0)) && (in->y_em <= 2400.0)) {
@@ -348,7 +310,8 @@ static inline void latch_apart(estimator_written_Self *self, const estimator_wri
     }
 }
 
-static inline void rates_drive_contact(const estimator_written_Self *self, Work *work)
+static inline void rates_drive_contact(const estimator_written_Self *self,
+    estimator_written_Work *work)
 {
     /* driveline equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
@@ -373,7 +336,7 @@ static inline void rates_drive_contact(const estimator_written_Self *self, Work 
     work->rate_theta_b = at_w_b; /* driveline flow.theta_b */
 }
 
-static inline void guards_drive_contact(Work *work)
+static inline void guards_drive_contact(estimator_written_Work *work)
 {
     /* driveline equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
@@ -383,7 +346,8 @@ static inline void guards_drive_contact(Work *work)
     work->guard_0 = at_w_free < 0.0; /* driveline modes.drive_contact.transitions.no_contact.when */
 }
 
-static inline void rates_no_contact(const estimator_written_Self *self, Work *work)
+static inline void rates_no_contact(const estimator_written_Self *self,
+    estimator_written_Work *work)
 {
     /* driveline equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
@@ -411,7 +375,7 @@ static inline void rates_no_contact(const estimator_written_Self *self, Work *wo
     work->rate_theta_b = at_w_b; /* driveline flow.theta_b */
 }
 
-static inline void guards_no_contact(Work *work)
+static inline void guards_no_contact(estimator_written_Work *work)
 {
     /* driveline equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
@@ -424,7 +388,8 @@ static inline void guards_no_contact(Work *work)
     work->guard_1 = (work->at_theta_b <= (-constant.alpha)) && (at_w_free < 0.0);
 }
 
-static inline void rates_coast_contact(const estimator_written_Self *self, Work *work)
+static inline void rates_coast_contact(const estimator_written_Self *self,
+    estimator_written_Work *work)
 {
     /* driveline equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
@@ -449,7 +414,7 @@ static inline void rates_coast_contact(const estimator_written_Self *self, Work 
     work->rate_theta_b = at_w_b; /* driveline flow.theta_b */
 }
 
-static inline void guards_coast_contact(Work *work)
+static inline void guards_coast_contact(estimator_written_Work *work)
 {
     /* driveline equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
@@ -460,7 +425,7 @@ static inline void guards_coast_contact(Work *work)
 }
 
 static inline void series_drive_contact(const estimator_written_Self *self,
-    const volatile estimator_written_Cal *cal, Work *work)
+    const volatile estimator_written_Cal *cal, estimator_written_Work *work)
 {
     work->order = 1.0;
     work->series_w_w[0] = (cal->solved.drive_contact_A_w_w_w_w * self->state.w_w)
@@ -493,7 +458,7 @@ static inline void series_drive_contact(const estimator_written_Self *self,
     }
 }
 
-static inline void point(const estimator_written_Self *self, Work *work)
+static inline void point(const estimator_written_Self *self, estimator_written_Work *work)
 {
     work->sum_w_w = 0.0;
     work->sum_w_em = 0.0;
@@ -512,7 +477,7 @@ static inline void point(const estimator_written_Self *self, Work *work)
 }
 
 static inline void step_drive_contact(const estimator_written_Self *self,
-    const volatile estimator_written_Cal *cal, Work *work)
+    const volatile estimator_written_Cal *cal, estimator_written_Work *work)
 {
     work->at_w_w = self->state.w_w;
     work->at_w_em = self->state.w_em;
@@ -615,7 +580,7 @@ static inline void step_drive_contact(const estimator_written_Self *self,
 }
 
 static inline void series_no_contact(const estimator_written_Self *self,
-    const volatile estimator_written_Cal *cal, Work *work)
+    const volatile estimator_written_Cal *cal, estimator_written_Work *work)
 {
     work->order = 1.0;
     work->series_w_w[0] = (cal->solved.no_contact_A_w_w_w_w * self->state.w_w) + work->pull_w_w;
@@ -645,7 +610,7 @@ static inline void series_no_contact(const estimator_written_Self *self,
 }
 
 static inline void step_no_contact(const estimator_written_Self *self,
-    const volatile estimator_written_Cal *cal, Work *work)
+    const volatile estimator_written_Cal *cal, estimator_written_Work *work)
 {
     work->at_w_w = self->state.w_w;
     work->at_w_em = self->state.w_em;
@@ -728,7 +693,7 @@ static inline void step_no_contact(const estimator_written_Self *self,
 }
 
 static inline void series_coast_contact(const estimator_written_Self *self,
-    const volatile estimator_written_Cal *cal, Work *work)
+    const volatile estimator_written_Cal *cal, estimator_written_Work *work)
 {
     work->order = 1.0;
     work->series_w_w[0] = (cal->solved.coast_contact_A_w_w_w_w * self->state.w_w)
@@ -762,7 +727,7 @@ static inline void series_coast_contact(const estimator_written_Self *self,
 }
 
 static inline void step_coast_contact(const estimator_written_Self *self,
-    const volatile estimator_written_Cal *cal, Work *work)
+    const volatile estimator_written_Cal *cal, estimator_written_Work *work)
 {
     work->at_w_w = self->state.w_w;
     work->at_w_em = self->state.w_em;
@@ -864,7 +829,8 @@ static inline void step_coast_contact(const estimator_written_Self *self,
     }
 }
 
-static inline void locate_drive_contact(const estimator_written_Self *self, Work *work)
+static inline void locate_drive_contact(const estimator_written_Self *self,
+    estimator_written_Work *work)
 {
     work->low = 0.0;
     work->high = work->h;
@@ -886,7 +852,7 @@ static inline void locate_drive_contact(const estimator_written_Self *self, Work
 }
 
 static inline void move_drive_contact(estimator_written_Self *self,
-    const volatile estimator_written_Cal *cal, Work *work)
+    const volatile estimator_written_Cal *cal, estimator_written_Work *work)
 {
     step_drive_contact(self, cal, work);
     work->elapsed = work->h;
@@ -906,7 +872,8 @@ static inline void move_drive_contact(estimator_written_Self *self,
     self->state.theta_b = work->end_theta_b;
 }
 
-static inline void locate_no_contact(const estimator_written_Self *self, Work *work)
+static inline void locate_no_contact(const estimator_written_Self *self,
+    estimator_written_Work *work)
 {
     work->low = 0.0;
     work->high = work->h;
@@ -943,7 +910,7 @@ static inline void locate_no_contact(const estimator_written_Self *self, Work *w
 }
 
 static inline void move_no_contact(estimator_written_Self *self,
-    const volatile estimator_written_Cal *cal, Work *work)
+    const volatile estimator_written_Cal *cal, estimator_written_Work *work)
 {
     step_no_contact(self, cal, work);
     work->elapsed = work->h;
@@ -963,7 +930,8 @@ static inline void move_no_contact(estimator_written_Self *self,
     self->state.theta_b = work->end_theta_b;
 }
 
-static inline void locate_coast_contact(const estimator_written_Self *self, Work *work)
+static inline void locate_coast_contact(const estimator_written_Self *self,
+    estimator_written_Work *work)
 {
     work->low = 0.0;
     work->high = work->h;
@@ -985,7 +953,7 @@ static inline void locate_coast_contact(const estimator_written_Self *self, Work
 }
 
 static inline void move_coast_contact(estimator_written_Self *self,
-    const volatile estimator_written_Cal *cal, Work *work)
+    const volatile estimator_written_Cal *cal, estimator_written_Work *work)
 {
     step_coast_contact(self, cal, work);
     work->elapsed = work->h;
@@ -1005,14 +973,16 @@ static inline void move_coast_contact(estimator_written_Self *self,
     self->state.theta_b = work->end_theta_b;
 }
 
-static inline void switch_drive_contact(estimator_written_Self *self, const Work *work)
+static inline void switch_drive_contact(estimator_written_Self *self,
+    const estimator_written_Work *work)
 {
     if (work->guard_0) {
         self->run_mode = estimator_written_RUN_no_contact;
     }
 }
 
-static inline void switch_no_contact(estimator_written_Self *self, const Work *work)
+static inline void switch_no_contact(estimator_written_Self *self,
+    const estimator_written_Work *work)
 {
     if (work->guard_0) {
         /* driveline modes.no_contact.transitions.drive_contact.reset.theta_b */
@@ -1027,7 +997,8 @@ static inline void switch_no_contact(estimator_written_Self *self, const Work *w
     }
 }
 
-static inline void switch_coast_contact(estimator_written_Self *self, const Work *work)
+static inline void switch_coast_contact(estimator_written_Self *self,
+    const estimator_written_Work *work)
 {
     if (work->guard_0) {
         self->run_mode = estimator_written_RUN_no_contact;
@@ -1120,8 +1091,7 @@ static inline void correct_drive(estimator_written_Self *self,
 
 static inline void run_gap(estimator_written_Self *self, const volatile estimator_written_Cal *cal)
 {
-    Work scratch;
-    Work *const work = &scratch;
+    estimator_written_Work *const work = &self->work;
 
     work->guard_0 = false;
     work->guard_1 = false;

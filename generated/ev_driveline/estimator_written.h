@@ -293,6 +293,44 @@ typedef struct {
     double T_hs; /* N*m */
 } estimator_written_Out;
 
+/* Values that live within one step */
+typedef struct {
+    double left;
+    double at_w_w;
+    double rate_w_w;
+    double at_w_em;
+    double rate_w_em;
+    double at_theta_d;
+    double rate_theta_d;
+    double at_theta_b;
+    double rate_theta_b;
+    bool guard_0;
+    bool guard_1;
+    double h;
+    double elapsed;
+    bool crossed;
+    double s;
+    double low;
+    double high;
+    double end_w_w;
+    double sum_w_w;
+    double series_w_w[27];
+    double end_w_em;
+    double sum_w_em;
+    double series_w_em[27];
+    double end_theta_d;
+    double sum_theta_d;
+    double series_theta_d[27];
+    double end_theta_b;
+    double sum_theta_b;
+    double series_theta_b[27];
+    double pull_w_w;
+    double pull_w_em;
+    double pull_theta_d;
+    double pull_theta_b;
+    double order;
+} estimator_written_Work;
+
 /* One instance: allocated by the caller, written by this module alone */
 typedef struct {
     struct {
@@ -332,6 +370,7 @@ typedef struct {
     uint32_t faults; /* latched fault bits */
     int16_t run_mode; /* mode of the run of driveline */
     estimator_written_Derived derived;
+    estimator_written_Work work;
 } estimator_written_Self;
 
 /* The digest of the Program, which a tool compares with that of its description */

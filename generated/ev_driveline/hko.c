@@ -211,96 +211,13 @@ hko_CALIBRATION const volatile hko_Cal hko_default_cal = {
     },
 };
 
-/* Values that live within one step */
-typedef struct {
-    double t_theta_d__theta_d;
-    double t_theta_d__w_em;
-    double t_theta_d__w_w;
-    double t_theta_d__T_l;
-    double pc_theta_d;
-    double gain_theta_d;
-    double t_w_em__theta_d;
-    double t_w_em__w_em;
-    double t_w_em__w_w;
-    double t_w_em__T_l;
-    double pc_w_em;
-    double gain_w_em;
-    double density_w_em;
-    double t_w_w__theta_d;
-    double t_w_w__w_em;
-    double t_w_w__w_w;
-    double t_w_w__T_l;
-    double pc_w_w;
-    double gain_w_w;
-    double t_T_l__theta_d;
-    double t_T_l__w_em;
-    double t_T_l__w_w;
-    double t_T_l__T_l;
-    double pc_T_l;
-    double gain_T_l;
-    double spread;
-    double residual;
-    int32_t place;
-    double after_w_w;
-    double after_w_em;
-    double after_theta_d;
-    double after_theta_b;
-    double after_T_l;
-    double past_T_em;
-    double after_T_em;
-    double past_T_br;
-    double after_T_br;
-    int32_t back;
-    bool until;
-    double rest;
-    double reset_theta_b;
-    double new_theta_d;
-    double new_w_em;
-    double new_w_w;
-    double new_T_l;
-    double left;
-    double at_w_w;
-    double rate_w_w;
-    double at_w_em;
-    double rate_w_em;
-    double at_theta_d;
-    double rate_theta_d;
-    double at_theta_b;
-    double rate_theta_b;
-    double at_T_l;
-    double rate_T_l;
-    bool guard_0;
-    bool guard_1;
-    double h;
-    double elapsed;
-    bool crossed;
-    double s;
-    double low;
-    double high;
-    double end_w_w;
-    double series_w_w[3];
-    double end_w_em;
-    double series_w_em[3];
-    double end_theta_d;
-    double series_theta_d[3];
-    double end_theta_b;
-    double series_theta_b[3];
-    double end_T_l;
-    double series_T_l[3];
-    double k1_w_w;
-    double k1_w_em;
-    double k1_theta_d;
-    double k1_theta_b;
-    double k1_T_l;
-} Work;
-
 static inline void latch_apart(hko_Self *self, const hko_In *in)
 {
     if ((in->y_em >= (-400.0)) && (in->y_em <= 2400.0)) {
         self->latched.y_em = in->y_em; /* inputs.y_em */
     } else {
         self->faults |= hko_FAULT_range_y_em;
-        if ((in->y_em - in->y_em) >= 0.0) {
+        if (fabs(in->y_em) <= 1.7976931348623157e+308) {
             self->latched.y_em = ha_clip(in->y_em, -400.0, 2400.0);
         }
     }
@@ -308,7 +225,7 @@ static inline void latch_apart(hko_Self *self, const hko_In *in)
         self->latched.y_w = in->y_w; /* inputs.y_w */
     } else {
         self->faults |= hko_FAULT_range_y_w;
-        if ((in->y_w - in->y_w) >= 0.0) {
+        if (fabs(in->y_w) <= 1.7976931348623157e+308) {
             self->latched.y_w = ha_clip(in->y_w, -50.0, 300.0);
         }
     }
@@ -316,7 +233,7 @@ static inline void latch_apart(hko_Self *self, const hko_In *in)
         self->latched.T_em = in->T_em; /* inputs.T_em */
     } else {
         self->faults |= hko_FAULT_range_T_em;
-        if ((in->T_em - in->T_em) >= 0.0) {
+        if (fabs(in->T_em) <= 1.7976931348623157e+308) {
             self->latched.T_em = ha_clip(in->T_em, -400.0, 400.0);
         } else {
             self->latched.T_em = 0.0;
@@ -326,7 +243,7 @@ static inline void latch_apart(hko_Self *self, const hko_In *in)
         self->latched.T_br = in->T_br; /* inputs.T_br */
     } else {
         self->faults |= hko_FAULT_range_T_br;
-        if ((in->T_br - in->T_br) >= 0.0) {
+        if (fabs(in->T_br) <= 1.7976931348623157e+308) {
             self->latched.T_br = ha_clip(in->T_br, 0.0, 3000.0);
         } else {
             self->latched.T_br = 0.0;
@@ -334,7 +251,7 @@ static inline void latch_apart(hko_Self *self, const hko_In *in)
     }
 }
 
-static inline void rates_drive_contact(const hko_Self *self, Work *work)
+static inline void rates_drive_contact(const hko_Self *self, hko_Work *work)
 {
     /* driveline_load equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
@@ -362,7 +279,7 @@ static inline void rates_drive_contact(const hko_Self *self, Work *work)
     work->rate_T_l = 0.0; /* driveline_load flow.T_l */
 }
 
-static inline void guards_drive_contact(Work *work)
+static inline void guards_drive_contact(hko_Work *work)
 {
     /* driveline_load equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
@@ -373,7 +290,7 @@ static inline void guards_drive_contact(Work *work)
     work->guard_0 = at_w_free < 0.0;
 }
 
-static inline void rates_no_contact(const hko_Self *self, Work *work)
+static inline void rates_no_contact(const hko_Self *self, hko_Work *work)
 {
     /* driveline_load equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
@@ -404,7 +321,7 @@ static inline void rates_no_contact(const hko_Self *self, Work *work)
     work->rate_T_l = 0.0; /* driveline_load flow.T_l */
 }
 
-static inline void guards_no_contact(Work *work)
+static inline void guards_no_contact(hko_Work *work)
 {
     /* driveline_load equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
@@ -417,7 +334,7 @@ static inline void guards_no_contact(Work *work)
     work->guard_1 = (work->at_theta_b <= (-constant.alpha)) && (at_w_free < 0.0);
 }
 
-static inline void rates_coast_contact(const hko_Self *self, Work *work)
+static inline void rates_coast_contact(const hko_Self *self, hko_Work *work)
 {
     /* driveline_load equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
@@ -445,7 +362,7 @@ static inline void rates_coast_contact(const hko_Self *self, Work *work)
     work->rate_T_l = 0.0; /* driveline_load flow.T_l */
 }
 
-static inline void guards_coast_contact(Work *work)
+static inline void guards_coast_contact(hko_Work *work)
 {
     /* driveline_load equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
@@ -456,7 +373,7 @@ static inline void guards_coast_contact(Work *work)
     work->guard_0 = at_w_free > 0.0;
 }
 
-static inline void step_drive_contact(const hko_Self *self, Work *work)
+static inline void step_drive_contact(const hko_Self *self, hko_Work *work)
 {
     work->at_w_w = self->state.w_w;
     work->at_w_em = self->state.w_em;
@@ -517,7 +434,7 @@ static inline void step_drive_contact(const hko_Self *self, Work *work)
         self->state.T_l + (h_per_6 * (work->k1_T_l + (2.0 * k2_T_l) + (2.0 * k3_T_l) + k4_T_l));
 }
 
-static inline void series_drive_contact(const hko_Self *self, Work *work)
+static inline void series_drive_contact(const hko_Self *self, hko_Work *work)
 {
     work->at_w_w = work->end_w_w;
     work->at_w_em = work->end_w_em;
@@ -552,7 +469,7 @@ static inline void series_drive_contact(const hko_Self *self, Work *work)
     work->series_T_l[2] = (work->k1_T_l + work->rate_T_l - (2.0 * slope_T_l)) / h_squared;
 }
 
-static inline void step_no_contact(const hko_Self *self, Work *work)
+static inline void step_no_contact(const hko_Self *self, hko_Work *work)
 {
     work->at_w_w = self->state.w_w;
     work->at_w_em = self->state.w_em;
@@ -613,7 +530,7 @@ static inline void step_no_contact(const hko_Self *self, Work *work)
         self->state.T_l + (h_per_6 * (work->k1_T_l + (2.0 * k2_T_l) + (2.0 * k3_T_l) + k4_T_l));
 }
 
-static inline void series_no_contact(const hko_Self *self, Work *work)
+static inline void series_no_contact(const hko_Self *self, hko_Work *work)
 {
     work->at_w_w = work->end_w_w;
     work->at_w_em = work->end_w_em;
@@ -648,7 +565,7 @@ static inline void series_no_contact(const hko_Self *self, Work *work)
     work->series_T_l[2] = (work->k1_T_l + work->rate_T_l - (2.0 * slope_T_l)) / h_squared;
 }
 
-static inline void step_coast_contact(const hko_Self *self, Work *work)
+static inline void step_coast_contact(const hko_Self *self, hko_Work *work)
 {
     work->at_w_w = self->state.w_w;
     work->at_w_em = self->state.w_em;
@@ -709,7 +626,7 @@ static inline void step_coast_contact(const hko_Self *self, Work *work)
         self->state.T_l + (h_per_6 * (work->k1_T_l + (2.0 * k2_T_l) + (2.0 * k3_T_l) + k4_T_l));
 }
 
-static inline void series_coast_contact(const hko_Self *self, Work *work)
+static inline void series_coast_contact(const hko_Self *self, hko_Work *work)
 {
     work->at_w_w = work->end_w_w;
     work->at_w_em = work->end_w_em;
@@ -744,7 +661,7 @@ static inline void series_coast_contact(const hko_Self *self, Work *work)
     work->series_T_l[2] = (work->k1_T_l + work->rate_T_l - (2.0 * slope_T_l)) / h_squared;
 }
 
-static inline void point(const hko_Self *self, Work *work)
+static inline void point(const hko_Self *self, hko_Work *work)
 {
     work->at_w_w = self->state.w_w + (work->s * ((((work->series_w_w[2] * work->s)
         + work->series_w_w[1]) * work->s) + work->series_w_w[0]));
@@ -758,7 +675,7 @@ static inline void point(const hko_Self *self, Work *work)
         + work->series_T_l[1]) * work->s) + work->series_T_l[0]));
 }
 
-static inline void locate_drive_contact(const hko_Self *self, Work *work)
+static inline void locate_drive_contact(const hko_Self *self, hko_Work *work)
 {
     work->low = 0.0;
     work->high = work->h;
@@ -780,7 +697,7 @@ static inline void locate_drive_contact(const hko_Self *self, Work *work)
     work->elapsed = ha_min(work->high, work->h);
 }
 
-static inline void move_drive_contact(hko_Self *self, Work *work)
+static inline void move_drive_contact(hko_Self *self, hko_Work *work)
 {
     step_drive_contact(self, work);
     work->elapsed = work->h;
@@ -802,7 +719,7 @@ static inline void move_drive_contact(hko_Self *self, Work *work)
     self->state.T_l = work->end_T_l;
 }
 
-static inline void locate_no_contact(const hko_Self *self, Work *work)
+static inline void locate_no_contact(const hko_Self *self, hko_Work *work)
 {
     work->low = 0.0;
     work->high = work->h;
@@ -840,7 +757,7 @@ static inline void locate_no_contact(const hko_Self *self, Work *work)
     work->elapsed = ha_min(work->high, work->h);
 }
 
-static inline void move_no_contact(hko_Self *self, Work *work)
+static inline void move_no_contact(hko_Self *self, hko_Work *work)
 {
     step_no_contact(self, work);
     work->elapsed = work->h;
@@ -862,7 +779,7 @@ static inline void move_no_contact(hko_Self *self, Work *work)
     self->state.T_l = work->end_T_l;
 }
 
-static inline void locate_coast_contact(const hko_Self *self, Work *work)
+static inline void locate_coast_contact(const hko_Self *self, hko_Work *work)
 {
     work->low = 0.0;
     work->high = work->h;
@@ -884,7 +801,7 @@ static inline void locate_coast_contact(const hko_Self *self, Work *work)
     work->elapsed = ha_min(work->high, work->h);
 }
 
-static inline void move_coast_contact(hko_Self *self, Work *work)
+static inline void move_coast_contact(hko_Self *self, hko_Work *work)
 {
     step_coast_contact(self, work);
     work->elapsed = work->h;
@@ -906,14 +823,14 @@ static inline void move_coast_contact(hko_Self *self, Work *work)
     self->state.T_l = work->end_T_l;
 }
 
-static inline void switch_drive_contact(hko_Self *self, const Work *work)
+static inline void switch_drive_contact(hko_Self *self, const hko_Work *work)
 {
     if (work->guard_0) {
         self->run_mode = hko_RUN_no_contact;
     }
 }
 
-static inline void switch_no_contact(hko_Self *self, const Work *work)
+static inline void switch_no_contact(hko_Self *self, const hko_Work *work)
 {
     if (work->guard_0) {
         /* driveline_load modes.no_contact.transitions.drive_contact.reset.theta_b */
@@ -928,14 +845,14 @@ static inline void switch_no_contact(hko_Self *self, const Work *work)
     }
 }
 
-static inline void switch_coast_contact(hko_Self *self, const Work *work)
+static inline void switch_coast_contact(hko_Self *self, const hko_Work *work)
 {
     if (work->guard_0) {
         self->run_mode = hko_RUN_no_contact;
     }
 }
 
-static inline void run_drive(hko_Self *self, Work *work)
+static inline void run_drive(hko_Self *self, hko_Work *work)
 {
     work->h = 0.001; /* hko modes.drive.runs */
     step_drive_contact(self, work);
@@ -981,7 +898,7 @@ static inline void run_drive(hko_Self *self, Work *work)
     }
 }
 
-static inline void predict_drive(hko_Self *self, const volatile hko_Cal *cal, Work *work)
+static inline void predict_drive(hko_Self *self, const volatile hko_Cal *cal, hko_Work *work)
 {
     /* hko modes.drive.observer.process_noise.w_em */
     work->density_w_em =
@@ -1094,7 +1011,7 @@ static inline void predict_drive(hko_Self *self, const volatile hko_Cal *cal, Wo
 }
 
 static inline void correct_drive(hko_Self *self, const volatile hko_Cal *cal, const hko_In *in,
-    Work *work)
+    hko_Work *work)
 {
     if (in->is_new.y_em) {
         self->innovation.y_em = self->latched.y_em - self->state.w_em;
@@ -1206,7 +1123,7 @@ static inline void correct_drive(hko_Self *self, const volatile hko_Cal *cal, co
     }
 }
 
-static inline void rest_gap(hko_Self *self, Work *work)
+static inline void rest_gap(hko_Self *self, hko_Work *work)
 {
     work->left = work->rest; /* hko modes.gap.runs */
     for (int32_t event = 0; (event < 5) && (work->left > 0.0); event++) {
@@ -1301,13 +1218,13 @@ static inline void rest_gap(hko_Self *self, Work *work)
     }
 }
 
-static inline void run_gap(hko_Self *self, Work *work)
+static inline void run_gap(hko_Self *self, hko_Work *work)
 {
     work->rest = 0.001; /* hko modes.gap.runs */
     rest_gap(self, work);
 }
 
-static inline void predict_gap(hko_Self *self, const volatile hko_Cal *cal, Work *work)
+static inline void predict_gap(hko_Self *self, const volatile hko_Cal *cal, hko_Work *work)
 {
     switch (self->run_mode) {
     case hko_RUN_drive_contact:
@@ -1601,7 +1518,7 @@ static inline void predict_gap(hko_Self *self, const volatile hko_Cal *cal, Work
 }
 
 static inline void correct_gap(hko_Self *self, const volatile hko_Cal *cal, const hko_In *in,
-    Work *work)
+    hko_Work *work)
 {
     if (in->is_new.y_em) {
         self->innovation.y_em = self->latched.y_em - self->state.w_em;
@@ -1713,7 +1630,7 @@ static inline void correct_gap(hko_Self *self, const volatile hko_Cal *cal, cons
     }
 }
 
-static inline void run_coast(hko_Self *self, Work *work)
+static inline void run_coast(hko_Self *self, hko_Work *work)
 {
     work->h = 0.001; /* hko modes.coast.runs */
     step_coast_contact(self, work);
@@ -1759,7 +1676,7 @@ static inline void run_coast(hko_Self *self, Work *work)
     }
 }
 
-static inline void predict_coast(hko_Self *self, const volatile hko_Cal *cal, Work *work)
+static inline void predict_coast(hko_Self *self, const volatile hko_Cal *cal, hko_Work *work)
 {
     /* hko modes.coast.observer.process_noise.w_em */
     work->density_w_em =
@@ -1872,7 +1789,7 @@ static inline void predict_coast(hko_Self *self, const volatile hko_Cal *cal, Wo
 }
 
 static inline void correct_coast(hko_Self *self, const volatile hko_Cal *cal, const hko_In *in,
-    Work *work)
+    hko_Work *work)
 {
     if (in->is_new.y_em) {
         self->innovation.y_em = self->latched.y_em - self->state.w_em;
@@ -2001,7 +1918,7 @@ static inline void equations_drive(hko_Self *self, const volatile hko_Cal *cal)
         + (constant.c_hs * (self->equation.w_d - self->equation.w_b));
 }
 
-static inline void until_drive_0(Work *work)
+static inline void until_drive_0(hko_Work *work)
 {
     const double past_w_d = (work->at_w_em * constant.per_R) - work->at_w_w; /* hko equations.w_d */
     const double past_w_b = 0.0; /* hko modes.drive.equations.w_b */
@@ -2012,7 +1929,7 @@ static inline void until_drive_0(Work *work)
     work->until = past_T_hs <= 0.0; /* hko modes.drive.transitions.gap.rewind.until */
 }
 
-static inline void back_drive_0(hko_Self *self, Work *work)
+static inline void back_drive_0(hko_Self *self, hko_Work *work)
 {
     work->at_w_w = self->state.w_w;
     work->at_w_em = self->state.w_em;
@@ -2149,7 +2066,7 @@ static inline void back_drive_0(hko_Self *self, Work *work)
     }
 }
 
-static inline void jump_drive(hko_Self *self, Work *work)
+static inline void jump_drive(hko_Self *self, hko_Work *work)
 {
     if (self->equation.T_hs < (-constant.T_hyst)) {
         back_drive_0(self, work);
@@ -2196,7 +2113,7 @@ static inline void equations_gap(hko_Self *self, const volatile hko_Cal *cal)
         - self->equation.w_b));
 }
 
-static inline void jump_gap(hko_Self *self, Work *work)
+static inline void jump_gap(hko_Self *self, hko_Work *work)
 {
     /* hko modes.gap.transitions.watch_drive.when */
     if (!(self->equation.T_acc > self->equation.T_sum)) {
@@ -2276,7 +2193,7 @@ static inline void equations_coast(hko_Self *self, const volatile hko_Cal *cal)
         + (constant.c_hs * (self->equation.w_d - self->equation.w_b));
 }
 
-static inline void until_coast_0(Work *work)
+static inline void until_coast_0(hko_Work *work)
 {
     const double past_w_d = (work->at_w_em * constant.per_R) - work->at_w_w; /* hko equations.w_d */
     const double past_w_b = 0.0; /* hko modes.coast.equations.w_b */
@@ -2287,7 +2204,7 @@ static inline void until_coast_0(Work *work)
     work->until = past_T_hs >= 0.0; /* hko modes.coast.transitions.gap.rewind.until */
 }
 
-static inline void back_coast_0(hko_Self *self, Work *work)
+static inline void back_coast_0(hko_Self *self, hko_Work *work)
 {
     work->at_w_w = self->state.w_w;
     work->at_w_em = self->state.w_em;
@@ -2424,7 +2341,7 @@ static inline void back_coast_0(hko_Self *self, Work *work)
     }
 }
 
-static inline void jump_coast(hko_Self *self, Work *work)
+static inline void jump_coast(hko_Self *self, hko_Work *work)
 {
     if (self->equation.T_hs > constant.T_hyst) {
         back_coast_0(self, work);
@@ -2533,7 +2450,8 @@ static inline void keep(hko_Self *self)
     }
 }
 
-static inline void start(hko_Self *self, const volatile hko_Cal *cal, const hko_In *in, Work *work)
+static inline void start(hko_Self *self, const volatile hko_Cal *cal, const hko_In *in,
+    hko_Work *work)
 {
     if (fabs(constant.alpha) <= 0.5) {
         self->state.theta_d = constant.alpha; /* hko states.theta_d.initial */
@@ -2617,8 +2535,7 @@ void hko_Calibrate(hko_Self *self, const volatile hko_Cal *cal)
 void hko_Step(hko_Self *self, const volatile hko_Cal *cal,
     const hko_In *in, hko_Out *out)
 {
-    Work scratch;
-    Work *const work = &scratch;
+    hko_Work *const work = &self->work;
 
     work->rest = 0.0;
     work->guard_0 = false;

@@ -218,6 +218,89 @@ typedef struct {
     uint32_t faults; /* 1 */
 } hko_Out;
 
+/* Values that live within one step */
+typedef struct {
+    double t_theta_d__theta_d;
+    double t_theta_d__w_em;
+    double t_theta_d__w_w;
+    double t_theta_d__T_l;
+    double pc_theta_d;
+    double gain_theta_d;
+    double t_w_em__theta_d;
+    double t_w_em__w_em;
+    double t_w_em__w_w;
+    double t_w_em__T_l;
+    double pc_w_em;
+    double gain_w_em;
+    double density_w_em;
+    double t_w_w__theta_d;
+    double t_w_w__w_em;
+    double t_w_w__w_w;
+    double t_w_w__T_l;
+    double pc_w_w;
+    double gain_w_w;
+    double t_T_l__theta_d;
+    double t_T_l__w_em;
+    double t_T_l__w_w;
+    double t_T_l__T_l;
+    double pc_T_l;
+    double gain_T_l;
+    double spread;
+    double residual;
+    int32_t place;
+    double after_w_w;
+    double after_w_em;
+    double after_theta_d;
+    double after_theta_b;
+    double after_T_l;
+    double past_T_em;
+    double after_T_em;
+    double past_T_br;
+    double after_T_br;
+    int32_t back;
+    bool until;
+    double rest;
+    double reset_theta_b;
+    double new_theta_d;
+    double new_w_em;
+    double new_w_w;
+    double new_T_l;
+    double left;
+    double at_w_w;
+    double rate_w_w;
+    double at_w_em;
+    double rate_w_em;
+    double at_theta_d;
+    double rate_theta_d;
+    double at_theta_b;
+    double rate_theta_b;
+    double at_T_l;
+    double rate_T_l;
+    bool guard_0;
+    bool guard_1;
+    double h;
+    double elapsed;
+    bool crossed;
+    double s;
+    double low;
+    double high;
+    double end_w_w;
+    double series_w_w[3];
+    double end_w_em;
+    double series_w_em[3];
+    double end_theta_d;
+    double series_theta_d[3];
+    double end_theta_b;
+    double series_theta_b[3];
+    double end_T_l;
+    double series_T_l[3];
+    double k1_w_w;
+    double k1_w_em;
+    double k1_theta_d;
+    double k1_theta_b;
+    double k1_T_l;
+} hko_Work;
+
 /* One instance: allocated by the caller, written by this module alone */
 typedef struct {
     struct {
@@ -282,6 +365,7 @@ typedef struct {
     uint32_t faults; /* latched fault bits */
     int16_t run_mode; /* mode of the run of driveline_load */
     hko_Derived derived;
+    hko_Work work;
 } hko_Self;
 
 /* The digest of the Program, which a tool compares with that of its description */

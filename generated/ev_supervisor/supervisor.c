@@ -34,57 +34,6 @@ supervisor_CALIBRATION const volatile supervisor_Cal supervisor_default_cal = {
     .v_creep = 1.6666666F,
 };
 
-/* Values that live within one step */
-typedef struct {
-    bool level_1;
-    bool edge_1;
-    uint16_t wish_chart;
-    uint16_t takes_chart;
-    int32_t low_chart;
-    int32_t high_chart;
-    bool heard_chart;
-    uint16_t wish_operation_drive_torque;
-    uint16_t takes_operation_drive_torque;
-    int32_t low_operation_drive_torque;
-    int32_t high_operation_drive_torque;
-    bool heard_operation_drive_torque;
-    uint16_t wish_operation_drive_derating;
-    uint16_t takes_operation_drive_derating;
-    int32_t low_operation_drive_derating;
-    int32_t high_operation_drive_derating;
-    bool heard_operation_drive_derating;
-    uint16_t wish_main;
-    uint16_t takes_main;
-    int32_t low_main;
-    int32_t high_main;
-    bool heard_main;
-    uint16_t wish_pre;
-    uint16_t takes_pre;
-    int32_t low_pre;
-    int32_t high_pre;
-    bool heard_pre;
-    bool keeps;
-    bool is_first;
-    bool is_over;
-    int32_t head;
-    int32_t tail;
-    int32_t event;
-    int32_t queue[5];
-    bool enter_operation_standby;
-    bool enter_operation_precharge;
-    bool enter_operation_ready;
-    bool exit_operation_drive;
-    bool enter_fault;
-    int32_t steps;
-    bool is_busy;
-    float reset_T_cmd;
-    bool reset_main_cmd;
-    bool reset_pre_cmd;
-    float next_T_cmd;
-    float next_share;
-    bool decided_permit;
-} Work;
-
 static inline void latch_apart(supervisor_Self *self, const supervisor_In *in)
 {
     if (in->key <= supervisor_key_crank) {
@@ -96,7 +45,7 @@ static inline void latch_apart(supervisor_Self *self, const supervisor_In *in)
         self->latched.U_dc = in->U_dc; /* inputs.U_dc */
     } else {
         self->faults |= supervisor_FAULT_range_U_dc;
-        if ((in->U_dc - in->U_dc) >= 0.0F) {
+        if (fabsf(in->U_dc) <= 3.4028235e+38F) {
             self->latched.U_dc = ha_clipf(in->U_dc, 0.0F, 500.0F);
         } else {
             self->latched.U_dc = 0.0F;
@@ -106,7 +55,7 @@ static inline void latch_apart(supervisor_Self *self, const supervisor_In *in)
         self->latched.U_pack = in->U_pack; /* inputs.U_pack */
     } else {
         self->faults |= supervisor_FAULT_range_U_pack;
-        if ((in->U_pack - in->U_pack) >= 0.0F) {
+        if (fabsf(in->U_pack) <= 3.4028235e+38F) {
             self->latched.U_pack = ha_clipf(in->U_pack, 0.0F, 500.0F);
         } else {
             self->latched.U_pack = 0.0F;
@@ -116,7 +65,7 @@ static inline void latch_apart(supervisor_Self *self, const supervisor_In *in)
         self->latched.T_req = in->T_req; /* inputs.T_req */
     } else {
         self->faults |= supervisor_FAULT_range_T_req;
-        if ((in->T_req - in->T_req) >= 0.0F) {
+        if (fabsf(in->T_req) <= 3.4028235e+38F) {
             self->latched.T_req = ha_clipf(in->T_req, -400.0F, 400.0F);
         } else {
             self->latched.T_req = 0.0F;
@@ -126,7 +75,7 @@ static inline void latch_apart(supervisor_Self *self, const supervisor_In *in)
         self->latched.v = in->v; /* inputs.v */
     } else {
         self->faults |= supervisor_FAULT_range_v;
-        if ((in->v - in->v) >= 0.0F) {
+        if (fabsf(in->v) <= 3.4028235e+38F) {
             self->latched.v = ha_clipf(in->v, -20.0F, 80.0F);
         }
     }
@@ -134,7 +83,7 @@ static inline void latch_apart(supervisor_Self *self, const supervisor_In *in)
         self->latched.temp = in->temp; /* inputs.temp */
     } else {
         self->faults |= supervisor_FAULT_range_temp;
-        if ((in->temp - in->temp) >= 0.0F) {
+        if (fabsf(in->temp) <= 3.4028235e+38F) {
             self->latched.temp = ha_clipf(in->temp, 233.15F, 473.15F);
         }
     }
@@ -291,13 +240,14 @@ static inline void equations_fault(supervisor_Self *self)
 }
 
 static inline void update_operation_drive_torque_creep(const supervisor_Self *self,
-    const volatile supervisor_Cal *cal, Work *work)
+    const volatile supervisor_Cal *cal, supervisor_Work *work)
 {
     /* supervisor modes.operation.modes.drive.regions.torque.modes.creep.update.T_cmd */
     work->next_T_cmd = self->discrete.share * cal->T_creep;
 }
 
-static inline void store_operation_drive_torque_creep(supervisor_Self *self, const Work *work)
+static inline void store_operation_drive_torque_creep(supervisor_Self *self,
+    const supervisor_Work *work)
 {
     if (fabsf(work->next_T_cmd) <= 400.0F) {
         self->discrete.T_cmd = work->next_T_cmd;
@@ -307,13 +257,15 @@ static inline void store_operation_drive_torque_creep(supervisor_Self *self, con
     }
 }
 
-static inline void update_operation_drive_torque_pull(const supervisor_Self *self, Work *work)
+static inline void update_operation_drive_torque_pull(const supervisor_Self *self,
+    supervisor_Work *work)
 {
     /* supervisor modes.operation.modes.drive.regions.torque.modes.pull.update.T_cmd */
     work->next_T_cmd = self->discrete.share * self->latched.T_req;
 }
 
-static inline void store_operation_drive_torque_pull(supervisor_Self *self, const Work *work)
+static inline void store_operation_drive_torque_pull(supervisor_Self *self,
+    const supervisor_Work *work)
 {
     if (fabsf(work->next_T_cmd) <= 400.0F) {
         self->discrete.T_cmd = work->next_T_cmd;
@@ -324,13 +276,14 @@ static inline void store_operation_drive_torque_pull(supervisor_Self *self, cons
 }
 
 static inline void update_operation_drive_torque_regen(const supervisor_Self *self,
-    const volatile supervisor_Cal *cal, Work *work)
+    const volatile supervisor_Cal *cal, supervisor_Work *work)
 {
     /* supervisor modes.operation.modes.drive.regions.torque.modes.regen.update.T_cmd */
     work->next_T_cmd = self->discrete.share * ha_maxf(self->latched.T_req, -cal->T_regen);
 }
 
-static inline void store_operation_drive_torque_regen(supervisor_Self *self, const Work *work)
+static inline void store_operation_drive_torque_regen(supervisor_Self *self,
+    const supervisor_Work *work)
 {
     if (fabsf(work->next_T_cmd) <= 400.0F) {
         self->discrete.T_cmd = work->next_T_cmd;
@@ -340,13 +293,14 @@ static inline void store_operation_drive_torque_regen(supervisor_Self *self, con
     }
 }
 
-static inline void update_operation_drive_derating_cool(Work *work)
+static inline void update_operation_drive_derating_cool(supervisor_Work *work)
 {
     /* supervisor modes.operation.modes.drive.regions.derating.modes.cool.update.share */
     work->next_share = 1.0F;
 }
 
-static inline void store_operation_drive_derating_cool(supervisor_Self *self, const Work *work)
+static inline void store_operation_drive_derating_cool(supervisor_Self *self,
+    const supervisor_Work *work)
 {
     if ((work->next_share >= 0.0F) && (work->next_share <= 1.0F)) {
         self->discrete.share = work->next_share;
@@ -356,13 +310,15 @@ static inline void store_operation_drive_derating_cool(supervisor_Self *self, co
     }
 }
 
-static inline void update_operation_drive_derating_warm(const supervisor_Self *self, Work *work)
+static inline void update_operation_drive_derating_warm(const supervisor_Self *self,
+    supervisor_Work *work)
 {
     /* supervisor modes.operation.modes.drive.regions.derating.modes.warm.update.share */
     work->next_share = ha_lookupf(axis_lim_1, 3, constant.lim, self->latched.temp);
 }
 
-static inline void store_operation_drive_derating_warm(supervisor_Self *self, const Work *work)
+static inline void store_operation_drive_derating_warm(supervisor_Self *self,
+    const supervisor_Work *work)
 {
     if ((work->next_share >= 0.0F) && (work->next_share <= 1.0F)) {
         self->discrete.share = work->next_share;
@@ -372,7 +328,8 @@ static inline void store_operation_drive_derating_warm(supervisor_Self *self, co
     }
 }
 
-static inline void count_operation(supervisor_Self *self, const supervisor_In *in, const Work *work)
+static inline void count_operation(supervisor_Self *self, const supervisor_In *in,
+    const supervisor_Work *work)
 {
     if (work->is_first) {
         if (in->hv_ok) { /* supervisor modes.operation.transitions.fault.when */
@@ -393,7 +350,7 @@ static inline void count_operation(supervisor_Self *self, const supervisor_In *i
     }
 }
 
-static inline void choose_operation(const supervisor_Self *self, Work *work)
+static inline void choose_operation(const supervisor_Self *self, supervisor_Work *work)
 {
     if (self->timer.operation_fault > 3U) {
         work->wish_chart = 19U; /* supervisor modes.operation.transitions.fault */
@@ -405,14 +362,14 @@ static inline void choose_operation(const supervisor_Self *self, Work *work)
 }
 
 static inline void choose_operation_standby(const supervisor_Self *self, const supervisor_In *in,
-    Work *work)
+    supervisor_Work *work)
 {
     if ((self->latched.key == supervisor_key_ignition) && in->hv_ok) {
         work->wish_chart = 1U; /* supervisor modes.operation.modes.standby.transitions.precharge */
     }
 }
 
-static inline void count_operation_precharge(supervisor_Self *self, const Work *work)
+static inline void count_operation_precharge(supervisor_Self *self, const supervisor_Work *work)
 {
     if (work->is_first) {
         /* supervisor modes.operation.modes.precharge.transitions.ready.when */
@@ -434,7 +391,7 @@ static inline void count_operation_precharge(supervisor_Self *self, const Work *
     }
 }
 
-static inline void choose_operation_precharge(const supervisor_Self *self, Work *work)
+static inline void choose_operation_precharge(const supervisor_Self *self, supervisor_Work *work)
 {
     if (self->timer.operation_precharge_ready > 5U) {
         work->wish_chart = 2U; /* supervisor modes.operation.modes.precharge.transitions.ready */
@@ -447,7 +404,7 @@ static inline void choose_operation_precharge(const supervisor_Self *self, Work 
     }
 }
 
-static inline void choose_operation_ready(const supervisor_Self *self, Work *work)
+static inline void choose_operation_ready(const supervisor_Self *self, supervisor_Work *work)
 {
     if (self->equation.main_closed && (self->latched.key == supervisor_key_crank)) {
         work->wish_chart = 5U; /* supervisor modes.operation.modes.ready.transitions.drive */
@@ -458,7 +415,7 @@ static inline void choose_operation_ready(const supervisor_Self *self, Work *wor
     }
 }
 
-static inline void count_operation_drive(supervisor_Self *self, Work *work)
+static inline void count_operation_drive(supervisor_Self *self, supervisor_Work *work)
 {
     if (work->is_first) {
         work->level_1 = self->latched.key == supervisor_key_parked;
@@ -473,7 +430,7 @@ static inline void count_operation_drive(supervisor_Self *self, Work *work)
     }
 }
 
-static inline void choose_operation_drive(Work *work)
+static inline void choose_operation_drive(supervisor_Work *work)
 {
     if (work->edge_1) {
         work->wish_chart = 7U; /* supervisor modes.operation.modes.drive.transitions.ready */
@@ -481,7 +438,7 @@ static inline void choose_operation_drive(Work *work)
 }
 
 static inline void choose_operation_drive_torque_creep(const supervisor_Self *self,
-    const volatile supervisor_Cal *cal, Work *work)
+    const volatile supervisor_Cal *cal, supervisor_Work *work)
 {
     if (self->latched.T_req > 1.0F) {
         /* supervisor modes.operation.modes.drive.regions.torque.modes.creep.transitions.pull */
@@ -494,7 +451,8 @@ static inline void choose_operation_drive_torque_creep(const supervisor_Self *se
     }
 }
 
-static inline void choose_operation_drive_torque_pull(const supervisor_Self *self, Work *work)
+static inline void choose_operation_drive_torque_pull(const supervisor_Self *self,
+    supervisor_Work *work)
 {
     if (self->latched.T_req <= 0.0F) {
         /* supervisor modes.operation.modes.drive.regions.torque.modes.pull.transitions.creep */
@@ -503,7 +461,7 @@ static inline void choose_operation_drive_torque_pull(const supervisor_Self *sel
 }
 
 static inline void count_operation_drive_torque_regen(supervisor_Self *self,
-    const volatile supervisor_Cal *cal, const Work *work)
+    const volatile supervisor_Cal *cal, const supervisor_Work *work)
 {
     if (work->is_first) {
         /* supervisor modes.operation.modes.drive.regions.torque.modes.regen.transitions.creep.when */
@@ -525,7 +483,8 @@ static inline void count_operation_drive_torque_regen(supervisor_Self *self,
     }
 }
 
-static inline void choose_operation_drive_torque_regen(const supervisor_Self *self, Work *work)
+static inline void choose_operation_drive_torque_regen(const supervisor_Self *self,
+    supervisor_Work *work)
 {
     if (self->timer.operation_drive_torque_regen_creep > 2U) {
         /* supervisor modes.operation.modes.drive.regions.torque.modes.regen.transitions.creep */
@@ -533,7 +492,8 @@ static inline void choose_operation_drive_torque_regen(const supervisor_Self *se
     }
 }
 
-static inline void count_operation_drive_derating_cool(supervisor_Self *self, const Work *work)
+static inline void count_operation_drive_derating_cool(supervisor_Self *self,
+    const supervisor_Work *work)
 {
     if (work->is_first) {
         /* supervisor modes.operation.modes.drive.regions.derating.modes.cool.transitions.warm.when */
@@ -555,7 +515,8 @@ static inline void count_operation_drive_derating_cool(supervisor_Self *self, co
     }
 }
 
-static inline void choose_operation_drive_derating_cool(const supervisor_Self *self, Work *work)
+static inline void choose_operation_drive_derating_cool(const supervisor_Self *self,
+    supervisor_Work *work)
 {
     if (self->timer.operation_drive_derating_cool_warm > 100U) {
         /* supervisor modes.operation.modes.drive.regions.derating.modes.cool.transitions.warm */
@@ -563,7 +524,8 @@ static inline void choose_operation_drive_derating_cool(const supervisor_Self *s
     }
 }
 
-static inline void count_operation_drive_derating_warm(supervisor_Self *self, const Work *work)
+static inline void count_operation_drive_derating_warm(supervisor_Self *self,
+    const supervisor_Work *work)
 {
     if (work->is_first) {
         /* supervisor modes.operation.modes.drive.regions.derating.modes.warm.transitions.cool.when */
@@ -585,7 +547,8 @@ static inline void count_operation_drive_derating_warm(supervisor_Self *self, co
     }
 }
 
-static inline void choose_operation_drive_derating_warm(const supervisor_Self *self, Work *work)
+static inline void choose_operation_drive_derating_warm(const supervisor_Self *self,
+    supervisor_Work *work)
 {
     if (self->timer.operation_drive_derating_warm_cool > 500U) {
         /* supervisor modes.operation.modes.drive.regions.derating.modes.warm.transitions.cool */
@@ -593,14 +556,14 @@ static inline void choose_operation_drive_derating_warm(const supervisor_Self *s
     }
 }
 
-static inline void choose_fault(const supervisor_In *in, Work *work)
+static inline void choose_fault(const supervisor_In *in, supervisor_Work *work)
 {
     if ((work->event == 1) && in->hv_ok) {
         work->wish_chart = 8U; /* supervisor modes.fault.transitions.operation */
     }
 }
 
-static inline void count_main_open(supervisor_Self *self, const Work *work)
+static inline void count_main_open(supervisor_Self *self, const supervisor_Work *work)
 {
     if (work->is_first) {
         /* supervisor regions.main.modes.open.transitions.shut.when */
@@ -622,21 +585,21 @@ static inline void count_main_open(supervisor_Self *self, const Work *work)
     }
 }
 
-static inline void choose_main_open(const supervisor_Self *self, Work *work)
+static inline void choose_main_open(const supervisor_Self *self, supervisor_Work *work)
 {
     if (self->timer.main_open_shut > 4U) {
         work->wish_main = 15U; /* supervisor regions.main.modes.open.transitions.shut */
     }
 }
 
-static inline void choose_main_shut(const supervisor_Self *self, Work *work)
+static inline void choose_main_shut(const supervisor_Self *self, supervisor_Work *work)
 {
     if (!self->equation.main_command) {
         work->wish_main = 16U; /* supervisor regions.main.modes.shut.transitions.open */
     }
 }
 
-static inline void count_pre_open(supervisor_Self *self, const Work *work)
+static inline void count_pre_open(supervisor_Self *self, const supervisor_Work *work)
 {
     if (work->is_first) {
         /* supervisor regions.pre.modes.open.transitions.shut.when */
@@ -658,14 +621,14 @@ static inline void count_pre_open(supervisor_Self *self, const Work *work)
     }
 }
 
-static inline void choose_pre_open(const supervisor_Self *self, Work *work)
+static inline void choose_pre_open(const supervisor_Self *self, supervisor_Work *work)
 {
     if (self->timer.pre_open_shut > 2U) {
         work->wish_pre = 17U; /* supervisor regions.pre.modes.open.transitions.shut */
     }
 }
 
-static inline void choose_pre_shut(const supervisor_Self *self, Work *work)
+static inline void choose_pre_shut(const supervisor_Self *self, supervisor_Work *work)
 {
     if (!self->equation.pre_command) {
         work->wish_pre = 18U; /* supervisor regions.pre.modes.shut.transitions.open */
@@ -673,7 +636,7 @@ static inline void choose_pre_shut(const supervisor_Self *self, Work *work)
 }
 
 static inline void select_transitions(supervisor_Self *self, const volatile supervisor_Cal *cal,
-    const supervisor_In *in, Work *work)
+    const supervisor_In *in, supervisor_Work *work)
 {
     work->wish_chart = 0U;
     work->wish_operation_drive_torque = 0U;
@@ -767,7 +730,7 @@ static inline void select_transitions(supervisor_Self *self, const volatile supe
     }
 }
 
-static inline void hear_chart(Work *work)
+static inline void hear_chart(supervisor_Work *work)
 {
     work->heard_chart = true;
     work->keeps = true;
@@ -793,7 +756,7 @@ static inline void hear_chart(Work *work)
     }
 }
 
-static inline void hear_operation_drive_torque(Work *work)
+static inline void hear_operation_drive_torque(supervisor_Work *work)
 {
     work->heard_operation_drive_torque = true;
     work->keeps = true;
@@ -811,7 +774,7 @@ static inline void hear_operation_drive_torque(Work *work)
     }
 }
 
-static inline void hear_operation_drive_derating(Work *work)
+static inline void hear_operation_drive_derating(supervisor_Work *work)
 {
     work->heard_operation_drive_derating = true;
     work->keeps = true;
@@ -829,19 +792,19 @@ static inline void hear_operation_drive_derating(Work *work)
     }
 }
 
-static inline void hear_main(Work *work)
+static inline void hear_main(supervisor_Work *work)
 {
     work->heard_main = true;
     work->takes_main = work->wish_main;
 }
 
-static inline void hear_pre(Work *work)
+static inline void hear_pre(supervisor_Work *work)
 {
     work->heard_pre = true;
     work->takes_pre = work->wish_pre;
 }
 
-static inline void hear(const supervisor_Self *self, Work *work)
+static inline void hear(const supervisor_Self *self, supervisor_Work *work)
 {
     work->takes_chart = 0U;
     work->heard_chart = false;
@@ -1176,7 +1139,7 @@ static inline void quit_operation_drive_derating(supervisor_Self *self)
     }
 }
 
-static inline void leave_chart(supervisor_Self *self, Work *work)
+static inline void leave_chart(supervisor_Self *self, supervisor_Work *work)
 {
     switch (self->mode) {
     case supervisor_MODE_operation_standby:
@@ -1202,7 +1165,7 @@ static inline void leave_chart(supervisor_Self *self, Work *work)
     }
 }
 
-static inline void leave_operation(supervisor_Self *self, Work *work)
+static inline void leave_operation(supervisor_Self *self, supervisor_Work *work)
 {
     switch (self->mode) {
     case supervisor_MODE_operation_precharge:
@@ -1267,7 +1230,7 @@ static inline void leave_pre(supervisor_Self *self)
     }
 }
 
-static inline void commit(supervisor_Self *self, Work *work)
+static inline void commit(supervisor_Self *self, supervisor_Work *work)
 {
     work->exit_operation_drive = false;
     work->enter_operation_standby = false;
@@ -1622,7 +1585,7 @@ static inline void commit(supervisor_Self *self, Work *work)
 }
 
 static inline void micro_step(supervisor_Self *self, const volatile supervisor_Cal *cal,
-    const supervisor_In *in, Work *work)
+    const supervisor_In *in, supervisor_Work *work)
 {
     select_transitions(self, cal, in, work);
     hear(self, work);
@@ -1655,7 +1618,7 @@ static inline void micro_step(supervisor_Self *self, const volatile supervisor_C
 }
 
 static inline void jump(supervisor_Self *self, const volatile supervisor_Cal *cal,
-    const supervisor_In *in, Work *work)
+    const supervisor_In *in, supervisor_Work *work)
 {
     self->count_of_log = 0;
     work->steps = 0;
@@ -1700,7 +1663,7 @@ static inline void remember(void)
     /* nothing to do */
 }
 
-static inline void decide(supervisor_Self *self, const supervisor_In *in, Work *work)
+static inline void decide(supervisor_Self *self, const supervisor_In *in, supervisor_Work *work)
 {
     /* supervisor tables.permission.if.ready_key */
     const bool decision_1_ready_key = self->latched.key != supervisor_key_parked;
@@ -1731,7 +1694,7 @@ static inline void keep(supervisor_Self *self)
     }
 }
 
-static inline void start(supervisor_Self *self, Work *work)
+static inline void start(supervisor_Self *self, supervisor_Work *work)
 {
     const float new_T_cmd = 0.0F; /* supervisor discrete.T_cmd.initial */
     if (fabsf(new_T_cmd) <= 400.0F) {
@@ -1810,9 +1773,10 @@ void supervisor_Calibrate(supervisor_Self *self, const volatile supervisor_Cal *
 void supervisor_Step(supervisor_Self *self, const volatile supervisor_Cal *cal,
     const supervisor_In *in, supervisor_Out *out)
 {
-    Work scratch = {0};
-    Work *const work = &scratch;
+    static const supervisor_Work nothing; /* every member 0 or false */
+    supervisor_Work *const work = &self->work;
 
+    *work = nothing;
     self->fired = 0U;
     self->fired_operation_drive_torque = 0U;
     self->fired_operation_drive_derating = 0U;

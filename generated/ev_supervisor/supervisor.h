@@ -102,6 +102,57 @@ typedef struct {
     uint32_t faults; /* 1 */
 } supervisor_Out;
 
+/* Values that live within one step */
+typedef struct {
+    bool level_1;
+    bool edge_1;
+    uint16_t wish_chart;
+    uint16_t takes_chart;
+    int32_t low_chart;
+    int32_t high_chart;
+    bool heard_chart;
+    uint16_t wish_operation_drive_torque;
+    uint16_t takes_operation_drive_torque;
+    int32_t low_operation_drive_torque;
+    int32_t high_operation_drive_torque;
+    bool heard_operation_drive_torque;
+    uint16_t wish_operation_drive_derating;
+    uint16_t takes_operation_drive_derating;
+    int32_t low_operation_drive_derating;
+    int32_t high_operation_drive_derating;
+    bool heard_operation_drive_derating;
+    uint16_t wish_main;
+    uint16_t takes_main;
+    int32_t low_main;
+    int32_t high_main;
+    bool heard_main;
+    uint16_t wish_pre;
+    uint16_t takes_pre;
+    int32_t low_pre;
+    int32_t high_pre;
+    bool heard_pre;
+    bool keeps;
+    bool is_first;
+    bool is_over;
+    int32_t head;
+    int32_t tail;
+    int32_t event;
+    int32_t queue[5];
+    bool enter_operation_standby;
+    bool enter_operation_precharge;
+    bool enter_operation_ready;
+    bool exit_operation_drive;
+    bool enter_fault;
+    int32_t steps;
+    bool is_busy;
+    float reset_T_cmd;
+    bool reset_main_cmd;
+    bool reset_pre_cmd;
+    float next_T_cmd;
+    float next_share;
+    bool decided_permit;
+} supervisor_Work;
+
 /* One instance: allocated by the caller, written by this module alone */
 typedef struct {
     struct {
@@ -154,6 +205,7 @@ typedef struct {
     bool started; /* the first tick is done */
     uint32_t faults; /* latched fault bits */
     supervisor_Derived derived;
+    supervisor_Work work;
 } supervisor_Self;
 
 /* The digest of the Program, which a tool compares with that of its description */

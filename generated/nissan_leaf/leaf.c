@@ -284,44 +284,6 @@ leaf_CALIBRATION const volatile leaf_Cal leaf_default_cal = {
     },
 };
 
-/* Values that live within one step */
-typedef struct {
-    double left;
-    double at_w_w;
-    double rate_w_w;
-    double at_w_em;
-    double rate_w_em;
-    double at_theta_d;
-    double rate_theta_d;
-    double at_theta_b;
-    double rate_theta_b;
-    bool guard_0;
-    bool guard_1;
-    double h;
-    double elapsed;
-    bool crossed;
-    double s;
-    double low;
-    double high;
-    double end_w_w;
-    double sum_w_w;
-    double series_w_w[24];
-    double end_w_em;
-    double sum_w_em;
-    double series_w_em[24];
-    double end_theta_d;
-    double sum_theta_d;
-    double series_theta_d[24];
-    double end_theta_b;
-    double sum_theta_b;
-    double series_theta_b[24];
-    double pull_w_w;
-    double pull_w_em;
-    double pull_theta_d;
-    double pull_theta_b;
-    double order;
-} Work;
-
 static inline void latch_apart(leaf_Self *self, const leaf_In *in)
 {
     if ((in->y_em >= (-400.0)) && (in->y_em <= 2400.0)) {
@@ -350,7 +312,7 @@ static inline void latch_apart(leaf_Self *self, const leaf_In *in)
     }
 }
 
-static inline void rates_drive_contact(const leaf_Self *self, Work *work)
+static inline void rates_drive_contact(const leaf_Self *self, leaf_Work *work)
 {
     /* driveline equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
@@ -375,7 +337,7 @@ static inline void rates_drive_contact(const leaf_Self *self, Work *work)
     work->rate_theta_b = at_w_b; /* driveline flow.theta_b */
 }
 
-static inline void guards_drive_contact(Work *work)
+static inline void guards_drive_contact(leaf_Work *work)
 {
     /* driveline equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
@@ -385,7 +347,7 @@ static inline void guards_drive_contact(Work *work)
     work->guard_0 = at_w_free < 0.0; /* driveline modes.drive_contact.transitions.no_contact.when */
 }
 
-static inline void rates_no_contact(const leaf_Self *self, Work *work)
+static inline void rates_no_contact(const leaf_Self *self, leaf_Work *work)
 {
     /* driveline equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
@@ -413,7 +375,7 @@ static inline void rates_no_contact(const leaf_Self *self, Work *work)
     work->rate_theta_b = at_w_b; /* driveline flow.theta_b */
 }
 
-static inline void guards_no_contact(Work *work)
+static inline void guards_no_contact(leaf_Work *work)
 {
     /* driveline equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
@@ -426,7 +388,7 @@ static inline void guards_no_contact(Work *work)
     work->guard_1 = (work->at_theta_b <= (-constant.alpha)) && (at_w_free < 0.0);
 }
 
-static inline void rates_coast_contact(const leaf_Self *self, Work *work)
+static inline void rates_coast_contact(const leaf_Self *self, leaf_Work *work)
 {
     /* driveline equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
@@ -451,7 +413,7 @@ static inline void rates_coast_contact(const leaf_Self *self, Work *work)
     work->rate_theta_b = at_w_b; /* driveline flow.theta_b */
 }
 
-static inline void guards_coast_contact(Work *work)
+static inline void guards_coast_contact(leaf_Work *work)
 {
     /* driveline equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
@@ -462,7 +424,7 @@ static inline void guards_coast_contact(Work *work)
 }
 
 static inline void series_drive_contact(const leaf_Self *self, const volatile leaf_Cal *cal,
-    Work *work)
+    leaf_Work *work)
 {
     work->order = 1.0;
     work->series_w_w[0] = (cal->solved.drive_contact_A_w_w_w_w * self->state.w_w)
@@ -495,7 +457,7 @@ static inline void series_drive_contact(const leaf_Self *self, const volatile le
     }
 }
 
-static inline void point(const leaf_Self *self, Work *work)
+static inline void point(const leaf_Self *self, leaf_Work *work)
 {
     work->sum_w_w = 0.0;
     work->sum_w_em = 0.0;
@@ -514,7 +476,7 @@ static inline void point(const leaf_Self *self, Work *work)
 }
 
 static inline void step_drive_contact(const leaf_Self *self, const volatile leaf_Cal *cal,
-    Work *work)
+    leaf_Work *work)
 {
     work->at_w_w = self->state.w_w;
     work->at_w_em = self->state.w_em;
@@ -617,7 +579,7 @@ static inline void step_drive_contact(const leaf_Self *self, const volatile leaf
 }
 
 static inline void series_no_contact(const leaf_Self *self, const volatile leaf_Cal *cal,
-    Work *work)
+    leaf_Work *work)
 {
     work->order = 1.0;
     work->series_w_w[0] = (cal->solved.no_contact_A_w_w_w_w * self->state.w_w) + work->pull_w_w;
@@ -646,7 +608,8 @@ static inline void series_no_contact(const leaf_Self *self, const volatile leaf_
     }
 }
 
-static inline void step_no_contact(const leaf_Self *self, const volatile leaf_Cal *cal, Work *work)
+static inline void step_no_contact(const leaf_Self *self, const volatile leaf_Cal *cal,
+    leaf_Work *work)
 {
     work->at_w_w = self->state.w_w;
     work->at_w_em = self->state.w_em;
@@ -729,7 +692,7 @@ static inline void step_no_contact(const leaf_Self *self, const volatile leaf_Ca
 }
 
 static inline void series_coast_contact(const leaf_Self *self, const volatile leaf_Cal *cal,
-    Work *work)
+    leaf_Work *work)
 {
     work->order = 1.0;
     work->series_w_w[0] = (cal->solved.coast_contact_A_w_w_w_w * self->state.w_w)
@@ -763,7 +726,7 @@ static inline void series_coast_contact(const leaf_Self *self, const volatile le
 }
 
 static inline void step_coast_contact(const leaf_Self *self, const volatile leaf_Cal *cal,
-    Work *work)
+    leaf_Work *work)
 {
     work->at_w_w = self->state.w_w;
     work->at_w_em = self->state.w_em;
@@ -865,7 +828,7 @@ static inline void step_coast_contact(const leaf_Self *self, const volatile leaf
     }
 }
 
-static inline void locate_drive_contact(const leaf_Self *self, Work *work)
+static inline void locate_drive_contact(const leaf_Self *self, leaf_Work *work)
 {
     work->low = 0.0;
     work->high = work->h;
@@ -886,7 +849,8 @@ static inline void locate_drive_contact(const leaf_Self *self, Work *work)
     work->elapsed = ha_min(work->high, work->h);
 }
 
-static inline void move_drive_contact(leaf_Self *self, const volatile leaf_Cal *cal, Work *work)
+static inline void move_drive_contact(leaf_Self *self, const volatile leaf_Cal *cal,
+    leaf_Work *work)
 {
     step_drive_contact(self, cal, work);
     work->elapsed = work->h;
@@ -906,7 +870,7 @@ static inline void move_drive_contact(leaf_Self *self, const volatile leaf_Cal *
     self->state.theta_b = work->end_theta_b;
 }
 
-static inline void locate_no_contact(const leaf_Self *self, Work *work)
+static inline void locate_no_contact(const leaf_Self *self, leaf_Work *work)
 {
     work->low = 0.0;
     work->high = work->h;
@@ -942,7 +906,7 @@ static inline void locate_no_contact(const leaf_Self *self, Work *work)
     work->elapsed = ha_min(work->high, work->h);
 }
 
-static inline void move_no_contact(leaf_Self *self, const volatile leaf_Cal *cal, Work *work)
+static inline void move_no_contact(leaf_Self *self, const volatile leaf_Cal *cal, leaf_Work *work)
 {
     step_no_contact(self, cal, work);
     work->elapsed = work->h;
@@ -962,7 +926,7 @@ static inline void move_no_contact(leaf_Self *self, const volatile leaf_Cal *cal
     self->state.theta_b = work->end_theta_b;
 }
 
-static inline void locate_coast_contact(const leaf_Self *self, Work *work)
+static inline void locate_coast_contact(const leaf_Self *self, leaf_Work *work)
 {
     work->low = 0.0;
     work->high = work->h;
@@ -983,7 +947,8 @@ static inline void locate_coast_contact(const leaf_Self *self, Work *work)
     work->elapsed = ha_min(work->high, work->h);
 }
 
-static inline void move_coast_contact(leaf_Self *self, const volatile leaf_Cal *cal, Work *work)
+static inline void move_coast_contact(leaf_Self *self, const volatile leaf_Cal *cal,
+    leaf_Work *work)
 {
     step_coast_contact(self, cal, work);
     work->elapsed = work->h;
@@ -1003,14 +968,14 @@ static inline void move_coast_contact(leaf_Self *self, const volatile leaf_Cal *
     self->state.theta_b = work->end_theta_b;
 }
 
-static inline void switch_drive_contact(leaf_Self *self, const Work *work)
+static inline void switch_drive_contact(leaf_Self *self, const leaf_Work *work)
 {
     if (work->guard_0) {
         self->run_mode = leaf_RUN_no_contact;
     }
 }
 
-static inline void switch_no_contact(leaf_Self *self, const Work *work)
+static inline void switch_no_contact(leaf_Self *self, const leaf_Work *work)
 {
     if (work->guard_0) {
         /* driveline modes.no_contact.transitions.drive_contact.reset.theta_b */
@@ -1025,7 +990,7 @@ static inline void switch_no_contact(leaf_Self *self, const Work *work)
     }
 }
 
-static inline void switch_coast_contact(leaf_Self *self, const Work *work)
+static inline void switch_coast_contact(leaf_Self *self, const leaf_Work *work)
 {
     if (work->guard_0) {
         self->run_mode = leaf_RUN_no_contact;
@@ -1115,8 +1080,7 @@ static inline void correct_drive(leaf_Self *self, const volatile leaf_Cal *cal, 
 
 static inline void run_gap(leaf_Self *self, const volatile leaf_Cal *cal)
 {
-    Work scratch;
-    Work *const work = &scratch;
+    leaf_Work *const work = &self->work;
 
     work->guard_0 = false;
     work->guard_1 = false;

@@ -53,49 +53,7 @@ blind_driveline_CALIBRATION const volatile blind_driveline_Cal blind_driveline_d
     .reserved = 0U,
 };
 
-/* Values that live within one step */
-typedef struct {
-    double at_w_em;
-    double rate_w_em;
-    double at_w_w;
-    double rate_w_w;
-    double at_theta_d;
-    double rate_theta_d;
-    double at_theta_b;
-    double rate_theta_b;
-    double at_w_s;
-    double rate_w_s;
-    bool guard_0;
-    bool guard_1;
-    double merge;
-    double left;
-    bool is_wait;
-    bool event;
-    bool is_settling;
-    double h;
-    double elapsed;
-    bool crossed;
-    double s;
-    double low;
-    double high;
-    double end_w_em;
-    double series_w_em[3];
-    double end_w_w;
-    double series_w_w[3];
-    double end_theta_d;
-    double series_theta_d[3];
-    double end_theta_b;
-    double series_theta_b[3];
-    double end_w_s;
-    double series_w_s[3];
-    double k1_w_em;
-    double k1_w_w;
-    double k1_theta_d;
-    double k1_theta_b;
-    double k1_w_s;
-} Work;
-
-static inline void rates_drive_contact(const blind_driveline_Self *self, Work *work)
+static inline void rates_drive_contact(const blind_driveline_Self *self, blind_driveline_Work *work)
 {
     /* blind_driveline equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
@@ -120,7 +78,7 @@ static inline void rates_drive_contact(const blind_driveline_Self *self, Work *w
     work->rate_w_s = (work->at_w_w - work->at_w_s) * constant.per_tau_f;
 }
 
-static inline void guards_drive_contact(Work *work)
+static inline void guards_drive_contact(blind_driveline_Work *work)
 {
     /* blind_driveline equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
@@ -130,7 +88,7 @@ static inline void guards_drive_contact(Work *work)
     work->guard_0 = at_w_free < 0.0;
 }
 
-static inline void rates_no_contact(const blind_driveline_Self *self, Work *work)
+static inline void rates_no_contact(const blind_driveline_Self *self, blind_driveline_Work *work)
 {
     /* blind_driveline equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
@@ -158,7 +116,7 @@ static inline void rates_no_contact(const blind_driveline_Self *self, Work *work
     work->rate_w_s = (work->at_w_w - work->at_w_s) * constant.per_tau_f;
 }
 
-static inline void guards_no_contact(Work *work)
+static inline void guards_no_contact(blind_driveline_Work *work)
 {
     /* blind_driveline equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
@@ -170,7 +128,7 @@ static inline void guards_no_contact(Work *work)
     work->guard_1 = (work->at_theta_b <= (-constant.alpha)) && (at_w_free < 0.0);
 }
 
-static inline void rates_coast_contact(const blind_driveline_Self *self, Work *work)
+static inline void rates_coast_contact(const blind_driveline_Self *self, blind_driveline_Work *work)
 {
     /* blind_driveline equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
@@ -195,7 +153,7 @@ static inline void rates_coast_contact(const blind_driveline_Self *self, Work *w
     work->rate_w_s = (work->at_w_w - work->at_w_s) * constant.per_tau_f;
 }
 
-static inline void guards_coast_contact(Work *work)
+static inline void guards_coast_contact(blind_driveline_Work *work)
 {
     /* blind_driveline equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
@@ -205,7 +163,7 @@ static inline void guards_coast_contact(Work *work)
     work->guard_0 = at_w_free > 0.0;
 }
 
-static inline void step_drive_contact(const blind_driveline_Self *self, Work *work)
+static inline void step_drive_contact(const blind_driveline_Self *self, blind_driveline_Work *work)
 {
     work->at_w_em = self->state.w_em;
     work->at_w_w = self->state.w_w;
@@ -266,7 +224,8 @@ static inline void step_drive_contact(const blind_driveline_Self *self, Work *wo
         self->state.w_s + (h_per_6 * (work->k1_w_s + (2.0 * k2_w_s) + (2.0 * k3_w_s) + k4_w_s));
 }
 
-static inline void series_drive_contact(const blind_driveline_Self *self, Work *work)
+static inline void series_drive_contact(const blind_driveline_Self *self,
+    blind_driveline_Work *work)
 {
     work->at_w_em = work->end_w_em;
     work->at_w_w = work->end_w_w;
@@ -301,7 +260,7 @@ static inline void series_drive_contact(const blind_driveline_Self *self, Work *
     work->series_w_s[2] = (work->k1_w_s + work->rate_w_s - (2.0 * slope_w_s)) / h_squared;
 }
 
-static inline void step_no_contact(const blind_driveline_Self *self, Work *work)
+static inline void step_no_contact(const blind_driveline_Self *self, blind_driveline_Work *work)
 {
     work->at_w_em = self->state.w_em;
     work->at_w_w = self->state.w_w;
@@ -362,7 +321,7 @@ static inline void step_no_contact(const blind_driveline_Self *self, Work *work)
         self->state.w_s + (h_per_6 * (work->k1_w_s + (2.0 * k2_w_s) + (2.0 * k3_w_s) + k4_w_s));
 }
 
-static inline void series_no_contact(const blind_driveline_Self *self, Work *work)
+static inline void series_no_contact(const blind_driveline_Self *self, blind_driveline_Work *work)
 {
     work->at_w_em = work->end_w_em;
     work->at_w_w = work->end_w_w;
@@ -397,7 +356,7 @@ static inline void series_no_contact(const blind_driveline_Self *self, Work *wor
     work->series_w_s[2] = (work->k1_w_s + work->rate_w_s - (2.0 * slope_w_s)) / h_squared;
 }
 
-static inline void step_coast_contact(const blind_driveline_Self *self, Work *work)
+static inline void step_coast_contact(const blind_driveline_Self *self, blind_driveline_Work *work)
 {
     work->at_w_em = self->state.w_em;
     work->at_w_w = self->state.w_w;
@@ -458,7 +417,8 @@ static inline void step_coast_contact(const blind_driveline_Self *self, Work *wo
         self->state.w_s + (h_per_6 * (work->k1_w_s + (2.0 * k2_w_s) + (2.0 * k3_w_s) + k4_w_s));
 }
 
-static inline void series_coast_contact(const blind_driveline_Self *self, Work *work)
+static inline void series_coast_contact(const blind_driveline_Self *self,
+    blind_driveline_Work *work)
 {
     work->at_w_em = work->end_w_em;
     work->at_w_w = work->end_w_w;
@@ -493,7 +453,7 @@ static inline void series_coast_contact(const blind_driveline_Self *self, Work *
     work->series_w_s[2] = (work->k1_w_s + work->rate_w_s - (2.0 * slope_w_s)) / h_squared;
 }
 
-static inline void point(const blind_driveline_Self *self, Work *work)
+static inline void point(const blind_driveline_Self *self, blind_driveline_Work *work)
 {
     work->at_w_em = self->state.w_em + (work->s * ((((work->series_w_em[2] * work->s)
         + work->series_w_em[1]) * work->s) + work->series_w_em[0]));
@@ -507,7 +467,8 @@ static inline void point(const blind_driveline_Self *self, Work *work)
         + work->series_w_s[1]) * work->s) + work->series_w_s[0]));
 }
 
-static inline void locate_drive_contact(const blind_driveline_Self *self, Work *work)
+static inline void locate_drive_contact(const blind_driveline_Self *self,
+    blind_driveline_Work *work)
 {
     work->low = 0.0;
     work->high = work->h;
@@ -529,7 +490,7 @@ static inline void locate_drive_contact(const blind_driveline_Self *self, Work *
     work->elapsed = ha_min(work->high, work->h);
 }
 
-static inline void move_drive_contact(blind_driveline_Self *self, Work *work)
+static inline void move_drive_contact(blind_driveline_Self *self, blind_driveline_Work *work)
 {
     step_drive_contact(self, work);
     work->elapsed = work->h;
@@ -566,7 +527,7 @@ static inline void move_drive_contact(blind_driveline_Self *self, Work *work)
     self->state.w_s = work->end_w_s;
 }
 
-static inline void locate_no_contact(const blind_driveline_Self *self, Work *work)
+static inline void locate_no_contact(const blind_driveline_Self *self, blind_driveline_Work *work)
 {
     work->low = 0.0;
     work->high = work->h;
@@ -604,7 +565,7 @@ static inline void locate_no_contact(const blind_driveline_Self *self, Work *wor
     work->elapsed = ha_min(work->high, work->h);
 }
 
-static inline void move_no_contact(blind_driveline_Self *self, Work *work)
+static inline void move_no_contact(blind_driveline_Self *self, blind_driveline_Work *work)
 {
     step_no_contact(self, work);
     work->elapsed = work->h;
@@ -641,7 +602,8 @@ static inline void move_no_contact(blind_driveline_Self *self, Work *work)
     self->state.w_s = work->end_w_s;
 }
 
-static inline void locate_coast_contact(const blind_driveline_Self *self, Work *work)
+static inline void locate_coast_contact(const blind_driveline_Self *self,
+    blind_driveline_Work *work)
 {
     work->low = 0.0;
     work->high = work->h;
@@ -663,7 +625,7 @@ static inline void locate_coast_contact(const blind_driveline_Self *self, Work *
     work->elapsed = ha_min(work->high, work->h);
 }
 
-static inline void move_coast_contact(blind_driveline_Self *self, Work *work)
+static inline void move_coast_contact(blind_driveline_Self *self, blind_driveline_Work *work)
 {
     step_coast_contact(self, work);
     work->elapsed = work->h;
@@ -706,14 +668,14 @@ static inline void latch(blind_driveline_Self *self, const blind_driveline_In *i
     self->before.T_br = in->T_br;
 }
 
-static inline void limit(const blind_driveline_Self *self, Work *work)
+static inline void limit(const blind_driveline_Self *self, blind_driveline_Work *work)
 {
     work->h = work->left;
     work->merge = 9.094947017729282e-13 * ha_max(self->time + work->h, 0.001);
     work->is_wait = false;
 }
 
-static inline void elapse(blind_driveline_Self *self, Work *work)
+static inline void elapse(blind_driveline_Self *self, blind_driveline_Work *work)
 {
     if (work->crossed && ((work->h - work->elapsed) <= work->merge)) {
         work->elapsed = work->h;
@@ -731,7 +693,7 @@ static inline void load(void)
     /* nothing to do */
 }
 
-static inline void jump_drive_contact(blind_driveline_Self *self, Work *work)
+static inline void jump_drive_contact(blind_driveline_Self *self, blind_driveline_Work *work)
 {
     guards_drive_contact(work);
     if (work->guard_0) {
@@ -740,7 +702,7 @@ static inline void jump_drive_contact(blind_driveline_Self *self, Work *work)
     }
 }
 
-static inline void jump_no_contact(blind_driveline_Self *self, Work *work)
+static inline void jump_no_contact(blind_driveline_Self *self, blind_driveline_Work *work)
 {
     guards_no_contact(work);
     if (work->guard_0) {
@@ -758,7 +720,7 @@ static inline void jump_no_contact(blind_driveline_Self *self, Work *work)
     }
 }
 
-static inline void jump_coast_contact(blind_driveline_Self *self, Work *work)
+static inline void jump_coast_contact(blind_driveline_Self *self, blind_driveline_Work *work)
 {
     guards_coast_contact(work);
     if (work->guard_0) {
@@ -767,7 +729,7 @@ static inline void jump_coast_contact(blind_driveline_Self *self, Work *work)
     }
 }
 
-static inline void jump(blind_driveline_Self *self, Work *work)
+static inline void jump(blind_driveline_Self *self, blind_driveline_Work *work)
 {
     self->fired = 0U;
     work->at_w_em = self->state.w_em;
@@ -790,7 +752,7 @@ static inline void jump(blind_driveline_Self *self, Work *work)
     }
 }
 
-static inline void watch(blind_driveline_Self *self, Work *work)
+static inline void watch(blind_driveline_Self *self, blind_driveline_Work *work)
 {
     work->at_w_em = self->state.w_em;
     work->at_w_w = self->state.w_w;
@@ -817,7 +779,7 @@ static inline void watch(blind_driveline_Self *self, Work *work)
     load();
 }
 
-static inline void settle(blind_driveline_Self *self, Work *work)
+static inline void settle(blind_driveline_Self *self, blind_driveline_Work *work)
 {
     work->is_settling = true;
     for (int32_t micro_step = 0; (micro_step < 4) && (work->is_settling); micro_step++) {
@@ -831,7 +793,7 @@ static inline void settle(blind_driveline_Self *self, Work *work)
     watch(self, work);
 }
 
-static inline void segment(blind_driveline_Self *self, Work *work)
+static inline void segment(blind_driveline_Self *self, blind_driveline_Work *work)
 {
     limit(self, work);
     switch (self->mode) {
@@ -962,8 +924,7 @@ void blind_driveline_Calibrate(blind_driveline_Self *self, const volatile blind_
 void blind_driveline_Step(blind_driveline_Self *self, const volatile blind_driveline_Cal *cal,
     const blind_driveline_In *in, blind_driveline_Out *out)
 {
-    Work scratch;
-    Work *const work = &scratch;
+    blind_driveline_Work *const work = &self->work;
 
     work->event = false;
     work->elapsed = 0.0;

@@ -42,6 +42,48 @@ typedef struct {
     double w_s; /* rad/s */
 } blind_driveline_Out;
 
+/* Values that live within one step */
+typedef struct {
+    double at_w_em;
+    double rate_w_em;
+    double at_w_w;
+    double rate_w_w;
+    double at_theta_d;
+    double rate_theta_d;
+    double at_theta_b;
+    double rate_theta_b;
+    double at_w_s;
+    double rate_w_s;
+    bool guard_0;
+    bool guard_1;
+    double merge;
+    double left;
+    bool is_wait;
+    bool event;
+    bool is_settling;
+    double h;
+    double elapsed;
+    bool crossed;
+    double s;
+    double low;
+    double high;
+    double end_w_em;
+    double series_w_em[3];
+    double end_w_w;
+    double series_w_w[3];
+    double end_theta_d;
+    double series_theta_d[3];
+    double end_theta_b;
+    double series_theta_b[3];
+    double end_w_s;
+    double series_w_s[3];
+    double k1_w_em;
+    double k1_w_w;
+    double k1_theta_d;
+    double k1_theta_b;
+    double k1_w_s;
+} blind_driveline_Work;
+
 /* One instance: allocated by the caller, written by this module alone */
 typedef struct {
     struct {
@@ -70,6 +112,7 @@ typedef struct {
     double time; /* s; time since the start: for tolerances only */
     uint32_t faults; /* latched fault bits */
     blind_driveline_Derived derived;
+    blind_driveline_Work work;
 } blind_driveline_Self;
 
 /* The digest of the Program, which a tool compares with that of its description */

@@ -34,35 +34,13 @@ brfd_damper_CALIBRATION const volatile brfd_damper_Cal brfd_damper_default_cal =
     .reserved = 0U,
 };
 
-/* Values that live within one step */
-typedef struct {
-    double at_z;
-    double rate_z;
-    bool guard_0;
-    bool guard_1;
-    double merge;
-    double left;
-    bool is_wait;
-    bool event;
-    bool is_settling;
-    double h;
-    double elapsed;
-    bool crossed;
-    double s;
-    double low;
-    double high;
-    double end_z;
-    double series_z[3];
-    double k1_z;
-} Work;
-
-static inline void rates_stick(const brfd_damper_Self *self, Work *work)
+static inline void rates_stick(const brfd_damper_Self *self, brfd_damper_Work *work)
 {
     const double at_v_z = self->before.v; /* brfd_damper modes.stick.equations.v_z */
     work->rate_z = at_v_z; /* brfd_damper flow.z */
 }
 
-static inline void guards_stick(const brfd_damper_Self *self, Work *work)
+static inline void guards_stick(const brfd_damper_Self *self, brfd_damper_Work *work)
 {
     const double at_v_z = self->before.v; /* brfd_damper modes.stick.equations.v_z */
     /* brfd_damper equations.F_b */
@@ -73,29 +51,29 @@ static inline void guards_stick(const brfd_damper_Self *self, Work *work)
     work->guard_1 = (at_F_b <= (-constant.F_lo)) && (self->before.v < 0.0);
 }
 
-static inline void rates_slip_up(Work *work)
+static inline void rates_slip_up(brfd_damper_Work *work)
 {
     const double at_v_z = 0.0; /* brfd_damper modes.slip_up.equations.v_z */
     work->rate_z = at_v_z; /* brfd_damper flow.z */
 }
 
-static inline void guards_slip_up(const brfd_damper_Self *self, Work *work)
+static inline void guards_slip_up(const brfd_damper_Self *self, brfd_damper_Work *work)
 {
     work->guard_0 = self->before.v < 0.0; /* brfd_damper modes.slip_up.transitions.stick.when */
 }
 
-static inline void rates_slip_lo(Work *work)
+static inline void rates_slip_lo(brfd_damper_Work *work)
 {
     const double at_v_z = 0.0; /* brfd_damper modes.slip_lo.equations.v_z */
     work->rate_z = at_v_z; /* brfd_damper flow.z */
 }
 
-static inline void guards_slip_lo(const brfd_damper_Self *self, Work *work)
+static inline void guards_slip_lo(const brfd_damper_Self *self, brfd_damper_Work *work)
 {
     work->guard_0 = self->before.v > 0.0; /* brfd_damper modes.slip_lo.transitions.stick.when */
 }
 
-static inline void step_stick(const brfd_damper_Self *self, Work *work)
+static inline void step_stick(const brfd_damper_Self *self, brfd_damper_Work *work)
 {
     work->at_z = self->state.z;
     rates_stick(self, work);
@@ -114,7 +92,7 @@ static inline void step_stick(const brfd_damper_Self *self, Work *work)
         self->state.z + (work->h / 6.0 * (work->k1_z + (2.0 * k2_z) + (2.0 * k3_z) + k4_z));
 }
 
-static inline void series_stick(const brfd_damper_Self *self, Work *work)
+static inline void series_stick(const brfd_damper_Self *self, brfd_damper_Work *work)
 {
     work->at_z = work->end_z;
     rates_stick(self, work);
@@ -124,7 +102,7 @@ static inline void series_stick(const brfd_damper_Self *self, Work *work)
     work->series_z[2] = (work->k1_z + work->rate_z - (2.0 * slope_z)) / (work->h * work->h);
 }
 
-static inline void step_slip_up(const brfd_damper_Self *self, Work *work)
+static inline void step_slip_up(const brfd_damper_Self *self, brfd_damper_Work *work)
 {
     work->at_z = self->state.z;
     rates_slip_up(work);
@@ -143,7 +121,7 @@ static inline void step_slip_up(const brfd_damper_Self *self, Work *work)
         self->state.z + (work->h / 6.0 * (work->k1_z + (2.0 * k2_z) + (2.0 * k3_z) + k4_z));
 }
 
-static inline void series_slip_up(const brfd_damper_Self *self, Work *work)
+static inline void series_slip_up(const brfd_damper_Self *self, brfd_damper_Work *work)
 {
     work->at_z = work->end_z;
     rates_slip_up(work);
@@ -153,7 +131,7 @@ static inline void series_slip_up(const brfd_damper_Self *self, Work *work)
     work->series_z[2] = (work->k1_z + work->rate_z - (2.0 * slope_z)) / (work->h * work->h);
 }
 
-static inline void step_slip_lo(const brfd_damper_Self *self, Work *work)
+static inline void step_slip_lo(const brfd_damper_Self *self, brfd_damper_Work *work)
 {
     work->at_z = self->state.z;
     rates_slip_lo(work);
@@ -172,7 +150,7 @@ static inline void step_slip_lo(const brfd_damper_Self *self, Work *work)
         self->state.z + (work->h / 6.0 * (work->k1_z + (2.0 * k2_z) + (2.0 * k3_z) + k4_z));
 }
 
-static inline void series_slip_lo(const brfd_damper_Self *self, Work *work)
+static inline void series_slip_lo(const brfd_damper_Self *self, brfd_damper_Work *work)
 {
     work->at_z = work->end_z;
     rates_slip_lo(work);
@@ -182,13 +160,13 @@ static inline void series_slip_lo(const brfd_damper_Self *self, Work *work)
     work->series_z[2] = (work->k1_z + work->rate_z - (2.0 * slope_z)) / (work->h * work->h);
 }
 
-static inline void point(const brfd_damper_Self *self, Work *work)
+static inline void point(const brfd_damper_Self *self, brfd_damper_Work *work)
 {
     work->at_z = self->state.z + (work->s * ((((work->series_z[2] * work->s)
         + work->series_z[1]) * work->s) + work->series_z[0]));
 }
 
-static inline void locate_stick(const brfd_damper_Self *self, Work *work)
+static inline void locate_stick(const brfd_damper_Self *self, brfd_damper_Work *work)
 {
     work->low = 0.0;
     work->high = work->h;
@@ -218,7 +196,7 @@ static inline void locate_stick(const brfd_damper_Self *self, Work *work)
     work->elapsed = ha_min(work->high, work->h);
 }
 
-static inline void move_stick(brfd_damper_Self *self, Work *work)
+static inline void move_stick(brfd_damper_Self *self, brfd_damper_Work *work)
 {
     step_stick(self, work);
     work->elapsed = work->h;
@@ -243,7 +221,7 @@ static inline void move_stick(brfd_damper_Self *self, Work *work)
     self->state.z = work->end_z;
 }
 
-static inline void locate_slip_up(const brfd_damper_Self *self, Work *work)
+static inline void locate_slip_up(const brfd_damper_Self *self, brfd_damper_Work *work)
 {
     work->low = 0.0;
     work->high = work->h;
@@ -261,7 +239,7 @@ static inline void locate_slip_up(const brfd_damper_Self *self, Work *work)
     work->elapsed = ha_min(work->high, work->h);
 }
 
-static inline void move_slip_up(brfd_damper_Self *self, Work *work)
+static inline void move_slip_up(brfd_damper_Self *self, brfd_damper_Work *work)
 {
     step_slip_up(self, work);
     work->elapsed = work->h;
@@ -286,7 +264,7 @@ static inline void move_slip_up(brfd_damper_Self *self, Work *work)
     self->state.z = work->end_z;
 }
 
-static inline void locate_slip_lo(const brfd_damper_Self *self, Work *work)
+static inline void locate_slip_lo(const brfd_damper_Self *self, brfd_damper_Work *work)
 {
     work->low = 0.0;
     work->high = work->h;
@@ -304,7 +282,7 @@ static inline void locate_slip_lo(const brfd_damper_Self *self, Work *work)
     work->elapsed = ha_min(work->high, work->h);
 }
 
-static inline void move_slip_lo(brfd_damper_Self *self, Work *work)
+static inline void move_slip_lo(brfd_damper_Self *self, brfd_damper_Work *work)
 {
     step_slip_lo(self, work);
     work->elapsed = work->h;
@@ -335,14 +313,14 @@ static inline void latch(brfd_damper_Self *self, const brfd_damper_In *in)
     self->before.c_v_v = constant.c_v * self->before.v; /* c_v * v */
 }
 
-static inline void limit(const brfd_damper_Self *self, Work *work)
+static inline void limit(const brfd_damper_Self *self, brfd_damper_Work *work)
 {
     work->h = work->left;
     work->merge = 9.094947017729282e-13 * ha_max(self->time + work->h, 0.001);
     work->is_wait = false;
 }
 
-static inline void elapse(brfd_damper_Self *self, Work *work)
+static inline void elapse(brfd_damper_Self *self, brfd_damper_Work *work)
 {
     if (work->crossed && ((work->h - work->elapsed) <= work->merge)) {
         work->elapsed = work->h;
@@ -360,7 +338,7 @@ static inline void load(void)
     /* nothing to do */
 }
 
-static inline void jump_stick(brfd_damper_Self *self, Work *work)
+static inline void jump_stick(brfd_damper_Self *self, brfd_damper_Work *work)
 {
     guards_stick(self, work);
     if (work->guard_0) {
@@ -374,7 +352,7 @@ static inline void jump_stick(brfd_damper_Self *self, Work *work)
     }
 }
 
-static inline void jump_slip_up(brfd_damper_Self *self, Work *work)
+static inline void jump_slip_up(brfd_damper_Self *self, brfd_damper_Work *work)
 {
     guards_slip_up(self, work);
     if (work->guard_0) {
@@ -383,7 +361,7 @@ static inline void jump_slip_up(brfd_damper_Self *self, Work *work)
     }
 }
 
-static inline void jump_slip_lo(brfd_damper_Self *self, Work *work)
+static inline void jump_slip_lo(brfd_damper_Self *self, brfd_damper_Work *work)
 {
     guards_slip_lo(self, work);
     if (work->guard_0) {
@@ -392,7 +370,7 @@ static inline void jump_slip_lo(brfd_damper_Self *self, Work *work)
     }
 }
 
-static inline void jump(brfd_damper_Self *self, Work *work)
+static inline void jump(brfd_damper_Self *self, brfd_damper_Work *work)
 {
     self->fired = 0U;
     work->at_z = self->state.z;
@@ -411,7 +389,7 @@ static inline void jump(brfd_damper_Self *self, Work *work)
     }
 }
 
-static inline void watch(brfd_damper_Self *self, Work *work)
+static inline void watch(brfd_damper_Self *self, brfd_damper_Work *work)
 {
     work->at_z = self->state.z;
     switch (self->mode) {
@@ -434,7 +412,7 @@ static inline void watch(brfd_damper_Self *self, Work *work)
     load();
 }
 
-static inline void settle(brfd_damper_Self *self, Work *work)
+static inline void settle(brfd_damper_Self *self, brfd_damper_Work *work)
 {
     work->is_settling = true;
     for (int32_t micro_step = 0; (micro_step < 4) && (work->is_settling); micro_step++) {
@@ -448,7 +426,7 @@ static inline void settle(brfd_damper_Self *self, Work *work)
     watch(self, work);
 }
 
-static inline void segment(brfd_damper_Self *self, Work *work)
+static inline void segment(brfd_damper_Self *self, brfd_damper_Work *work)
 {
     limit(self, work);
     switch (self->mode) {
@@ -544,8 +522,7 @@ void brfd_damper_Calibrate(brfd_damper_Self *self, const volatile brfd_damper_Ca
 void brfd_damper_Step(brfd_damper_Self *self, const volatile brfd_damper_Cal *cal,
     const brfd_damper_In *in, brfd_damper_Out *out)
 {
-    Work scratch;
-    Work *const work = &scratch;
+    brfd_damper_Work *const work = &self->work;
 
     work->event = false;
     work->elapsed = 0.0;

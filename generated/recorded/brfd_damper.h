@@ -41,6 +41,28 @@ typedef struct {
     int16_t mode; /* 1 */
 } brfd_damper_Out;
 
+/* Values that live within one step */
+typedef struct {
+    double at_z;
+    double rate_z;
+    bool guard_0;
+    bool guard_1;
+    double merge;
+    double left;
+    bool is_wait;
+    bool event;
+    bool is_settling;
+    double h;
+    double elapsed;
+    bool crossed;
+    double s;
+    double low;
+    double high;
+    double end_z;
+    double series_z[3];
+    double k1_z;
+} brfd_damper_Work;
+
 /* One instance: allocated by the caller, written by this module alone */
 typedef struct {
     struct {
@@ -63,6 +85,7 @@ typedef struct {
     double time; /* s; time since the start: for tolerances only */
     uint32_t faults; /* latched fault bits */
     brfd_damper_Derived derived;
+    brfd_damper_Work work;
 } brfd_damper_Self;
 
 /* The digest of the Program, which a tool compares with that of its description */

@@ -36,28 +36,7 @@ emps_CALIBRATION const volatile emps_Cal emps_default_cal = {
     .reserved = 0U,
 };
 
-/* Values that live within one step */
-typedef struct {
-    double at_q;
-    double rate_q;
-    double at_v;
-    double rate_v;
-    double at_F_dr;
-    double rate_F_dr;
-    double merge;
-    double left;
-    bool is_wait;
-    bool event;
-    bool is_settling;
-    double h;
-    double elapsed;
-    bool crossed;
-    double end_q;
-    double end_v;
-    double end_F_dr;
-} Work;
-
-static inline void rates_always(const emps_Self *self, Work *work)
+static inline void rates_always(const emps_Self *self, emps_Work *work)
 {
     /* emps equations.u_dr */
     const double at_u_dr =
@@ -73,7 +52,7 @@ static inline void guards_always(void)
     /* nothing to do */
 }
 
-static inline void step_always(const emps_Self *self, Work *work)
+static inline void step_always(const emps_Self *self, emps_Work *work)
 {
     work->at_q = self->state.q;
     work->at_v = self->state.v;
@@ -111,7 +90,7 @@ static inline void step_always(const emps_Self *self, Work *work)
         self->state.F_dr + (h_per_6 * (k1_F_dr + (2.0 * k2_F_dr) + (2.0 * k3_F_dr) + k4_F_dr));
 }
 
-static inline void move_always(emps_Self *self, Work *work)
+static inline void move_always(emps_Self *self, emps_Work *work)
 {
     step_always(self, work);
     work->elapsed = work->h;
@@ -126,14 +105,14 @@ static inline void latch(emps_Self *self, const emps_In *in)
     self->before.q_ref = in->q_ref;
 }
 
-static inline void limit(const emps_Self *self, Work *work)
+static inline void limit(const emps_Self *self, emps_Work *work)
 {
     work->h = work->left;
     work->merge = 9.094947017729282e-13 * ha_max(self->time + work->h, 0.001);
     work->is_wait = false;
 }
 
-static inline void elapse(emps_Self *self, Work *work)
+static inline void elapse(emps_Self *self, emps_Work *work)
 {
     if (work->crossed && ((work->h - work->elapsed) <= work->merge)) {
         work->elapsed = work->h;
@@ -156,7 +135,7 @@ static inline void jump_always(void)
     guards_always();
 }
 
-static inline void jump(emps_Self *self, Work *work)
+static inline void jump(emps_Self *self, emps_Work *work)
 {
     self->fired = 0U;
     work->at_q = self->state.q;
@@ -171,7 +150,7 @@ static inline void jump(emps_Self *self, Work *work)
     }
 }
 
-static inline void watch(const emps_Self *self, Work *work)
+static inline void watch(const emps_Self *self, emps_Work *work)
 {
     work->at_q = self->state.q;
     work->at_v = self->state.v;
@@ -186,7 +165,7 @@ static inline void watch(const emps_Self *self, Work *work)
     load();
 }
 
-static inline void settle(emps_Self *self, Work *work)
+static inline void settle(emps_Self *self, emps_Work *work)
 {
     work->is_settling = true;
     for (int32_t micro_step = 0; (micro_step < 2) && (work->is_settling); micro_step++) {
@@ -200,7 +179,7 @@ static inline void settle(emps_Self *self, Work *work)
     watch(self, work);
 }
 
-static inline void segment(emps_Self *self, Work *work)
+static inline void segment(emps_Self *self, emps_Work *work)
 {
     limit(self, work);
     switch (self->mode) {
@@ -270,8 +249,7 @@ void emps_Calibrate(emps_Self *self, const volatile emps_Cal *cal)
 void emps_Step(emps_Self *self, const volatile emps_Cal *cal,
     const emps_In *in, emps_Out *out)
 {
-    Work scratch;
-    Work *const work = &scratch;
+    emps_Work *const work = &self->work;
 
     work->event = false;
     work->elapsed = 0.0;

@@ -38,6 +38,27 @@ typedef struct {
     double F_m; /* N */
 } emps_Out;
 
+/* Values that live within one step */
+typedef struct {
+    double at_q;
+    double rate_q;
+    double at_v;
+    double rate_v;
+    double at_F_dr;
+    double rate_F_dr;
+    double merge;
+    double left;
+    bool is_wait;
+    bool event;
+    bool is_settling;
+    double h;
+    double elapsed;
+    bool crossed;
+    double end_q;
+    double end_v;
+    double end_F_dr;
+} emps_Work;
+
 /* One instance: allocated by the caller, written by this module alone */
 typedef struct {
     struct {
@@ -58,6 +79,7 @@ typedef struct {
     double time; /* s; time since the start: for tolerances only */
     uint32_t faults; /* latched fault bits */
     emps_Derived derived;
+    emps_Work work;
 } emps_Self;
 
 /* The digest of the Program, which a tool compares with that of its description */

@@ -45,28 +45,7 @@ leaf_vehicle_CALIBRATION const volatile leaf_vehicle_Cal leaf_vehicle_default_ca
     .reserved = 0U,
 };
 
-/* Values that live within one step */
-typedef struct {
-    double at_w_em;
-    double rate_w_em;
-    double at_w_w;
-    double rate_w_w;
-    double at_theta_d;
-    double rate_theta_d;
-    double merge;
-    double left;
-    bool is_wait;
-    bool event;
-    bool is_settling;
-    double h;
-    double elapsed;
-    bool crossed;
-    double end_w_em;
-    double end_w_w;
-    double end_theta_d;
-} Work;
-
-static inline void rates_always(const leaf_vehicle_Self *self, Work *work)
+static inline void rates_always(const leaf_vehicle_Self *self, leaf_vehicle_Work *work)
 {
     /* leaf_vehicle equations.w_d */
     const double at_w_d = (work->at_w_em * constant.per_R) - work->at_w_w;
@@ -87,7 +66,7 @@ static inline void guards_always(void)
     /* nothing to do */
 }
 
-static inline void step_always(const leaf_vehicle_Self *self, Work *work)
+static inline void step_always(const leaf_vehicle_Self *self, leaf_vehicle_Work *work)
 {
     work->at_w_em = self->state.w_em;
     work->at_w_w = self->state.w_w;
@@ -128,7 +107,7 @@ static inline void step_always(const leaf_vehicle_Self *self, Work *work)
         + k4_theta_d));
 }
 
-static inline void move_always(leaf_vehicle_Self *self, Work *work)
+static inline void move_always(leaf_vehicle_Self *self, leaf_vehicle_Work *work)
 {
     step_always(self, work);
     work->elapsed = work->h;
@@ -143,14 +122,14 @@ static inline void latch(leaf_vehicle_Self *self, const leaf_vehicle_In *in)
     self->before.T_em = in->T_em;
 }
 
-static inline void limit(const leaf_vehicle_Self *self, Work *work)
+static inline void limit(const leaf_vehicle_Self *self, leaf_vehicle_Work *work)
 {
     work->h = work->left;
     work->merge = 9.094947017729282e-13 * ha_max(self->time + work->h, 0.002);
     work->is_wait = false;
 }
 
-static inline void elapse(leaf_vehicle_Self *self, Work *work)
+static inline void elapse(leaf_vehicle_Self *self, leaf_vehicle_Work *work)
 {
     if (work->crossed && ((work->h - work->elapsed) <= work->merge)) {
         work->elapsed = work->h;
@@ -173,7 +152,7 @@ static inline void jump_always(void)
     guards_always();
 }
 
-static inline void jump(leaf_vehicle_Self *self, Work *work)
+static inline void jump(leaf_vehicle_Self *self, leaf_vehicle_Work *work)
 {
     self->fired = 0U;
     work->at_w_em = self->state.w_em;
@@ -188,7 +167,7 @@ static inline void jump(leaf_vehicle_Self *self, Work *work)
     }
 }
 
-static inline void watch(const leaf_vehicle_Self *self, Work *work)
+static inline void watch(const leaf_vehicle_Self *self, leaf_vehicle_Work *work)
 {
     work->at_w_em = self->state.w_em;
     work->at_w_w = self->state.w_w;
@@ -203,7 +182,7 @@ static inline void watch(const leaf_vehicle_Self *self, Work *work)
     load();
 }
 
-static inline void settle(leaf_vehicle_Self *self, Work *work)
+static inline void settle(leaf_vehicle_Self *self, leaf_vehicle_Work *work)
 {
     work->is_settling = true;
     for (int32_t micro_step = 0; (micro_step < 2) && (work->is_settling); micro_step++) {
@@ -217,7 +196,7 @@ static inline void settle(leaf_vehicle_Self *self, Work *work)
     watch(self, work);
 }
 
-static inline void segment(leaf_vehicle_Self *self, Work *work)
+static inline void segment(leaf_vehicle_Self *self, leaf_vehicle_Work *work)
 {
     limit(self, work);
     switch (self->mode) {
@@ -292,8 +271,7 @@ void leaf_vehicle_Calibrate(leaf_vehicle_Self *self, const volatile leaf_vehicle
 void leaf_vehicle_Step(leaf_vehicle_Self *self, const volatile leaf_vehicle_Cal *cal,
     const leaf_vehicle_In *in, leaf_vehicle_Out *out)
 {
-    Work scratch;
-    Work *const work = &scratch;
+    leaf_vehicle_Work *const work = &self->work;
 
     work->event = false;
     work->elapsed = 0.0;

@@ -39,6 +39,27 @@ typedef struct {
     double w_w; /* rad/s */
 } leaf_vehicle_Out;
 
+/* Values that live within one step */
+typedef struct {
+    double at_w_em;
+    double rate_w_em;
+    double at_w_w;
+    double rate_w_w;
+    double at_theta_d;
+    double rate_theta_d;
+    double merge;
+    double left;
+    bool is_wait;
+    bool event;
+    bool is_settling;
+    double h;
+    double elapsed;
+    bool crossed;
+    double end_w_em;
+    double end_w_w;
+    double end_theta_d;
+} leaf_vehicle_Work;
+
 /* One instance: allocated by the caller, written by this module alone */
 typedef struct {
     struct {
@@ -60,6 +81,7 @@ typedef struct {
     double time; /* s; time since the start: for tolerances only */
     uint32_t faults; /* latched fault bits */
     leaf_vehicle_Derived derived;
+    leaf_vehicle_Work work;
 } leaf_vehicle_Self;
 
 /* The digest of the Program, which a tool compares with that of its description */

@@ -78,8 +78,8 @@ def test_what_may_be_read_before_it_is_set_is_found(step: Block, found: set[str]
 
 def test_a_driveline_sets_three_of_its_work_values_when_a_step_begins() -> None:
     text = c_files(shipped("driveline"))["driveline.c"]
-    begin = text[text.index("    Work scratch;") : text.index("    if (self->started)")]
-    assert begin.count(" = ") == 4
+    begin = text[text.index("*const work = &self->work;") : text.index("    if (self->started)")]
+    assert begin.count(" = ") == 4  # the pointer, then these
     for line in ("work->event = false;", "work->elapsed = 0.0;", "work->crossed = false;"):
         assert line in begin
 

@@ -101,7 +101,7 @@ static inline void latch(heater_Self *self, const heater_In *in)
         self->latched.T = in->T; /* inputs.T */
     } else {
         self->faults |= heater_FAULT_range_T;
-        if ((in->T - in->T) >= 0.0) {
+        if (fabs(in->T) <= 1.7976931348623157e+308) {
             self->latched.T = ha_clip(in->T, 200.0, 500.0);
         }
     }

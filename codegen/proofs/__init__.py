@@ -1,0 +1,1 @@
+"""Proofs: what tools of others say of the C of a Program."""

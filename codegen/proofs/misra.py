@@ -1,0 +1,51 @@
+"""MISRA: the rules of MISRA C:2012 that cppcheck knows, less the deviations that we state."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+from codegen.proofs.proof import Proof, told, version_of
+from language.missing import ToolMissing
+
+DEVIATIONS = {
+    "8.9": "fixed numbers stand together at the head of the file, also where one function alone "
+    "reads them",
+    "21.15": "the bits of a power of two are set by memcpy, which every compiler turns into a move",
+}
+"""Rules that generated C breaks on purpose, and why (docs/c_code.md)."""
+KNOWN = ("-DFLT_EVAL_METHOD=0", "-DINT32_MIN=(-2147483647-1)")
+"""What headers of the compiler define, which cppcheck does not read."""
+ADDONS = ("usr/lib/*", "usr/share", "usr/local/share")
+VIOLATION = re.compile(r"\[(?P<file>[^:\]]+):(?P<line>\d+)\].*\[misra-c2012-(?P<rule>[\d.]+)\]")
+
+
+def misra(folder: Path, sources: Sequence[str]) -> Proof:
+    """Check the sources of a folder. Raises ToolMissing, BuildError."""
+    told(["cppcheck", "--dump", "--quiet", "--std=c99", *KNOWN, *sources], folder)
+    dumps = [f"{source}.dump" for source in sources]
+    heard = told([sys.executable, _addon(), *dumps], folder)
+    lines = {match.group(0): match for match in map(VIOLATION.match, _lines(heard.stderr)) if match}
+    deviating = Counter(m["rule"] for m in lines.values() if m["rule"] in DEVIATIONS)
+    found = sorted(
+        f"{Path(m['file']).name}:{m['line']}: rule {m['rule']}"
+        for m in lines.values()
+        if m["rule"] not in DEVIATIONS
+    )
+    listed = ", ".join(f"{rule} ({n} times)" for rule, n in sorted(deviating.items()))
+    about = f"{len(sources)} files; deviations: {listed or 'none'}"
+    return Proof("misra", f"cppcheck {version_of('cppcheck', folder)}", about, tuple(found))
+
+
+def _lines(text: str) -> list[str]:
+    return [line.strip() for line in text.splitlines()]
+
+
+def _addon() -> str:
+    for pattern in ADDONS:
+        for found in Path("/").glob(f"{pattern}/cppcheck/addons/misra.py"):
+            return str(found)
+    raise ToolMissing("the rules of cppcheck (misra.py) are missing: apt-get install cppcheck")

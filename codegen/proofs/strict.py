@@ -1,0 +1,23 @@
+"""Strict: the C of a Program under all warnings that we ask a compiler for, from two compilers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from codegen.build import FLAGS, WARNINGS
+from codegen.proofs.proof import Proof, told, version_of
+
+COMPILERS = ("gcc", "clang-19")
+
+
+def strict(folder: Path, sources: Sequence[str]) -> list[Proof]:
+    """Compile the sources of a folder. Raises ToolMissing."""
+    found = []
+    for compiler in COMPILERS:
+        command = [compiler, *FLAGS, *WARNINGS, "-c", *sources]
+        lines = told(command, folder).stderr.splitlines()
+        heard = tuple(line for line in lines if "warning:" in line or "error:" in line)
+        about = f"{len(WARNINGS)} kinds of warnings"
+        found.append(Proof("warnings", f"{compiler} {version_of(compiler, folder)}", about, heard))
+    return found

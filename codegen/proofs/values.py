@@ -1,0 +1,86 @@
+"""Values: no infinity, no NaN, no division by zero, nothing out of bounds, in any number of steps.
+
+By the value analysis of Frama-C (EVA): intervals of all values, over all inputs and calibrations.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+from codegen.expression import literal
+from codegen.gate import LARGEST
+from codegen.harness import fed, tunable
+from codegen.names import REAL, CNames, c_type
+from codegen.proofs.proof import Proof, told, version_of
+from codegen.rendering import render
+from codegen.source import c_files, stepped
+from language.program import Constant, Program, Variable
+
+KERNEL = (
+    *("-machdep", "gcc_x86_32", "-cpp-extra-args=-I. -Dvolatile="),
+    *("-warn-special-float", "non-finite", "-warn-signed-overflow", "-warn-unsigned-overflow"),
+    *("-warn-signed-downcast", "-warn-unsigned-downcast"),
+)
+"""The page is not `volatile` here: it changes between steps only."""
+ANALYSIS = ("-eva", "-eva-precision", "1", "-eva-no-show-progress")
+ALARM = re.compile(
+    r"\[eva:alarm\] (?P<file>[^:]+):(?P<line>\d+): Warning: *(?P<what>[^\n]*)\n? *(?P<more>[^\n]*)"
+)
+REACHED = re.compile(r"(\d+) statements reached \(out of (\d+)\)")
+
+
+def values(program: Program, folder: Path) -> Proof:
+    """Follow the values of a Program. Raises ToolMissing, BuildError."""
+    files = {**c_files(program, by_amount=False), "main.c": _main(program)}
+    for name, text in files.items():
+        (folder / name).write_text(text)
+    sources = [name for name in files if name.endswith(".c")]
+    done = told(["frama-c", *KERNEL, *ANALYSIS, *sources], folder)
+    tool = f"Frama-C {version_of('frama-c', folder)}"
+    alarms = {f"{m['file']}:{m['line']}: {m['what'] or m['more']}" for m in _alarms(done.stdout)}
+    reached = REACHED.search(done.stdout)
+    if done.returncode or reached is None:
+        last = (done.stdout + done.stderr).strip().splitlines()[-1:]
+        return Proof("values", tool, "no result", tuple(last) or ("no result",))
+    about = f"{reached[1]} of {reached[2]} statements reached; any number of steps"
+    return Proof("values", tool, about, tuple(sorted(alarms)))
+
+
+def _alarms(text: str) -> Iterator[re.Match[str]]:
+    return ALARM.finditer(text)
+
+
+def _main(program: Program) -> str:
+    place = CNames(program)
+    inputs = [(place(v.name).replace("in->", "in."), _any(program, v)) for v in fed(program)]
+    page = [
+        (place(c.name).replace("cal->", "cal."), _within(program, c))
+        for c in tunable(stepped(program))
+        if c.range
+    ]
+    real = REAL[program.number]
+    return render(
+        "values_main.c.jinja", {"name": program.name, "real": real, "inputs": inputs, "page": page}
+    )
+
+
+def _any(program: Program, variable: Variable) -> str:
+    """Return any value of an input: of its range or not."""
+    if variable.type == "real":
+        return _between(program, -LARGEST[program.number], LARGEST[program.number])
+    if variable.type == "truth":
+        return "Frama_C_interval(0, 1) != 0"
+    low, high = (0, 255) if c_type(variable, program.number) == "uint8_t" else (-(2**31), 2**31 - 1)
+    return f"({c_type(variable, program.number)})Frama_C_interval({low}, {high})"
+
+
+def _within(program: Program, constant: Constant) -> str:
+    assert constant.range
+    return _between(program, *(float(end) for end in constant.range))
+
+
+def _between(program: Program, low: float, high: float) -> str:
+    ends = f"{literal(low, program.number)}, {literal(high, program.number)}"
+    return f"Frama_C_{REAL[program.number]}_interval({ends})"

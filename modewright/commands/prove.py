@@ -1,0 +1,57 @@
+"""Command prove: generated C under the tools that an ECU's code has to pass."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from modewright.commands.options import Calibrations, Json, Sets, values_of
+from modewright.console import console, working
+from modewright.exits import PROBLEMS
+
+if TYPE_CHECKING:
+    from codegen.proofs.proof import Proof
+
+Automaton = Annotated[str, typer.Argument(help="an automaton: its name or file")]
+Only = Annotated[
+    str | None, typer.Option(help="some of warnings,misra,stack,values; default all of them")
+]
+
+
+def prove(
+    automaton: Automaton,
+    only: Only = None,
+    sets: Sets = None,
+    calibrations: Calibrations = None,
+    as_json: Json = False,
+) -> None:
+    """Check the C of an automaton by compilers, cppcheck (MISRA C:2012) and Frama-C.
+
+    \b
+    modewright prove estimator_simple
+    modewright prove supervisor --only misra,stack --json
+    """
+    from codegen.proofs.all import CHECKS
+    from modewright import api, show
+
+    checks = tuple(only.split(",")) if only else CHECKS
+    unknown = sorted(set(checks) - set(CHECKS))
+    if unknown:
+        known = ", ".join(CHECKS)
+        raise typer.BadParameter(f"{unknown[0]}: not one of {known}", param_hint="--only")
+    found: list[Proof] = []
+    for check in checks:
+        with working(f"checking the C of {automaton}: {check}"):
+            found += api.prove(
+                automaton,
+                values_of(sets),
+                calibrations=calibrations or (),
+                checks=(check,),
+            )
+    if as_json:
+        show.print_json({"automaton": automaton, "proofs": [show.proof_json(p) for p in found]})
+    else:
+        show.print_proofs(console(), found)
+    if not all(proof.holds for proof in found):
+        raise typer.Exit(PROBLEMS)

@@ -1,0 +1,53 @@
+"""Verify speed: generated C against twins of the same specs that were written by hand.
+
+Figures of issue 8 in docs/evidence/8.json; a part that was measured with the same code is kept.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from fractions import Fraction
+from functools import partial
+
+from codegen.machine import CORTEX_M4F, HOST, Machine
+from tests.target.closed_loop import driveline
+from tests.twin.duel import duel
+from tests.verify.store import ROOT, Figure, measured
+
+ISSUE, MOST = 8, 1.1
+TWINS = {"est": ("estimator", Fraction(20)), "plant": ("plant", Fraction(5))}
+"""Instances of the driveline, their twins, and 20 000 steps of each [s]."""
+ROUNDS = {HOST.name: 25, CORTEX_M4F.name: 1}
+"""Instructions are counted, time is measured."""
+
+
+def main() -> int:
+    """Measure what is not measured yet; return 0 if every bar is met."""
+    os.chdir(ROOT)
+    figures = {
+        f"{name} against its twin, {machine.name}": partial(against, name, machine)
+        for name in TWINS
+        for machine in (HOST, CORTEX_M4F)
+    }
+    return measured(ISSUE, figures)
+
+
+def against(name: str, machine: Machine) -> Figure:
+    """Return what a step takes, of the generated code and of its twin, in one run."""
+    twin, horizon = TWINS[name]
+    found = duel(driveline("float32", horizon, [name])[name], twin, ROUNDS[machine.name], machine)
+    generated, by_hand = found.best
+    return {
+        "steps": found.steps,
+        "differing": found.differing,
+        "generated": round(generated, 2),
+        "by_hand": round(by_hand, 2),
+        "unit": "ns" if machine is HOST else "instructions",
+        "ratio": round(found.ratio, 3),
+        "met": found.differing == 0 and found.ratio <= MOST,
+    }
+
+
+if __name__ == "__main__":
+    sys.exit(main())
