@@ -65,38 +65,13 @@ target-test: setup ## compare the C on an emulated Cortex-M4F with the engine
 	$(BIN)/pytest -n 2 -q tests/target $(ARGS)
 
 prove: setup ## check the C of every sampled automaton by compilers, cppcheck and Frama-C
-	$(BIN)/python tests/verify/proofs.py $(ARGS)
+	$(BIN)/python tests/verify/proofs.py
 
 verify: setup ## measure every acceptance figure; with recordings: ARGS="--recordings DIR"
-	$(BIN)/python tests/verify/first_drive.py $(ARGS)
-	$(BIN)/python tests/verify/complete.py
-	$(BIN)/python tests/verify/lockstep_bits.py
-	$(BIN)/python tests/verify/random_specs.py
-	$(BIN)/python tests/verify/random_charts.py
-	$(BIN)/python tests/verify/command_line.py
-	$(BIN)/python tests/verify/editor.py
-	$(BIN)/python tests/verify/static_checks.py
-	$(BIN)/python tests/verify/charts.py
-	$(BIN)/python tests/verify/studies.py
-	$(BIN)/python tests/verify/fast.py
-	$(BIN)/python tests/verify/open_cases.py
-	$(BIN)/python tests/verify/variants.py
-	$(BIN)/python tests/verify/tip_out.py
-	$(BIN)/python tests/verify/kept_stages.py
-	$(BIN)/python tests/verify/target_bits.py
-	$(BIN)/python tests/verify/proofs.py
-	$(BIN)/python tests/verify/twins.py
-	$(BIN)/python tests/verify/machines.py $(ARGS)
+	$(BIN)/python tests/verify/every.py $(ARGS)
 
 verify-part: setup ## measure a fixed part of the figures, as CI does
-	$(BIN)/python tests/verify/first_drive.py
-	$(BIN)/python tests/verify/complete.py --part
-	$(BIN)/python tests/verify/lockstep_bits.py --ticks 50000
-	$(BIN)/python tests/verify/random_specs.py --specs 20
-	$(BIN)/python tests/verify/random_charts.py --charts 20
-	$(BIN)/python tests/verify/command_line.py
-	$(BIN)/python tests/verify/editor.py
-	$(BIN)/python tests/verify/static_checks.py
+	$(BIN)/python tests/verify/every.py --part
 	$(BIN)/python -m tests.proof.part
 
 prove-diagnosis: setup ## diagnose the sealed cases blind, write docs/proof.md (hours; resumable)

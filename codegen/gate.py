@@ -7,18 +7,14 @@ another, so where all of them are inside, which is nearly always, one branch tak
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from functools import reduce
 
-from language.number import NumberType
+from language.number import LARGEST
 from language.operation import Assign, Binary, Block, Branch, Call, Compare, Expr, Ref, Run, Value
 from language.program import Program
 from language.substitution import with_expressions
 
-LARGEST: Mapping[NumberType, float] = {
-    "float64": 1.7976931348623157e308,
-    "float32": 3.4028234663852886e38,
-}
 LATCH = "latch"
 APART = "latch_apart"
 """What takes the inputs one by one."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 import tempfile
 from collections.abc import Callable, Sequence
@@ -11,15 +10,8 @@ from importlib import resources
 from pathlib import Path
 
 from codegen.build import SECONDS, BuildError, compiler, run_executable
-from language.missing import ToolMissing
+from codegen.tool import ARM_COMPILER, EMULATOR, needed
 
-ARM_COMPILER = "arm-none-eabi-gcc"
-EMULATOR = "qemu-system-arm"
-PACKAGES = {
-    ARM_COMPILER: "gcc-arm-none-eabi libnewlib-arm-none-eabi",
-    EMULATOR: "qemu-system-arm",
-}
-"""Debian packages of what a target needs."""
 CORTEX = ("-mcpu=cortex-m4", "-mthumb", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard")
 LINK = ("-nostartfiles", "-Wl,--gc-sections", "--specs=nano.specs", "--specs=nosys.specs")
 BOARD, SCRIPT = "mps2-an386", "mps2_an386.ld"
@@ -49,20 +41,13 @@ def harness_file(name: str) -> Path:
     return Path(str(resources.files("codegen"))) / "targets" / name
 
 
-def _needed(tool: str) -> str:
-    """Return a tool. Raises ToolMissing."""
-    if shutil.which(tool) is None:
-        raise ToolMissing(f"`{tool}` is missing: apt-get install {PACKAGES[tool]}")
-    return tool
-
-
 def _cross_compiler(named: str | None) -> list[str]:
-    return [named or _needed(ARM_COMPILER), *CORTEX]
+    return [named or needed(ARM_COMPILER), *CORTEX]
 
 
 def emulated(target: Path, records: bytes, options: Sequence[str] = ()) -> bytes:
     """Run a program of a Cortex-M4F in QEMU on records. Raises ToolMissing, BuildError."""
-    emulator = _needed(EMULATOR)
+    emulator = needed(EMULATOR)
     semihosting = ("-semihosting-config", "enable=on,target=native")
     quiet = ("-nographic", "-monitor", "none", "-serial", "none")
     with tempfile.TemporaryDirectory(prefix="modewright-") as name:

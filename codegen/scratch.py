@@ -6,7 +6,7 @@ observer's run of a model. Then the steps that do not take that way have no part
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from codegen.unassigned import unassigned
@@ -67,9 +67,13 @@ def _only(program: Program, shared: frozenset[str], used: Mapping[str, Usage]) -
     return callers[0] if is_plain and len(callers) == 1 else STEP
 
 
-def without_work(used: Mapping[str, Usage], blocks: Container[str]) -> dict[str, Usage]:
-    """Return what blocks need from outside, where some have the values of a step themselves."""
-    return {
-        name: Usage(one.needs - {"work"}, one.writes - {"work"}) if name in blocks else one
-        for name, one in used.items()
-    }
+def with_own(used: Mapping[str, Usage], scratch: Scratch) -> dict[str, Usage]:
+    """Return what blocks need from outside, where one has the values of a step itself: of all else
+    the instance, if they are a part of that.
+    """
+    mine = frozenset({"self"} if scratch.is_in_instance else ())
+    found = dict(used)
+    for name in {scratch.block, STEP}:
+        one = used[name]
+        found[name] = Usage((one.needs - {"work"}) | mine, (one.writes - {"work"}) | mine)
+    return found

@@ -23,7 +23,7 @@ from codegen.names import (
     value_constant,
 )
 from codegen.rendering import render, version
-from codegen.scratch import STEP, Scratch, scratch_of, without_work
+from codegen.scratch import STEP, Scratch, scratch_of, with_own
 from codegen.statement import INDENT, WIDTH, Writer
 from codegen.usage import Usage, locals_of, usages
 from language.functions import FUNCTIONS_OF
@@ -82,7 +82,7 @@ def module_context(program: Program, page: Page = CONSTANTS) -> dict[str, Any]:
     shared = _work(program, local)
     scratch = scratch_of(program, shared, used, page.holds_solved)
     if scratch and scratch.block != STEP:
-        used = without_work(used, (scratch.block, STEP))
+        used = with_own(used, scratch)
     blocks = [
         _block(program, name, local[name], used, kinds, page, scratch)
         for name in _callees_first(program)

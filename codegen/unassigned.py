@@ -43,7 +43,7 @@ class _Way:
         self.program = program
         self.shared = shared
         self.sizes = {v.name: v.size for v in program.variables if v.size}
-        self.known: dict[tuple[str, Set], Set] = {}
+        self.known: dict[tuple[str, Set, frozenset[tuple[str, int]]], Set] = {}
         self.turn: dict[str, int] = {}
         self.found: set[str] = set()
 
@@ -72,9 +72,10 @@ class _Way:
             case Loop(count, index, body) if count:
                 return self._loop(count, index, body, done | {index})
             case Run(name):
-                if (name, done) not in self.known:
-                    self.known[name, done] = self.run(self.program.blocks[name], done)
-                return self.known[name, done]
+                key = name, done, frozenset(self.turn.items())
+                if key not in self.known:
+                    self.known[key] = self.run(self.program.blocks[name], done)
+                return self.known[key]
             case _:
                 return done
 

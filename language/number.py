@@ -17,6 +17,10 @@ NumberType = Literal["float64", "float32"]
 NUMBERS: tuple[NumberType, ...] = ("float64", "float32")
 DIGITS: Mapping[NumberType, int] = {"float64": 53, "float32": 24}
 """Significant bits: a rounding is at most 2^-digits of the value."""
+LARGEST: Mapping[NumberType, float] = {
+    "float64": 1.7976931348623157e308,
+    "float32": 3.4028234663852886e38,
+}
 FLOAT32 = struct.Struct("<f")
 MOST_DECIMALS = 9
 """Significant decimals that tell every two float32 apart."""

@@ -19,16 +19,21 @@ DEVIATIONS = {
 """Rules that generated C breaks on purpose, and why (docs/c_code.md)."""
 KNOWN = ("-DFLT_EVAL_METHOD=0", "-DINT32_MIN=(-2147483647-1)")
 """What headers of the compiler define, which cppcheck does not read."""
+READING = ("--quiet", "--std=c99", "--error-exitcode=1")
 ADDONS = ("usr/lib/*", "usr/share", "usr/local/share")
 VIOLATION = re.compile(r"\[(?P<file>[^:\]]+):(?P<line>\d+)\].*\[misra-c2012-(?P<rule>[\d.]+)\]")
 
 
 def misra(folder: Path, sources: Sequence[str]) -> Proof:
     """Check the sources of a folder. Raises ToolMissing, BuildError."""
-    told(["cppcheck", "--dump", "--quiet", "--std=c99", *KNOWN, *sources], folder)
-    dumps = [f"{source}.dump" for source in sources]
-    heard = told([sys.executable, _addon(), *dumps], folder)
-    lines = {match.group(0): match for match in map(VIOLATION.match, _lines(heard.stderr)) if match}
+    tool = f"cppcheck {version_of('cppcheck', folder)}"
+    read = told(["cppcheck", "--dump", *READING, *KNOWN, *sources], folder)
+    heard = told([sys.executable, _addon(), *(f"{source}.dump" for source in sources)], folder)
+    unread = [one for one in sources if f"Checking {one}.dump, config" not in heard.stdout]
+    if read.returncode or unread:
+        said = (read.stderr + heard.stderr).strip().splitlines()[-1:]
+        return Proof("misra", tool, "no result", (f"not read: {' '.join([*unread, *said])}",))
+    lines = {match.group(0): match for match in VIOLATION.finditer(heard.stderr)}
     deviating = Counter(m["rule"] for m in lines.values() if m["rule"] in DEVIATIONS)
     found = sorted(
         f"{Path(m['file']).name}:{m['line']}: rule {m['rule']}"
@@ -37,11 +42,7 @@ def misra(folder: Path, sources: Sequence[str]) -> Proof:
     )
     listed = ", ".join(f"{rule} ({n} times)" for rule, n in sorted(deviating.items()))
     about = f"{len(sources)} files; deviations: {listed or 'none'}"
-    return Proof("misra", f"cppcheck {version_of('cppcheck', folder)}", about, tuple(found))
-
-
-def _lines(text: str) -> list[str]:
-    return [line.strip() for line in text.splitlines()]
+    return Proof("misra", tool, about, tuple(found))
 
 
 def _addon() -> str:

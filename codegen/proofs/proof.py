@@ -7,18 +7,10 @@ import subprocess
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from shutil import which
 
 from codegen.build import BuildError
-from language.missing import ToolMissing
+from codegen.tool import needed
 
-PACKAGES = {
-    "cppcheck": "cppcheck",
-    "frama-c": "frama-c-base",
-    "gcc": "gcc libc6-dev",
-    "clang-19": "clang-19",
-}
-"""Debian packages of the tools."""
 SECONDS = 900
 """Longest run of a tool before it is given up."""
 
@@ -43,12 +35,10 @@ class Proof:
 
 def told(command: Sequence[str], folder: Path) -> subprocess.CompletedProcess[str]:
     """Run a tool in a folder. Raises ToolMissing, BuildError."""
-    if which(command[0]) is None:
-        package = PACKAGES.get(command[0], command[0])
-        raise ToolMissing(f"`{command[0]}` is missing: apt-get install {package}")
+    tool, *words = command
     try:
         return subprocess.run(
-            list(command),
+            [needed(tool), *words],
             cwd=folder,
             env=os.environ | {"PWD": str(folder)},
             capture_output=True,
@@ -57,7 +47,7 @@ def told(command: Sequence[str], folder: Path) -> subprocess.CompletedProcess[st
             check=False,
         )
     except subprocess.TimeoutExpired:
-        raise BuildError(f"{command[0]} was not done after {SECONDS} s") from None
+        raise BuildError(f"{tool} was not done after {SECONDS} s") from None
 
 
 def version_of(tool: str, folder: Path) -> str:

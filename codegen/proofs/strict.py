@@ -16,8 +16,11 @@ def strict(folder: Path, sources: Sequence[str]) -> list[Proof]:
     found = []
     for compiler in COMPILERS:
         command = [compiler, *FLAGS, *WARNINGS, "-c", *sources]
-        lines = told(command, folder).stderr.splitlines()
+        done = told(command, folder)
+        lines = done.stderr.splitlines()
         heard = tuple(line for line in lines if "warning:" in line or "error:" in line)
+        if done.returncode and not heard:
+            heard = (f"{compiler} ended with {done.returncode}",)
         about = f"{len(WARNINGS)} kinds of warnings"
         found.append(Proof("warnings", f"{compiler} {version_of(compiler, folder)}", about, heard))
     return found

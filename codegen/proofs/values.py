@@ -6,16 +6,15 @@ By the value analysis of Frama-C (EVA): intervals of all values, over all inputs
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from pathlib import Path
 
 from codegen.expression import literal
-from codegen.gate import LARGEST
 from codegen.harness import fed, tunable
 from codegen.names import REAL, CNames, c_type
 from codegen.proofs.proof import Proof, told, version_of
 from codegen.rendering import render
 from codegen.source import c_files, stepped
+from language.number import LARGEST
 from language.program import Constant, Program, Variable
 
 KERNEL = (
@@ -39,17 +38,15 @@ def values(program: Program, folder: Path) -> Proof:
     sources = [name for name in files if name.endswith(".c")]
     done = told(["frama-c", *KERNEL, *ANALYSIS, *sources], folder)
     tool = f"Frama-C {version_of('frama-c', folder)}"
-    alarms = {f"{m['file']}:{m['line']}: {m['what'] or m['more']}" for m in _alarms(done.stdout)}
+    alarms = {
+        f"{m['file']}:{m['line']}: {m['what'] or m['more']}" for m in ALARM.finditer(done.stdout)
+    }
     reached = REACHED.search(done.stdout)
     if done.returncode or reached is None:
         last = (done.stdout + done.stderr).strip().splitlines()[-1:]
         return Proof("values", tool, "no result", tuple(last) or ("no result",))
     about = f"{reached[1]} of {reached[2]} statements reached; any number of steps"
     return Proof("values", tool, about, tuple(sorted(alarms)))
-
-
-def _alarms(text: str) -> Iterator[re.Match[str]]:
-    return ALARM.finditer(text)
 
 
 def _main(program: Program) -> str:

@@ -19,6 +19,7 @@ from language.load import program_of
 from language.operation import Assign
 from language.printing import digest
 from language.program import Program
+from language.reserved import reserved_words
 from language.traversal import walk
 from modewright.api import load, program
 
@@ -133,6 +134,13 @@ def test_files_carry_the_digest_but_no_date_and_no_place(name: str) -> None:
 def test_names_of_the_model_are_kept() -> None:
     code = files_of("estimator_simple")["estimator_simple.c"]
     assert "self->equation.w_d = (self->state.w_em * constant.per_R) - self->state.w_w;" in code
+
+
+def test_what_we_add_to_page_and_inputs_is_named_like_no_parameter_and_no_input() -> None:
+    beside_names = files_of("estimator")["estimator.h"].partition("} estimator_In;")[0]
+    ours = set(re.findall(r"^    } (\w+);", beside_names, re.MULTILINE))
+    assert len(ours) == 2
+    assert ours <= reserved_words()["GENERATED"]
 
 
 @pytest.mark.parametrize("hash_seed", ["1", "2"])

@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from codegen.build import FLAGS, BuildError, optimised
-from codegen.machine import ARM_COMPILER, CORTEX_M4F, EMULATOR, emulated
+from codegen.machine import CORTEX_M4F, emulated
+from codegen.tool import ARM_COMPILER, EMULATOR
 from language.number import NUMBERS, NumberType
 from lockstep.compare import Tape, compare
 from modewright.api import lockstep, program

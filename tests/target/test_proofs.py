@@ -8,10 +8,11 @@ from pathlib import Path
 import pytest
 
 from codegen.proofs.misra import misra
-from codegen.proofs.proof import PACKAGES, Proof
+from codegen.proofs.proof import Proof
 from codegen.proofs.stack import stack
 from codegen.proofs.strict import strict
 from codegen.source import c_files
+from codegen.tool import PACKAGES
 from language.program import Program
 from modewright.api import prove
 
@@ -19,6 +20,17 @@ pytestmark = pytest.mark.skipif(
     not all(map(shutil.which, PACKAGES)), reason="a tool is missing: make system-packages"
 )
 CHECKS = ("warnings", "misra", "stack")
+GROWS = """\
+#include <stddef.h>
+#include <string.h>
+double grows(double x, size_t n);
+double grows(double x, size_t n)
+{
+    char b[n];
+    memset(b, 1, n);
+    return (x * 3.0) + (double)b[0];
+}
+"""
 WRONG = """\
 #include <stdint.h>
 float broken(float x, int32_t n);
@@ -58,8 +70,24 @@ def test_each_tool_finds_a_mistake(tmp_path: Path) -> None:
     assert all("double-promotion" in text for text in heard), heard
     rules = {finding.rpartition(" ")[2] for finding in misra(tmp_path, ["wrong.c"]).findings}
     assert {"15.5", "15.6", "17.2"} <= rules
-    with pytest.raises(ValueError, match="broken calls itself"):
-        stack(tmp_path, ["wrong.c"], "broken")
+    assert "broken calls itself" in stack(tmp_path, ["wrong.c"], "broken").findings
+
+
+def test_what_a_tool_cannot_read_does_not_pass(tmp_path: Path) -> None:
+    (tmp_path / "torn.c").write_text("int torn(int a) { if (a { return 1; }\n")
+    proofs = [*strict(tmp_path, ["torn.c"]), misra(tmp_path, ["torn.c"])]
+    proofs.append(stack(tmp_path, ["torn.c"], "torn"))
+    assert [proof.check for proof in proofs if proof.holds] == []
+    assert not misra(tmp_path, ["missing.c"]).holds
+
+
+def test_stack_that_is_not_known_is_told(tmp_path: Path) -> None:
+    (tmp_path / "grows.c").write_text(GROWS)
+    found = stack(tmp_path, ["grows.c"], "grows")
+    assert found.findings == ("grows takes more or less each time",)
+    assert "memset" in found.about
+    assert "__aeabi_dmul" in found.about
+    assert stack(tmp_path, ["grows.c"], "other").findings == ("other is not in the compiled code",)
 
 
 def test_a_state_without_its_range_is_found(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -60,8 +60,7 @@ def duel(
         for path in (*own, HERE / "duel.h", HERE / f"{twin}_twin.h"):
             shutil.copyfile(path, folder / path.name)
         sources += [folder / path.name for path in own]
-        quiet = [word for word in WARNINGS if word != "-Wundef"]
-        words = [*machine.command(None), *flags, *quiet, *map(str, sources)]
+        words = [*machine.command(None), *flags, *WARNINGS, *map(str, sources)]
         linked([*words, *machine.link(folder / "harness")], folder / "duel")
         records = struct.pack("<2d", len(tape.inputs), rounds)
         size = 8 * len(fed(tape.program))

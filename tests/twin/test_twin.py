@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from codegen.machine import ARM_COMPILER, CORTEX_M4F, EMULATOR, HOST, MACHINES
+from codegen.machine import CORTEX_M4F, HOST, MACHINES
+from codegen.tool import ARM_COMPILER, EMULATOR
 from lockstep.compare import Tape
 from tests.target.closed_loop import driveline
 from tests.twin.duel import HERE, duel
@@ -35,7 +36,6 @@ def test_a_twin_has_the_same_bits(pair: tuple[Tape, str], machine: str) -> None:
     assert tape.transitions > 5
     assert found.steps == len(tape.inputs) > 2000
     assert found.differing == 0
-    assert 0.2 < found.ratio < 5.0
 
 
 def test_an_input_that_is_no_number_is_held_by_both() -> None:
