@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from codegen.asam import a2l as asam
 from codegen.build import optimised
 from codegen.machine import HOST, MACHINES
 from codegen.proofs.all import CHECKS, proofs
@@ -124,6 +125,24 @@ def generate(
 ) -> dict[str, str]:
     """Return the C files of an automaton by name. Raises SpecError."""
     return c_files(_generated(reference, values, root, calibrations))
+
+
+def a2l(
+    reference: str,
+    elf: Path | None = None,
+    page: str | None = None,
+    instance: str | None = None,
+    values: Values | None = None,
+    root: Path | None = None,
+    calibrations: Sequence[str] = (),
+) -> str:
+    """Return the A2L of the C of an automaton, with addresses of a linked program.
+
+    `page` and `instance` name structures where that has several. Raises SpecError, ImageError,
+    ToolMissing.
+    """
+    program = _generated(reference, values, root, calibrations)
+    return asam.a2l(program, asam.located(program, elf, page, instance) if elf else None)
 
 
 def prove(

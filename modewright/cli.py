@@ -13,6 +13,7 @@ from typing import Annotated
 import typer
 
 from language.inside import ALLOW_OUTSIDE
+from modewright.commands.a2l import a2l
 from modewright.commands.check import check
 from modewright.commands.compare import compare
 from modewright.commands.demo import demo
@@ -46,7 +47,7 @@ YOUNG_OBJECTS = 100_000
 """New objects after which garbage is looked for: trees of expressions have no circles."""
 COMMANDS = (
     new, check, test, trace, diagnose, fit, effects, simulate, sweep, lockstep, replay, plot,
-    compare, graph, generate, prove, explain, diff, format, schema, lsp, demo, doctor,
+    compare, graph, generate, a2l, prove, explain, diff, format, schema, lsp, demo, doctor,
 )  # fmt: skip
 
 app = typer.Typer(

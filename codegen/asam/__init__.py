@@ -1,0 +1,1 @@
+"""Descriptions of generated C for measurement and calibration tools (ASAM)."""

@@ -1,0 +1,46 @@
+"""Command a2l: the description of generated C for a measurement and calibration tool."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from modewright.commands.options import Calibrations, Sets, values_of
+from modewright.console import announce
+from modewright.files import OutputError, require_writable, write_files
+
+
+def a2l(
+    automaton: Annotated[str, typer.Argument(help="an automaton: its name or file")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="write .a2l")],
+    elf: Annotated[
+        Path | None, typer.Option("--elf", help="the linked program, with -g: gives addresses")
+    ] = None,
+    page: Annotated[
+        str | None, typer.Option(help="the calibration page; default X_default_cal")
+    ] = None,
+    instance: Annotated[
+        str | None, typer.Option(help="the instance where the program has several: 'app.left'")
+    ] = None,
+    sets: Sets = None,
+    calibrations: Calibrations = None,
+) -> None:
+    """Write what a tool may measure and calibrate in generated C (ASAM A2L 1.7.1).
+
+    \b
+    modewright a2l estimator --out estimator.a2l --elf ecu.elf
+    modewright a2l estimator --out left.a2l --elf ecu.elf --instance app.left --page left_page
+    """
+    from codegen.asam.image import ImageError
+    from modewright import api
+
+    require_writable(out)
+    given = values_of(sets), calibrations or ()
+    try:
+        text = api.a2l(automaton, elf, page, instance, given[0], calibrations=given[1])
+    except ImageError as error:
+        raise OutputError(str(error)) from None
+    write_files({out: text.encode("ascii")})
+    announce([out])

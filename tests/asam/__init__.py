@@ -1,0 +1,1 @@
+"""Tests of descriptions for measurement and calibration tools."""
