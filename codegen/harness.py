@@ -68,7 +68,7 @@ def write_harness(program: Program, folder: Path, machine: Machine = HOST) -> li
     for name in (*INCLUDED, *machine.files):
         shutil.copyfile(harness_file(name), folder / "harness" / name)
     files = c_files(program)
-    files["main.c"] = render("lockstep_main.c.jinja", _harness(program))
+    files["main.c"] = render("lockstep_main.c.jinja", harness_context(program))
     for name, text in files.items():
         (folder / name).write_text(text)
     names = (*files, *(f"harness/{name}" for name in machine.files))
@@ -93,7 +93,8 @@ def executable(
         yield stored(key, lambda target: linked(words, target), folder)
 
 
-def _harness(program: Program) -> Mapping[str, object]:
+def harness_context(program: Program) -> Mapping[str, object]:
+    """Return what a main around a program needs to know: inputs, tunables and what is compared."""
     program = stepped(program)
     place, real = CNames(program), REAL[program.number]
     inputs = [

@@ -8,10 +8,11 @@ from __future__ import annotations
 import itertools
 import struct
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from codegen.build import FLAGS
 from codegen.harness import executable, fed, observed, tunable
+from codegen.instructions import Instructions, instructions
 from codegen.machine import HOST, Machine
 from engine.firing import fired
 from engine.interpreter import Stepper
@@ -20,6 +21,8 @@ from language.program import Program, short
 
 FORMAT: Mapping[NumberType, str] = {"float64": "d", "float32": "f"}
 """How a record keeps a real; whole numbers and truth values take 8 bytes."""
+MOST_COUNTED = 5000
+"""Steps whose instructions are counted: each of them is repeated forty times."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +47,7 @@ class Verdict:
     """How many ticks and values were compared, how many differ, and the first that does.
 
     Of a continuous automaton a tick is a major step; `note` says what was not compared, and why.
+    `instructions` of the first steps are counted on a target.
     """
 
     name: str
@@ -54,6 +58,7 @@ class Verdict:
     transitions: int
     first: Difference | None
     note: str = ""
+    instructions: Instructions | None = None
 
     @property
     def is_equal(self) -> bool:
@@ -139,6 +144,12 @@ def compare(
     """
     with executable(tape.program, flags, compiler, machine) as target:
         return judged(tape, machine.run(target, b"".join(tape.inputs)))
+
+
+def counted(verdict: Verdict, tape: Tape, flags: Sequence[str] = FLAGS) -> Verdict:
+    """Return a verdict with the instructions of its first steps on a Cortex-M4F."""
+    records = b"".join(tape.inputs[:MOST_COUNTED])
+    return replace(verdict, instructions=instructions(tape.program, records, flags))
 
 
 def judged(tape: Tape, output: bytes) -> Verdict:

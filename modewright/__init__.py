@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from engine.trajectory import Event, Trajectory
     from language.problem import Problem, SpecError, render_all
     from lockstep.compare import Verdict
-    from modewright.api import Loaded, Replayed, check, generate, load, lockstep, replay, simulate
+    from modewright.api import Loaded, Replayed, check, load, lockstep, replay, simulate
+    from modewright.code import a2l, generate, metrics, prove
     from modewright.diagnoses import diagnose, fit, save_diagnosis
     from modewright.diagram import Diagram, graph
     from modewright.recordings import CheckedRecordings, check_recordings
@@ -41,6 +42,7 @@ __all__ = [
     "SpecError",
     "Trajectory",
     "Verdict",
+    "a2l",
     "check",
     "check_recordings",
     "compare",
@@ -50,6 +52,7 @@ __all__ = [
     "graph",
     "load",
     "lockstep",
+    "metrics",
     "plot",
     "prove",
     "read",
@@ -77,6 +80,10 @@ PLACES = {
     "SpecError": "language.problem",
     "Trajectory": "engine.trajectory",
     "Verdict": "lockstep.compare",
+    "a2l": "modewright.code",
+    "generate": "modewright.code",
+    "metrics": "modewright.code",
+    "prove": "modewright.code",
     "compare": "modewright.runs",
     "plot": "modewright.runs",
     "read": "modewright.runs",

@@ -4,25 +4,20 @@ from __future__ import annotations
 
 import dataclasses
 import logging
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from codegen.asam import a2l as asam
 from codegen.build import optimised
-from codegen.machine import HOST, MACHINES
-from codegen.proofs.all import CHECKS, proofs
-from codegen.proofs.proof import Proof
-from codegen.source import c_files
+from codegen.machine import CORTEX_M4F, HOST, MACHINES
 from engine.recording import Recording, read_recording
 from engine.replay import Replay, replay as replay_recording, used_columns
-from engine.simulate import simulate as simulate_system
 from engine.trajectory import Trajectory
-from language.document import Document, Scalar, require_kind
+from language.document import require_kind
 from language.experiment import RecordingMap, Scenario, System
 from language.limit import require_ranges
-from language.load import automaton_of, command_line_value, program_of
+from language.load import automaton_of, program_of
 from language.map import read_map
 from language.model import Automaton
 from language.number import NumberType
@@ -32,14 +27,12 @@ from language.program import Program
 from language.project import Project, layered, read_document, with_calibrations
 from language.scenario import read_scenario
 from language.system import in_numbers, read_system
-from lockstep.compare import Tape, Verdict, compare
+from lockstep.compare import Tape, Verdict, compare, counted
 from lockstep.coverage import noted
+from lockstep.taping import taped
 from modewright.checking import check as check
 from modewright.compiled import run as run_compiled
-
-Values = Mapping[str, str]
-"""Parameter values as text with units, by `parameter` or `instance.parameter`."""
-
+from modewright.documents import Values, calibrated_document, scalars
 
 METHODS = ("RK4", "DOP853", "Radau", "LSODA")
 """How continuous automata can be integrated: our own method, or one of scipy's."""
@@ -72,7 +65,7 @@ def load(
 ) -> Loaded:
     """Return a system with a scenario. Raises SpecError with all problems."""
     project = Project(root or Path())
-    read = read_system(_document(system, project, calibrations), project, _scalars(values))
+    read = read_system(calibrated_document(system, project, calibrations), project, scalars(values))
     document = read_document(project.path_of(scenario))
     return Loaded(read, read_scenario(document, project, read))
 
@@ -114,61 +107,7 @@ def program(reference: str, values: Values | None = None, root: Path | None = No
     """Return the Program of an automaton. Raises SpecError."""
     project = Project(root or Path())
     document = read_document(project.path_of(reference))
-    return program_of(automaton_of(document, project, _scalars(values)))
-
-
-def generate(
-    reference: str,
-    values: Values | None = None,
-    root: Path | None = None,
-    calibrations: Sequence[str] = (),
-) -> dict[str, str]:
-    """Return the C files of an automaton by name. Raises SpecError."""
-    return c_files(_generated(reference, values, root, calibrations))
-
-
-def a2l(
-    reference: str,
-    elf: Path | None = None,
-    page: str | None = None,
-    instance: str | None = None,
-    values: Values | None = None,
-    root: Path | None = None,
-    calibrations: Sequence[str] = (),
-) -> str:
-    """Return the A2L of the C of an automaton, with addresses of a linked program.
-
-    `page` and `instance` name structures where that has several. Raises SpecError, ImageError,
-    ToolMissing.
-    """
-    program = _generated(reference, values, root, calibrations)
-    return asam.a2l(program, asam.located(program, elf, page, instance) if elf else None)
-
-
-def prove(
-    reference: str,
-    values: Values | None = None,
-    root: Path | None = None,
-    calibrations: Sequence[str] = (),
-    checks: Sequence[str] = CHECKS,
-) -> Iterator[Proof]:
-    """Yield what tools of others say of the C of an automaton: some of the checks, in turn.
-
-    Raises SpecError, ToolMissing.
-    """
-    yield from proofs(_generated(reference, values, root, calibrations), checks)
-
-
-def _generated(
-    reference: str, values: Values | None, root: Path | None, calibrations: Sequence[str]
-) -> Program:
-    """Return the Program that C is made of."""
-    project = Project(root or Path())
-    document = _document(reference, project, calibrations)
-    automaton = automaton_of(document, project, _scalars(values))
-    if automaton.is_sampled:
-        require_ranges(automaton)
-    return program_of(automaton)
+    return program_of(automaton_of(document, project, scalars(values)))
 
 
 def lockstep(
@@ -186,7 +125,8 @@ def lockstep(
 ) -> tuple[Trajectory, list[Verdict]]:
     """Simulate, then run the C of every instance on the same inputs and compare bits.
 
-    `target` is where the C runs: `host`, or `cortex-m4f` in an emulator.
+    `target` is where the C runs: `host`, or `cortex-m4f` in an emulator, where the instructions of
+    steps are counted, too.
     `numbers` replaces the number type of every instance; `changes` are pages of the calibration
     like `1.5 s: k_hs = 6000 N*m/rad`, in place of those of the scenario.
     Raises SpecError, ToolMissing.
@@ -200,18 +140,12 @@ def lockstep(
     for instance in loaded.system.instances.values():
         if instance.automaton.is_sampled:
             require_ranges(instance.automaton)
-    tapes: dict[str, Tape] = {}
-
-    def ticked(name: str, used: Program, stepper: object) -> None:
-        if name not in tapes:
-            start = float(loaded.system.instances[name].offset)
-            tapes[name] = Tape(used, name=name, start=start)
-        tapes[name].record(stepper)  # type: ignore[arg-type]
-
-    trajectory = simulate_system(loaded.system, loaded.scenario, ticked=ticked)
+    trajectory, tapes = taped(loaded.system, loaded.scenario)
     flags = optimised(optimise)
     machine = MACHINES[target]
     verdicts = [compare(tape, flags, compiler, machine) for tape in tapes.values()]
+    if machine is CORTEX_M4F:
+        verdicts = [counted(verdict, tapes[verdict.name], flags) for verdict in verdicts]
     return trajectory, noted(verdicts, loaded.system, loaded.scenario, trajectory)
 
 
@@ -241,11 +175,6 @@ def replay(
     return Replayed(result, verdict, tuple(left_out), read)
 
 
-def _document(reference: str, project: Project, calibrations: Sequence[str]) -> Document:
-    document = read_document(project.path_of(reference))
-    return with_calibrations(document, calibrations, "--calibration")
-
-
 def _estimator(
     reference: str,
     variant: str | None,
@@ -261,7 +190,7 @@ def _estimator(
         require_kind(over, "variant", problems)
         document = layered(document, over, project, problems)
     document = with_calibrations(document, calibrations, "--calibration")
-    automaton = automaton_of(document, project, _scalars(values))
+    automaton = automaton_of(document, project, scalars(values))
     if not automaton.is_sampled:
         problems = Problems()
         label = f"`{automaton.name}` is continuous: only a sampled automaton reads a recording"
@@ -273,7 +202,3 @@ def _estimator(
 def _map(reference: str, root: Path | None) -> RecordingMap:
     project = Project(root or Path())
     return read_map(read_document(project.path_of(reference)), project)
-
-
-def _scalars(values: Values | None) -> dict[str, Scalar]:
-    return {name: command_line_value(text, name=name) for name, text in (values or {}).items()}

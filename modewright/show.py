@@ -81,6 +81,10 @@ def print_verdicts(console: Console, verdicts: Sequence[Verdict]) -> None:
     for verdict in verdicts:
         if verdict.note:
             console.print(f"{verdict.name}: {verdict.note}", soft_wrap=True, highlight=False)
+        if verdict.instructions:
+            count = len(verdict.instructions.steps)
+            text = f"{verdict.name}: {verdict.instructions} instructions a step, of {count} steps"
+            console.print(text, soft_wrap=True, highlight=False)
         if verdict.first:
             console.print(f"first difference: {verdict.first}", soft_wrap=True, highlight=False)
 
@@ -132,7 +136,16 @@ def verdict_json(verdict: Verdict) -> dict[str, Any]:
         "transitions": verdict.transitions,
         "first": vars(verdict.first) if verdict.first else None,
         "note": verdict.note,
+        "instructions": _instructions_json(verdict),
     }
+
+
+def _instructions_json(verdict: Verdict) -> dict[str, Any] | None:
+    counts = verdict.instructions
+    if counts is None:
+        return None
+    least, most = min(counts.steps, default=0), max(counts.steps, default=0)
+    return {"steps": len(counts.steps), "mean": counts.mean, "min": least, "max": most}
 
 
 def replay_json(replayed: Replayed) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from codegen.build import FLAGS
+from codegen.build import FLAGS, BuildError
 from codegen.machine import CORTEX
 from codegen.proofs.proof import Proof, told, version_of
 from codegen.tool import ARM_COMPILER
@@ -37,30 +37,52 @@ class _Calls:
         return [longer for one in sorted(self.called[name]) for longer in self.ways(one, way)]
 
 
-def stack(folder: Path, sources: Sequence[str], entry: str) -> Proof:
-    """Compile for a Cortex-M4F and add up what a step takes. Raises ToolMissing, BuildError.
+@dataclass(frozen=True)
+class Stack:
+    """The `most` bytes that a function takes with all that it calls, as far as that is known.
 
-    Functions that are not among the sources (memset, arithmetic in software) are named: the
-    compiler does not tell what they take.
+    `beside` are functions that are not among the sources (memset, arithmetic in software): the
+    compiler does not tell what they take. `recurring` call themselves, `growing` have no fixed
+    size.
     """
-    command = [ARM_COMPILER, *CORTEX, *FLAGS, "-fcallgraph-info=su", "-c", *sources]
-    done = told(command, folder)
-    tool = f"{ARM_COMPILER} {version_of(ARM_COMPILER, folder)}"
+
+    most: int
+    beside: tuple[str, ...] = ()
+    recurring: tuple[str, ...] = ()
+    growing: tuple[str, ...] = ()
+
+
+def stack_of(folder: Path, sources: Sequence[str], entry: str) -> Stack:
+    """Compile for a Cortex-M4F and add up what a function takes. Raises ToolMissing, BuildError."""
+    done = told([ARM_COMPILER, *CORTEX, *FLAGS, "-fcallgraph-info=su", "-c", *sources], folder)
     if done.returncode:
-        return Proof("stack", tool, "does not compile", tuple(done.stderr.splitlines()[:1]))
+        raise BuildError(done.stderr.strip() or f"{ARM_COMPILER} ended with {done.returncode}")
     calls = _read("\n".join((folder / f"{Path(s).stem}.ci").read_text() for s in sources))
     if entry not in calls.sizes:
-        return Proof("stack", tool, "no result", (f"{entry} is not in the compiled code",))
+        raise BuildError(f"{entry} is not in the compiled code")
     ways = calls.ways(entry)
-    took = max(sum(calls.sizes.get(name, 0) for name in way) for way in ways)
     met = {name for way in ways for name in way}
-    beside = ", ".join(sorted(met - set(calls.sizes)))
-    found = [f"{way[-1]} calls itself" for way in ways if way[-1] in way[:-1]]
-    found += [f"{name} takes more or less each time" for name in sorted(met & calls.growing)]
-    if took > LIMIT:
-        found.append(f"{entry} takes {took} bytes, {LIMIT} are allowed")
-    about = f"{entry}: {took} bytes" + (f", beside what these take: {beside}" if beside else "")
-    return Proof("stack", tool, about, tuple(dict.fromkeys(found)))
+    return Stack(
+        max(sum(calls.sizes.get(name, 0) for name in way) for way in ways),
+        tuple(sorted(met - set(calls.sizes))),
+        tuple(sorted({way[-1] for way in ways if way[-1] in way[:-1]})),
+        tuple(sorted(met & calls.growing)),
+    )
+
+
+def stack(folder: Path, sources: Sequence[str], entry: str) -> Proof:
+    """Say whether a step takes no more than the limit, and a fixed number. Raises ToolMissing."""
+    tool = f"{ARM_COMPILER} {version_of(ARM_COMPILER, folder)}"
+    try:
+        took = stack_of(folder, sources, entry)
+    except BuildError as error:
+        return Proof("stack", tool, "no result", (str(error).partition("\n")[0],))
+    found = [f"{name} calls itself" for name in took.recurring]
+    found += [f"{name} takes more or less each time" for name in took.growing]
+    if took.most > LIMIT:
+        found.append(f"{entry} takes {took.most} bytes, {LIMIT} are allowed")
+    beside = f", beside what these take: {', '.join(took.beside)}" if took.beside else ""
+    return Proof("stack", tool, f"{entry}: {took.most} bytes{beside}", tuple(found))
 
 
 def _read(text: str) -> _Calls:

@@ -34,12 +34,12 @@ def a2l(
     modewright a2l estimator --out left.a2l --elf ecu.elf --instance app.left --page left_page
     """
     from codegen.asam.image import ImageError
-    from modewright import api
+    from modewright import code
 
     require_writable(out)
     given = values_of(sets), calibrations or ()
     try:
-        text = api.a2l(automaton, elf, page, instance, given[0], calibrations=given[1])
+        text = code.a2l(automaton, elf, page, instance, given[0], calibrations=given[1])
     except ImageError as error:
         raise OutputError(str(error)) from None
     write_files({out: text.encode("ascii")})

@@ -32,7 +32,7 @@ def generate(
     modewright generate estimator --out build
     modewright generate --all --check
     """
-    from modewright import api
+    from modewright import code
     from modewright.generated import generated_files
 
     if every == (automaton is not None):
@@ -41,7 +41,7 @@ def generate(
         _stop_where_stale()
         return
     if automaton is not None:
-        made = api.generate(automaton, values_of(sets), calibrations=calibrations or ())
+        made = code.generate(automaton, values_of(sets), calibrations=calibrations or ())
         files = {out / name: text.encode() for name, text in made.items()}
     else:
         files = generated_files(Path())

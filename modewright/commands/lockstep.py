@@ -9,6 +9,7 @@ import typer
 from modewright.commands.options import (
     Calibrations,
     Json,
+    Numbers,
     Scenario,
     Sets,
     System,
@@ -17,10 +18,6 @@ from modewright.commands.options import (
 )
 from modewright.console import console, working
 
-Numbers = Annotated[
-    Literal["float64", "float32"] | None,
-    typer.Option(help="compute in this type, whatever the automata say"),
-]
 Changes = Annotated[
     list[str] | None,
     typer.Option("--change", help="a tunable from a time on: '1.5 s: k_hs = 6000 N*m/rad'"),

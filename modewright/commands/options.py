@@ -7,7 +7,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -41,6 +41,10 @@ Signals = Annotated[
 ]
 From = Annotated[float | None, typer.Option("--from", help="start of the window [s]")]
 To = Annotated[float | None, typer.Option("--to", help="end of the window [s]")]
+Numbers = Annotated[
+    Literal["float64", "float32"] | None,
+    typer.Option(help="compute in this type, whatever the automata say"),
+]
 Json = Annotated[bool, typer.Option("--json", help="print the result as JSON")]
 
 

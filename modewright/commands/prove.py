@@ -30,7 +30,7 @@ def prove(
     modewright prove supervisor --only misra,stack --json
     """
     from codegen.proofs.all import CHECKS
-    from modewright import api, show
+    from modewright import code, show
 
     checks = tuple(only.split(",")) if only else CHECKS
     unknown = sorted(set(checks) - set(CHECKS))
@@ -38,7 +38,9 @@ def prove(
         known = ", ".join(CHECKS)
         raise typer.BadParameter(f"{unknown[0]}: not one of {known}", param_hint="--only")
     with working(f"checking the C of {automaton}"):
-        made = api.prove(automaton, values_of(sets), calibrations=calibrations or (), checks=checks)
+        made = code.prove(
+            automaton, values_of(sets), calibrations=calibrations or (), checks=checks
+        )
         found = list(made)
     if as_json:
         show.print_json({"automaton": automaton, "proofs": [show.proof_json(p) for p in found]})

@@ -14,7 +14,7 @@ from codegen.proofs.strict import strict
 from codegen.source import c_files
 from codegen.tool import PACKAGES
 from language.program import Program
-from modewright.api import prove
+from modewright.code import prove
 
 pytestmark = pytest.mark.skipif(
     not all(map(shutil.which, PACKAGES)), reason="a tool is missing: make system-packages"

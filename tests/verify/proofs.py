@@ -10,7 +10,7 @@ import sys
 from functools import partial
 
 from codegen.proofs.all import CHECKS
-from modewright.api import prove
+from modewright.code import prove
 from tests.verify.store import ROOT, Figure, measured
 
 ISSUE = 8

@@ -1,0 +1,100 @@
+"""Metrics: what generated C takes of a Cortex-M4F - ROM, RAM, stack."""
+
+from __future__ import annotations
+
+import re
+import tempfile
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from codegen.build import FLAGS, BuildError
+from codegen.machine import CORTEX
+from codegen.proofs.proof import told
+from codegen.proofs.stack import stack_of
+from codegen.source import c_files
+from codegen.tool import ARM_COMPILER
+from language.program import Program
+
+SIZE = "arm-none-eabi-size"
+STRUCTURES = ("Self", "In", "Out")
+PROBE = "const char of_{structure}[sizeof({name}_{structure})] = {{0}};\n"
+SECTION = re.compile(r"^(\.[\w.]+)\s+(\d+)\s+\d+", re.MULTILINE)
+KINDS = {".text": "code", ".rodata": "constants", ".data": "data", ".bss": "data"}
+"""What a section holds, by the first word of its name."""
+
+
+@dataclass(frozen=True)
+class Metrics:
+    """Bytes: of `code` and its `constants`, of the calibration `page` (both ROM), of `data` that
+    is no one's instance, of one `instance` (RAM), of the structures of inputs and outputs, and of
+    the `stack` of a step; `beside` are functions whose stack the compiler does not tell.
+    """
+
+    name: str
+    number: str
+    code: int
+    constants: int
+    page: int
+    data: int
+    instance: int
+    inputs: int
+    outputs: int
+    stack: int
+    beside: tuple[str, ...]
+
+    @property
+    def rom(self) -> int:
+        """Code, constants and the default page."""
+        return self.code + self.constants + self.page
+
+
+def metrics(program: Program) -> Metrics:
+    """Compile the C of a Program for a Cortex-M4F, `-O2`, and measure it.
+
+    Raises ToolMissing, BuildError.
+    """
+    name = program.name
+    with tempfile.TemporaryDirectory(prefix="modewright-") as folder_name:
+        folder, files = Path(folder_name), c_files(program)
+        probes = "".join(PROBE.format(structure=one, name=name) for one in STRUCTURES)
+        for file, text in {**files, "probe.c": f'#include "{name}.h"\n{probes}'}.items():
+            (folder / file).write_text(text)
+        sources = [file for file in files if file.endswith(".c")]
+        held = _sections(folder, sources)
+        sizes = _sections(folder, ["probe.c"])
+        found = stack_of(folder, sources, f"{name}_Step")
+    kinds: Counter[str] = Counter()
+    for section, size in held.items():
+        kinds[KINDS.get("." + section.split(".")[1], "")] += size
+    return Metrics(
+        name,
+        program.number,
+        code=kinds["code"],
+        constants=kinds["constants"],
+        page=held[f".calibration.{name}"],
+        data=kinds["data"],
+        instance=sizes[".rodata.of_Self"],
+        inputs=sizes[".rodata.of_In"],
+        outputs=sizes[".rodata.of_Out"],
+        stack=found.most,
+        beside=found.beside,
+    )
+
+
+def _sections(folder: Path, sources: Sequence[str]) -> Counter[str]:
+    """Return the bytes of each section of all sources together."""
+    _done([ARM_COMPILER, *CORTEX, *FLAGS, "-fdata-sections", "-c", *sources], folder)
+    objects = [f"{Path(source).stem}.o" for source in sources]
+    found: Counter[str] = Counter()
+    for line in SECTION.finditer(_done([SIZE, "-A", "-d", *objects], folder)):
+        found[line[1]] += int(line[2])
+    return found
+
+
+def _done(command: Sequence[str], folder: Path) -> str:
+    done = told(command, folder)
+    if done.returncode:
+        raise BuildError(done.stderr.strip() or f"{command[0]} ended with {done.returncode}")
+    return done.stdout

@@ -1,0 +1,121 @@
+"""Code: the C of an automaton, and what an ECU's engineers want beside it, as functions."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from codegen.asam import a2l as asam
+from codegen.instructions import Instructions, instructions as counted
+from codegen.metrics import Metrics, metrics as measured
+from codegen.proofs.all import CHECKS, proofs
+from codegen.proofs.proof import Proof
+from codegen.source import c_files
+from language.limit import require_ranges
+from language.load import automaton_of, program_of
+from language.number import NumberType
+from language.program import Program
+from language.project import Project
+from language.system import in_numbers
+from lockstep.compare import MOST_COUNTED
+from lockstep.taping import taped
+from modewright.api import load
+from modewright.documents import Values, calibrated_document, scalars
+
+
+def generate(
+    reference: str,
+    values: Values | None = None,
+    root: Path | None = None,
+    calibrations: Sequence[str] = (),
+) -> dict[str, str]:
+    """Return the C files of an automaton by name. Raises SpecError."""
+    return c_files(_generated(reference, values, root, calibrations))
+
+
+def a2l(
+    reference: str,
+    elf: Path | None = None,
+    page: str | None = None,
+    instance: str | None = None,
+    values: Values | None = None,
+    root: Path | None = None,
+    calibrations: Sequence[str] = (),
+) -> str:
+    """Return the A2L of the C of an automaton, with addresses of a linked program.
+
+    `page` and `instance` name structures where that has several. Raises SpecError, ImageError,
+    ToolMissing.
+    """
+    program = _generated(reference, values, root, calibrations)
+    return asam.a2l(program, asam.located(program, elf, page, instance) if elf else None)
+
+
+def prove(
+    reference: str,
+    values: Values | None = None,
+    root: Path | None = None,
+    calibrations: Sequence[str] = (),
+    checks: Sequence[str] = CHECKS,
+) -> Iterator[Proof]:
+    """Yield what tools of others say of the C of an automaton: some of the checks, in turn.
+
+    Raises SpecError, ToolMissing.
+    """
+    yield from proofs(_generated(reference, values, root, calibrations), checks)
+
+
+def metrics(
+    reference: str,
+    values: Values | None = None,
+    root: Path | None = None,
+    calibrations: Sequence[str] = (),
+    numbers: NumberType | None = None,
+) -> Metrics:
+    """Return what the C of an automaton takes of a Cortex-M4F: ROM, RAM, stack.
+
+    `numbers` replaces its number type. Raises SpecError, ToolMissing.
+    """
+    return measured(_generated(reference, values, root, calibrations, numbers))
+
+
+def instructions(
+    reference: str,
+    system: str,
+    scenario: str,
+    values: Values | None = None,
+    root: Path | None = None,
+    calibrations: Sequence[str] = (),
+    numbers: NumberType | None = None,
+) -> Instructions:
+    """Return the instructions of the steps of an automaton's C in a scenario of a system.
+
+    Raises SpecError, ValueError where no instance of the system is that automaton, ToolMissing.
+    """
+    program = _generated(reference, values, root, calibrations, numbers)
+    loaded = load(system, scenario, None, root, calibrations)
+    run = in_numbers(loaded.system, numbers) if numbers else loaded.system
+    name = next((n for n, i in run.instances.items() if i.automaton.name == program.name), None)
+    if name is None:
+        raise ValueError(f"{system} has no instance of {program.name}")
+    tape = taped(run, loaded.scenario)[1][name]
+    return counted(program, b"".join(tape.inputs[:MOST_COUNTED]))
+
+
+def _generated(
+    reference: str,
+    values: Values | None,
+    root: Path | None,
+    calibrations: Sequence[str],
+    numbers: NumberType | None = None,
+) -> Program:
+    """Return the Program that C is made of."""
+    project = Project(root or Path())
+    document = calibrated_document(reference, project, calibrations)
+    automaton = automaton_of(document, project, scalars(values))
+    if numbers:
+        automaton = dataclasses.replace(automaton, numbers=numbers)
+    if automaton.is_sampled:
+        require_ranges(automaton)
+    return program_of(automaton)

@@ -1,0 +1,23 @@
+"""Documents: specs by name or path, with calibrations laid, and values that a user gives."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from language.document import Document, Scalar
+from language.load import command_line_value
+from language.project import Project, read_document, with_calibrations
+
+Values = Mapping[str, str]
+"""Parameter values as text with units, by `parameter` or `instance.parameter`."""
+
+
+def calibrated_document(reference: str, project: Project, calibrations: Sequence[str]) -> Document:
+    """Return a spec with calibrations laid over it. Raises SpecError."""
+    document = read_document(project.path_of(reference))
+    return with_calibrations(document, calibrations, "--calibration")
+
+
+def scalars(values: Values | None) -> dict[str, Scalar]:
+    """Return values that a user gave as the language reads them. Raises SpecError."""
+    return {name: command_line_value(text, name=name) for name, text in (values or {}).items()}

@@ -1,0 +1,93 @@
+"""Show metrics: what generated C takes of an ECU, as a table, a page and plain data."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+from typing import Any
+
+from rich.table import Table
+
+from codegen.instructions import Instructions
+from codegen.metrics import Metrics
+
+Measured = tuple[Metrics, Instructions | None]
+"""What one automaton takes, and its instructions where they were counted."""
+HEADS = ("automaton", "ROM", "code", "constants", "page", "RAM", "data", "stack", "instructions")
+ABOUT = (
+    "Bytes on a Cortex-M4F, -O2. ROM: code, constants and the default calibration page. RAM: one "
+    "instance; data: what belongs to none. Stack: the most that a step takes with all that it "
+    "calls. Instructions of a step: mean, least and most."
+)
+STYLE = """body{font:14px/1.45 system-ui,sans-serif;margin:2rem;color:#222;max-width:60rem}
+table{border-collapse:collapse}
+th,td{padding:.35rem .7rem;border-bottom:1px solid #ddd;text-align:right}
+th:first-child,td:first-child{text-align:left}svg{display:block;margin:.3rem 0 1.2rem}
+@media(prefers-color-scheme:dark){body{background:#161616;color:#ddd}td,th{border-color:#444}}"""
+WIDTH, HEIGHT = 900, 90
+"""Of the picture of instructions over steps [px]."""
+
+
+def metrics_table(found: Sequence[Measured]) -> Table:
+    """Return a table for a person."""
+    table = Table(*HEADS, box=None, pad_edge=False, header_style="bold")
+    for measured in found:
+        table.add_row(*_row(measured))
+    return table
+
+
+def metrics_json(found: Sequence[Measured]) -> dict[str, Any]:
+    """Return metrics as plain data."""
+    return {
+        "target": "cortex-m4f",
+        "automata": [
+            {
+                **vars(metrics),
+                "beside": list(metrics.beside),
+                "rom": metrics.rom,
+                "instructions": counts and list(counts.steps),
+            }
+            for metrics, counts in found
+        ],
+    }
+
+
+def metrics_html(found: Sequence[Measured]) -> str:
+    """Return a page: the table, and the instructions of each step as a picture."""
+    heads = "".join(f"<th>{escape(head)}</th>" for head in HEADS)
+    rows = "".join(
+        "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in _row(measured)) + "</tr>\n"
+        for measured in found
+    )
+    pictures = "".join(_picture(metrics, counts) for metrics, counts in found if counts)
+    return (
+        f"<!doctype html><meta charset=utf-8><title>metrics</title><style>{STYLE}</style>\n"
+        f"<h1>What generated C takes</h1><p>{escape(ABOUT)}</p>\n"
+        f"<table><tr>{heads}</tr>\n{rows}</table>\n{pictures}"
+    )
+
+
+def _row(measured: Measured) -> tuple[str, ...]:
+    metrics, counts = measured
+    stack = f"{metrics.stack}{' and more' if metrics.beside else ''}"
+    sizes = (metrics.rom, metrics.code, metrics.constants, metrics.page)
+    ram = (metrics.instance, metrics.data)
+    numbers = (str(size) for size in (*sizes, *ram))
+    return metrics.name, *numbers, stack, str(counts) if counts else "not counted"
+
+
+def _picture(metrics: Metrics, counts: Instructions) -> str:
+    """Return the instructions over the steps: the least and most of those in a pixel."""
+    steps, most = counts.steps, max(counts.steps, default=0) or 1
+    wide = max(1, -(-len(steps) // WIDTH))
+    lines = []
+    for x, start in enumerate(range(0, len(steps), wide)):
+        part = steps[start : start + wide]
+        high, low = (HEIGHT * (1 - value / most) for value in (max(part), min(part)))
+        lines.append(f"M{x} {low + 0.5:.1f}V{high:.1f}")
+    title = escape(f"{metrics.name}: instructions of {len(steps)} steps, {counts}")
+    return (
+        f"<h2>{title}</h2>"
+        f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" height="{HEIGHT}">'
+        f'<path d="{"".join(lines)}" stroke="#2a6fb0" fill="none"/></svg>\n'
+    )
