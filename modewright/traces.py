@@ -6,10 +6,12 @@ import csv
 import dataclasses
 import io
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from codegen.source import c_files
 from expectation.expected import Test
+from expectation.key_trace import KeyTraces, keys_traced
 from expectation.trace import Trace, traced
 from language.document import Document, Scalar, read_text
 from language.instance import with_instances
@@ -49,6 +51,37 @@ def trace(
         if each.kind == "automaton"
     }
     return traced(made, code, zip(tests, verdicts, strict=True), requirements(listed))
+
+
+@dataclass(frozen=True)
+class TracedKeys:
+    """Which keys show in which lines of C; `specs` and `code` are the texts by file."""
+
+    found: KeyTraces
+    specs: dict[str, str]
+    code: dict[str, str]
+
+
+def trace_keys(specs: Sequence[str], root: Path | None = None) -> TracedKeys:
+    """Return which lines of C come from which keys of specs: of automata, and all in systems.
+
+    Raises SpecError.
+    """
+    project = Project(root or Path())
+    documents = _documents(specs, project)
+    named = {read_document(project.path_of(spec)).name for spec in specs}
+    made = [_whole(document, project) for document in documents]
+    systems = {document.name for document in made if document.kind == "system"}
+    code = {
+        document.name: c_files(program_of(automaton_of(document, project)))
+        for document, each in zip(documents, made, strict=True)
+        if each.kind == "automaton" and (document.name in named or named & systems)
+    }
+    found = keys_traced(made, code)
+    files = dict.fromkeys(key.place.source.name for key in found.keys)
+    every = {name: text for files in code.values() for name, text in files.items()}
+    shown = {name: text for name, text in every.items() if not name.startswith("ha_math")}
+    return TracedKeys(found, {name: read_text(Path(name))[1] for name in files}, shown)
 
 
 def requirements(path: Path | None) -> dict[str, str]:

@@ -28,6 +28,9 @@ def trace(
     strict: Annotated[
         bool, typer.Option("--strict", help="leave with 1 if a requirement is not traced")
     ] = False,
+    keys: Annotated[
+        bool, typer.Option("--keys", help="trace each key of the specs to lines of C instead")
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Trace requirements (`req:`) through specs, the lines of their C, and tests.
@@ -35,6 +38,7 @@ def trace(
     \b
     modewright trace ev_driveline
     modewright trace estimator --requirements needs.csv --run --out trace.html
+    modewright trace estimator --keys --out keys.html
     """
     from modewright import show_trace, traces
 
@@ -42,6 +46,9 @@ def trace(
     if out and form not in FORMATS:
         raise OutputError(f"{out}: a trace ends with {', '.join(FORMATS)}")
     require_writable(out)
+    if keys:
+        _trace_keys(specs, out, form, as_json)
+        return
     with working("tracing requirements"):
         found = traces.trace(specs, requirements, run=run)
     data = json.dumps(show_trace.trace_json(found), indent=2) + "\n"
@@ -58,3 +65,25 @@ def trace(
         announce([out] if out else [])
     if strict and len(found.of_state("traced")) < len(found.requirements):
         raise typer.Exit(PROBLEMS)
+
+
+def _trace_keys(specs: list[str], out: Path | None, form: str, as_json: bool) -> None:
+    """Trace keys to lines of C: a page with both side by side, or plain data."""
+    from modewright import show_keys, traces
+
+    if form == ".csv":
+        raise OutputError(f"{out}: a trace of keys ends with .html or .json")
+    with working("tracing keys"):
+        traced = traces.trace_keys(specs)
+    data = json.dumps(show_keys.keys_json(traced.found), indent=2) + "\n"
+    if out:
+        title = f"Keys of {', '.join(specs)}"
+        is_page = form == ".html"
+        page = show_keys.keys_html(traced.found, traced.specs, traced.code, title)
+        write_files({out: (page if is_page else data).encode()})
+    if as_json:
+        print(data, end="")
+    else:
+        for line in show_keys.keys_lines(traced.found):
+            console().print(line, soft_wrap=True, highlight=False, markup=False)
+        announce([out] if out else [])
