@@ -7,15 +7,20 @@ Inside a step the solution of x' = A x + pull is a Taylor sum of a fixed number 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
-from language.affine import jacobian
+from language.affine import affine_parts, jacobian
 from language.evaluate import Scalar
 from language.field import Field, at_state, at_time
 from language.linear import Point
-from language.matrix import Matrix, exponential as matrix_exponential, exponential_integral
+from language.matrix import (
+    Matrix,
+    exponential as matrix_exponential,
+    exponential_integral,
+    sum_of_sizes,
+)
 from language.motion import Method
 from language.number import DIGITS, NumberType
 from language.operation import (
@@ -63,16 +68,21 @@ class Solved:
         """Return A (n, n) of a mode: see `jacobian`."""
         return jacobian(self.rates[mode], field.states, self.point.values)
 
-    def largest_norm(self, field: Field, mode: str) -> float:
-        """Return the largest |A h| of a mode within the ranges of the tunables.
+    def steps(self, field: Field, mode: str) -> list[Matrix]:
+        """Return A h of a mode in units of the ranges, also at the ends of those of the tunables.
 
-        It is taken at their ends: an entry that is largest between them is not seen.
+        An entry that is largest between them is not seen.
         """
-        norm = 0.0
-        for constants in (self.point.values, *self.corners):
-            found = scaled_norm(field, jacobian(self.rates[mode], field.states, constants))
-            norm = found if not found <= norm else norm
-        return norm * float(self.h)
+        rates, states, h = self.rates[mode], field.states, float(self.h)
+        known = (self.point.values, *self.corners)
+        return [in_ranges(field, jacobian(rates, states, constants), h) for constants in known]
+
+    def pulled(self, field: Field, mode: str) -> frozenset[str]:
+        """Return the states whose rate is more than its row of A, whatever the calibration."""
+        known = self.point.values.items()
+        fixed = {name: value for name, value in known if name.startswith("constant.")}
+        parts = affine_parts(self.rates[mode], field.states, fixed)
+        return frozenset(n for n in field.states if parts[f"work.rate_{n}"].constant != 0.0)
 
 
 def exponential(field: Field, solved: Solved, span: Span, problems: Problems) -> Method:
@@ -91,8 +101,10 @@ def linear_motion(
     made: dict[str, Block] = {}
     constants: list[Constant] = []
     norms: dict[str, float] = {}
+    steps: dict[str, list[Matrix]] = {}
     for name in field.automaton.modes:
-        norms[name] = solved.largest_norm(field, name)
+        steps[name] = solved.steps(field, name)
+        norms[name] = largest(row_sum_norm(step) for step in steps[name])
         if not norms[name] <= LARGEST_NORM:
             label = f"mode `{name}` is too fast for one step: |A h| = {norms[name]:.3g} is above 4"
             norm = norms[name]
@@ -101,10 +113,10 @@ def linear_motion(
             continue
         constants += _constants(field, name, solved)
         made[f"step_{name}"] = step(field, name, solved)
-    bounded = [norm if norm <= LARGEST_NORM else 0.0 for norm in norms.values()]
-    terms = max(taylor_terms(norm, solved.number) for norm in bounded)
+    bounded = [step for name, norm in norms.items() if norm <= LARGEST_NORM for step in steps[name]]
+    terms = max((taylor_terms(step, solved.number) for step in bounded), default=1)
     for name in field.automaton.modes:
-        made[f"series_{name}"] = _series(field, name, solved.matrix(field, name), terms)
+        made[f"series_{name}"] = _series(field, name, solved, terms)
     variables = [
         Variable(f"work.pull_{name}", "real", f"({state.unit.dimension})/s")
         for name, state in field.automaton.states.items()
@@ -113,28 +125,50 @@ def linear_motion(
     return Method(made, terms, tuple(constants), (*variables, number), norms)
 
 
-def scaled_norm(field: Field, a: Matrix) -> float:
-    """Return the row-sum norm of A [1/s], each state in units of its range's width."""
+def in_ranges(field: Field, a: Matrix, h: float) -> Matrix:
+    """Return A h (n, n), each state in units of its range's width."""
     widths = []
     for state in field.automaton.states.values():
         assert state.range is not None
         widths.append(float(state.range[1] - state.range[0]))
-    largest = 0.0
-    for row, width in zip(a, widths, strict=True):
-        size = 0.0
-        for entry, other in zip(row, widths, strict=True):
-            size += abs(entry) * other / width
-        largest = max(largest, size)
-    return largest
+    return tuple(
+        tuple(entry * other / width * h for entry, other in zip(row, widths, strict=True))
+        for row, width in zip(a, widths, strict=True)
+    )
 
 
-def taylor_terms(norm: float, number: NumberType = "float64") -> int:
-    """Return the smallest K with norm^(K+1)/(K+1)! <= 2^-53, 2^-24 in float32."""
-    terms, size = 0, norm
-    while size > 2.0 ** -DIGITS[number]:
-        terms += 1
-        size = size * norm / (terms + 1)
-    return max(1, terms)
+def row_sum_norm(a: Matrix) -> float:
+    """Return the largest sum of sizes of a row."""
+    return largest(sum_of_sizes(row) for row in a)
+
+
+def largest(values: Iterable[float]) -> float:
+    """Return the largest of sizes; NaN if one is."""
+    found = 0.0
+    for value in values:
+        found = value if not value <= found else found
+    return found
+
+
+def taylor_terms(step: Matrix, number: NumberType = "float64") -> int:
+    """Return the number of terms of a Taylor sum after which none counts, for z = A h (n, n).
+
+    The sum is that of z^k (d0 h) / (k + 1)!, and d0 h is at most |z|. From K on
+    | |z|^K 1 | |z| / (K + 1)! <= 2^-53, 2^-24 in float32: powers of sizes see what the norm does
+    not, that what turns into another quantity is gone, such as speed into angle.
+    """
+    norm, tiny = row_sum_norm(step), 2.0 ** -DIGITS[number]
+    reach = [1.0 for _ in step]
+    terms, bound, order = 1, norm, 1
+    while bound > tiny:
+        if largest(reach) * norm > tiny:
+            terms = order
+        order += 1
+        bound = bound * norm / order
+        reach = [
+            sum_of_sizes(x * y for x, y in zip(row, reach, strict=True)) / order for row in step
+        ]
+    return terms
 
 
 def _table(field: Field, mode: str, solved: Solved) -> dict[str, Matrix]:
@@ -173,15 +207,23 @@ def _row(
     return [
         multiply(Ref(_name(mode, letter, row, column)), values[column])
         for j, column in enumerate(field.states)
-        if matrix[i][j] != 0.0
+        if matrix[i][j] != 0.0 and column in values
     ]
 
 
-def _pull(field: Field, mode: str, a: Matrix) -> list[Op]:
+def _pulls(field: Field, mode: str, solved: Solved) -> dict[str, Expr]:
+    pulled = solved.pulled(field, mode)
+    return {name: Ref(f"work.pull_{name}") for name in field.states if name in pulled}
+
+
+def _pull(field: Field, mode: str, solved: Solved) -> list[Op]:
     """pull = rate - A x at the point: what is not linear."""
-    at = {name: Ref(f"work.at_{name}") for name in field.states}
+    a, pulled = solved.matrix(field, mode), solved.pulled(field, mode)
+    at: dict[str, Expr] = {name: Ref(f"work.at_{name}") for name in field.states}
     ops: list[Op] = []
     for i, name in enumerate(field.states):
+        if name not in pulled:
+            continue
         linear = _row(field, mode, "A", a, i, at)
         rate = Ref(f"work.rate_{name}")
         value: Expr = subtract(rate, total(linear)) if linear else rate
@@ -191,7 +233,7 @@ def _pull(field: Field, mode: str, a: Matrix) -> list[Op]:
 
 def opening(field: Field, mode: str, solved: Solved) -> Block:
     """Return the operations that find what is not linear, at the start of the step."""
-    pull = _pull(field, mode, solved.matrix(field, mode))
+    pull = _pull(field, mode, solved)
     start = (*at_state(field), *at_time(field, real(0.0)))
     return (*start, Run(f"rates_{mode}"), *pull)
 
@@ -214,7 +256,7 @@ def _moved(field: Field, mode: str, letters: tuple[str, str, str], solved: Solve
     target, e, f = letters
     table = _table(field, mode, solved)
     state: dict[str, Expr] = {name: Ref(f"state.{name}") for name in field.states}
-    pull: dict[str, Expr] = {name: Ref(f"work.pull_{name}") for name in field.states}
+    pull = _pulls(field, mode, solved)
     ops = []
     for i, name in enumerate(field.states):
         parts = _row(field, mode, e, table[e], i, state)
@@ -232,18 +274,20 @@ def _step(field: Field, mode: str, solved: Solved) -> Block:
         Branch(_is_whole(solved), moved, (Run(f"series_{mode}"), middle, Run("point"))),
         *at_time(field, half),
         Run(f"rates_{mode}"),
-        *_pull(field, mode, solved.matrix(field, mode)),
+        *_pull(field, mode, solved),
         *closing(field, mode, solved),
     )
 
 
-def _series(field: Field, mode: str, a: Matrix, terms: int) -> Block:
+def _series(field: Field, mode: str, solved: Solved, terms: int) -> Block:
     """d0 = A x0 + pull, d_i = A d_(i-1) / (i + 1)."""
+    a, pull = solved.matrix(field, mode), _pulls(field, mode, solved)
     state: dict[str, Expr] = {name: Ref(f"state.{name}") for name in field.states}
     order, index = Ref("work.order"), Ref("work.term")
     ops: list[Op] = [Assign("work.order", real(1.0))]
     for i, name in enumerate(field.states):
-        value = total([*_row(field, mode, "A", a, i, state), Ref(f"work.pull_{name}")])
+        pulled = [pull[name]] if name in pull else []
+        value = total([*_row(field, mode, "A", a, i, state), *pulled])
         ops.append(Store(f"work.series_{name}", whole(0), value))
     before: dict[str, Expr] = {name: Item(f"work.series_{name}", index) for name in field.states}
     body: list[Op] = [Assign("work.order", add(order, real(1.0)))]

@@ -73,7 +73,7 @@ def chart_variables(charting: Charting) -> list[Variable]:
         found += [Variable(flag(node).name, "truth") for flag in (leaves_flag, enters_flag)]
     found += [Variable(name, "whole") for name in (STEPS.name, TURN)]
     found += [Variable(BUSY.name, "truth")]
-    size = charting.chart.micro_steps * (len(charting.chart.regions) + 1)
+    size = _log_size(charting)
     about = "transitions of this tick, 0 after those of a micro-step"
     found.append(Variable(LOG, "whole", size=size, about=about))
     found.append(Variable(LOGGED, "whole", about="how many entries of log"))
@@ -134,7 +134,11 @@ def _step(charting: Charting) -> Block:
     """One turn: a micro-step, or the next event, or the end."""
     fired = _any(charting, _chosen(charting))
     over: Block = (FaultBit(MICRO_STEP_LIMIT), Assign(BUSY.name, Value(False)))
-    done: list[Op] = [Run("commit"), *_noted(whole(0)), Assign(STEPS.name, add(STEPS, whole(1)))]
+    done: list[Op] = [
+        Run("commit"),
+        _noted(charting, whole(0)),
+        Assign(STEPS.name, add(STEPS, whole(1))),
+    ]
     if charting.size:
         done.append(Assign(EVENT.name, whole(0)))
     reached = Compare("==", STEPS, whole(charting.chart.micro_steps))
@@ -199,15 +203,22 @@ def _left(charting: Charting) -> Block:
             continue
         log: Block = (Assign(fired_variable(region.region), chosen),)
         if charting.several:
-            log = (*log, *_noted(chosen))
+            log = (*log, _noted(charting, chosen))
         ops.append(Branch(Compare("!=", chosen, whole(0)), log))
         if cases:
             ops.append(Choose(chosen.name, tuple(cases)))
     return tuple(ops)
 
 
-def _noted(entry: Expr) -> Block:
-    return (Store(LOG, Ref(LOGGED), entry), Assign(LOGGED, add(Ref(LOGGED), whole(1))))
+def _log_size(charting: Charting) -> int:
+    """Return how many entries a tick has at most: one of each region in a step, and its end."""
+    return charting.chart.micro_steps * (len(charting.chart.regions) + 1)
+
+
+def _noted(charting: Charting, entry: Expr) -> Op:
+    """Write an entry. There is always room; the test says so to tools that follow ranges."""
+    written = (Store(LOG, Ref(LOGGED), entry), Assign(LOGGED, add(Ref(LOGGED), whole(1))))
+    return Branch(Compare("<", Ref(LOGGED), whole(_log_size(charting))), written)
 
 
 def _stage(charting: Charting, flagged: list[tuple[Ref, Mapping[str, Formula]]]) -> Block:
