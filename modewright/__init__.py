@@ -19,6 +19,14 @@ if TYPE_CHECKING:
     from language.problem import Problem, SpecError, render_all
     from lockstep.compare import Verdict
     from modewright.api import Loaded, Replayed, check, generate, load, lockstep, replay, simulate
+    from modewright.calibrations import (
+        CalibrationPage,
+        ImportedPage,
+        ResolvedPage,
+        export_calibration,
+        import_calibration,
+        resolve_calibration,
+    )
     from modewright.diagnoses import diagnose, fit, save_diagnosis
     from modewright.diagram import Diagram, graph
     from modewright.recordings import CheckedRecordings, check_recordings
@@ -28,15 +36,18 @@ if TYPE_CHECKING:
     from modewright.traces import trace
 
 __all__ = [
+    "CalibrationPage",
     "CheckedRecordings",
     "Diagram",
     "Dossier",
     "Event",
     "Fit",
+    "ImportedPage",
     "Loaded",
     "Picture",
     "Problem",
     "Replayed",
+    "ResolvedPage",
     "RunDifference",
     "SpecError",
     "Trajectory",
@@ -45,9 +56,11 @@ __all__ = [
     "check_recordings",
     "compare",
     "diagnose",
+    "export_calibration",
     "fit",
     "generate",
     "graph",
+    "import_calibration",
     "load",
     "lockstep",
     "plot",
@@ -55,6 +68,7 @@ __all__ = [
     "read",
     "render_all",
     "replay",
+    "resolve_calibration",
     "run_tests",
     "save",
     "save_diagnosis",
@@ -66,6 +80,12 @@ __all__ = [
 ]
 
 PLACES = {
+    "CalibrationPage": "modewright.calibrations",
+    "ImportedPage": "modewright.calibrations",
+    "ResolvedPage": "modewright.calibrations",
+    "export_calibration": "modewright.calibrations",
+    "import_calibration": "modewright.calibrations",
+    "resolve_calibration": "modewright.calibrations",
     "CheckedRecordings": "modewright.recordings",
     "Diagram": "modewright.diagram",
     "Dossier": "diagnosis.dossier",
