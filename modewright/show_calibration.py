@@ -164,7 +164,10 @@ def _print_remarks(screen: Console, remarks: Sequence[Remark]) -> None:
 
 def _print_warnings(screen: Console, problems: Sequence[Problem]) -> None:
     if problems:
-        screen.print(render_all(problems), highlight=False, markup=False, soft_wrap=True)
+        text = render_all(problems[:MOST_SHOWN])
+        screen.print(text, highlight=False, markup=False, soft_wrap=True)
+    if len(problems) > MOST_SHOWN:
+        screen.print(f"... and {len(problems) - MOST_SHOWN} more", highlight=False)
 
 
 def _of_all(changes: Sequence[Change], page: CalibrationPage) -> str:

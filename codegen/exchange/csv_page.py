@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -151,6 +152,8 @@ def _characteristic(rows: Sequence[Row], problems: Problems) -> Characteristic:
 
 def _is_grid(rows: Sequence[Row], axes: Sequence[Axis]) -> bool:
     """Tell whether the points of the rows are those of a table, the last axis fastest."""
+    if math.prod(len(axis.points) for axis in axes) != len(rows):
+        return False
     grid: list[tuple[str, ...]] = [()]
     for axis in axes:
         grid = [(*before, point.text) for before in grid for point in axis.points]

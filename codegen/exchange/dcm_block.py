@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -54,10 +55,7 @@ def characteristic_of(block: Block, problems: Problems) -> Characteristic | None
     kind = block.head.text
     if kind == SHARED:
         values = block.points_x
-    count = 1
-    for size in sizes:
-        count *= size
-    is_whole = _has(values, count, "values", block, problems)
+    is_whole = _has(values, math.prod(sizes), "values", block, problems)
     axes = []
     if kind in LINES or kind in MAPS:
         is_whole &= _has(block.points_x, sizes[0], "points `ST/X`", block, problems)

@@ -8,10 +8,16 @@ DISPLAYNAME, VAR ...) is passed over, and so are points that several maps share
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, field
 
-from codegen.exchange.characteristic import Cell, Characteristic, PageFile, stop_if_many
+from codegen.exchange.characteristic import (
+    MAX_PROBLEMS,
+    Cell,
+    Characteristic,
+    PageFile,
+    stop_if_many,
+)
 from codegen.exchange.dcm_block import SHARED, SIZES, Block, characteristic_of, is_count
 from language.problem import Problems, Source, Span, nearest
 
@@ -21,6 +27,7 @@ SECTIONS = ("FUNKTIONEN", "VARIANTENKODIERUNG")
 """Sections that end with END and hold no values."""
 HEADS = ("KONSERVIERUNG_FORMAT", "MODULKOPF", *SECTIONS, *SIZES)
 VERSIONS = ("1.0", "2.0")
+VALUE_WORDS = ("ST/X", "ST/Y", "WERT", "TEXT", "EINHEIT_X", "EINHEIT_Y", "EINHEIT_W")
 PASSED_OVER = ("LANGNAME", "DISPLAYNAME", "FUNKTION", "VAR")
 """Words of a block that say nothing about its values."""
 
@@ -30,8 +37,11 @@ Lines = Iterator[Words]
 
 @dataclass(frozen=True)
 class _Reading:
+    """`passed` are the unknown words that were told of: each once, and not more than a few."""
+
     source: Source
     problems: Problems
+    passed: set[str] = field(default_factory=set)
 
 
 def read_dcm(source: Source, problems: Problems) -> PageFile:
@@ -46,7 +56,7 @@ def read_dcm(source: Source, problems: Problems) -> PageFile:
         if head in SECTIONS:
             _pass_over(words[0], lines, problems)
         elif head in SIZES:
-            block = _block(words, lines, problems)
+            block = _block(words, lines, reading)
             one = characteristic_of(block, problems) if block else None
             if one and head != SHARED:
                 found.append(one)
@@ -92,9 +102,10 @@ def _pass_over(head: Cell, lines: Lines, problems: Problems) -> None:
         problems.error("form", head.span, f"`{head.text}` has no `END`")
 
 
-def _block(words: Words, lines: Lines, problems: Problems) -> Block | None:
+def _block(words: Words, lines: Lines, reading: _Reading) -> Block | None:
     """Return a block up to its END; None where its head is no name with its sizes."""
     head, *rest = words
+    problems = reading.problems
     block = Block(head, rest[0] if rest else head, _sizes(head, rest[1:], problems))
     if not rest:
         problems.error("form", head.span, f"`{head.text}` is followed by a name")
@@ -103,7 +114,7 @@ def _block(words: Words, lines: Lines, problems: Problems) -> Block | None:
             return block if rest and block.sizes is not None else None
         if line[0].text in SIZES:
             break
-        _keep(block, line, problems)
+        _keep(block, line, reading)
         stop_if_many(problems)
     problems.error("form", head.span, f"`{head.text} {block.name.text}` has no `END`")
     problems.stop_if_any()
@@ -130,26 +141,43 @@ def _unquoted(cell: Cell) -> Cell:
     return Cell(cell.text.strip('"'), cell.span)
 
 
-def _keep(block: Block, words: Words, problems: Problems) -> None:
+def _keep(block: Block, words: Words, reading: _Reading) -> None:
     """Take a line of a block."""
     word, *rest = words
     cells = [_unquoted(cell) for cell in rest]
-    takers: dict[str, Callable[[list[Cell]], None]] = {
-        "ST/X": block.points_x.extend,
-        "ST_TX/X": block.points_x.extend,
-        "ST/Y": block.points_y.extend,
-        "ST_TX/Y": block.points_y.extend,
-        "WERT": block.numbers.extend,
-        "TEXT": block.texts.extend,
-    }
-    if word.text in takers:
+    kept = _list_of(block, word.text)
+    if kept is not None:
         if not cells:
-            problems.error("missing", word.span, f"behind `{word.text}` there is no value")
-        takers[word.text](cells)
+            label = f"behind `{word.text}` there is no value"
+            reading.problems.error("missing", word.span, label)
+        kept.extend(cells)
     elif word.text.startswith("EINHEIT_") and len(cells) > 0:
         block.units[word.text.removeprefix("EINHEIT_")] = cells[0]
     elif word.text == "LANGNAME" and cells:
         block.about.append(cells[0].text)
     elif word.text not in PASSED_OVER and not word.text.startswith("EINHEIT_"):
-        label = f"`{word.text}` is not known in `{block.head.text}`: it is passed over"
-        problems.warning("unknown-key", word.span, label, nearest(word.text, takers))
+        _pass_word(word, block, reading)
+
+
+def _list_of(block: Block, word: str) -> list[Cell] | None:
+    """Return where the values behind a word are kept; None for a word that has none."""
+    match word:
+        case "ST/X" | "ST_TX/X":
+            return block.points_x
+        case "ST/Y" | "ST_TX/Y":
+            return block.points_y
+        case "WERT":
+            return block.numbers
+        case "TEXT":
+            return block.texts
+        case _:
+            return None
+
+
+def _pass_word(word: Cell, block: Block, reading: _Reading) -> None:
+    """Warn of a word that is not known; the first few are told, each where it stands first."""
+    if word.text in reading.passed or len(reading.passed) >= MAX_PROBLEMS:
+        return
+    reading.passed.add(word.text)
+    label = f"`{word.text}` is not known in `{block.head.text}`: it is passed over"
+    reading.problems.warning("unknown-key", word.span, label, nearest(word.text, VALUE_WORDS))

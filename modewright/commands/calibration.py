@@ -16,7 +16,6 @@ from modewright.console import announce, console, working
 from modewright.exits import EXIT_CODES
 from modewright.files import OutputError, require_writable, write_files
 
-FORMATS = ("dcm", "cdfx", "csv")
 Automaton = Annotated[str, typer.Argument(help="an automaton: name or file")]
 PageOut = Annotated[Path, typer.Option("--out", "-o", help="write the page: .dcm, .cdfx or .csv")]
 Format = Annotated[
@@ -151,13 +150,15 @@ def _told_as_json(as_json: bool) -> Iterator[None]:
 
 
 def _require_format(form: str | None) -> None:
+    from codegen.exchange.formats import FORMATS
+
     if form is not None and form not in FORMATS:
         raise typer.BadParameter(f"{form}: one of {', '.join(FORMATS)}", param_hint="--format")
 
 
 def _written_format(out: Path, form: str | None) -> str:
     """Return the format that a page is written in. Raises OutputError before any work is done."""
-    from codegen.exchange.formats import format_name
+    from codegen.exchange.formats import FORMATS, format_name
 
     _require_format(form)
     require_writable(out)
