@@ -19,6 +19,14 @@ if TYPE_CHECKING:
     from language.problem import Problem, SpecError, render_all
     from lockstep.compare import Verdict
     from modewright.api import Loaded, Replayed, check, load, lockstep, replay, simulate
+    from modewright.calibrations import (
+        CalibrationPage,
+        ImportedPage,
+        ResolvedPage,
+        export_calibration,
+        import_calibration,
+        resolve_calibration,
+    )
     from modewright.code import a2l, generate, metrics, prove
     from modewright.diagnoses import diagnose, fit, save_diagnosis
     from modewright.diagram import Diagram, graph
@@ -29,15 +37,18 @@ if TYPE_CHECKING:
     from modewright.traces import trace
 
 __all__ = [
+    "CalibrationPage",
     "CheckedRecordings",
     "Diagram",
     "Dossier",
     "Event",
     "Fit",
+    "ImportedPage",
     "Loaded",
     "Picture",
     "Problem",
     "Replayed",
+    "ResolvedPage",
     "RunDifference",
     "SpecError",
     "Trajectory",
@@ -47,9 +58,11 @@ __all__ = [
     "check_recordings",
     "compare",
     "diagnose",
+    "export_calibration",
     "fit",
     "generate",
     "graph",
+    "import_calibration",
     "load",
     "lockstep",
     "metrics",
@@ -58,6 +71,7 @@ __all__ = [
     "read",
     "render_all",
     "replay",
+    "resolve_calibration",
     "run_tests",
     "save",
     "save_diagnosis",
@@ -69,6 +83,12 @@ __all__ = [
 ]
 
 PLACES = {
+    "CalibrationPage": "modewright.calibrations",
+    "ImportedPage": "modewright.calibrations",
+    "ResolvedPage": "modewright.calibrations",
+    "export_calibration": "modewright.calibrations",
+    "import_calibration": "modewright.calibrations",
+    "resolve_calibration": "modewright.calibrations",
     "CheckedRecordings": "modewright.recordings",
     "Diagram": "modewright.diagram",
     "Dossier": "diagnosis.dossier",

@@ -14,6 +14,7 @@ import typer
 
 from language.inside import ALLOW_OUTSIDE
 from modewright.commands.a2l import a2l
+from modewright.commands.calibration import calibration
 from modewright.commands.check import check
 from modewright.commands.compare import compare
 from modewright.commands.demo import demo
@@ -61,6 +62,7 @@ app = typer.Typer(
 for command in COMMANDS:
     app.command(epilog=EXIT_CODES)(command)
 app.add_typer(recording, name="recording")
+app.add_typer(calibration, name="calibration")
 
 
 @app.callback(epilog=EXIT_CODES)

@@ -73,6 +73,7 @@ def test_every_command_in_the_readme_exists() -> None:
         "docs/guide.md",
         "docs/recordings.md",
         "docs/c_code.md",
+        "docs/calibration.md",
         "docs/studies.md",
         "docs/benchmark.md",
         "docs/diagnosis.md",
@@ -155,3 +156,21 @@ def test_the_program_on_the_page_on_c_compiles_and_runs(tmp_path: Path) -> None:
     sources = [tmp_path / name for name in files if name.endswith(".c")]
     compile_program(sources, tmp_path / "run")
     assert subprocess.run([tmp_path / "run"], timeout=60, check=False).returncode == 0
+
+
+def test_the_commands_and_the_page_on_calibration_are_as_it_says(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    page = (ROOT / "docs" / "calibration.md").read_text()
+    for block in re.findall(r"```sh\n(.*?)```", page, re.DOTALL):
+        for line in block.splitlines():
+            command = partial(app, shlex.split(line)[1:], standalone_mode=False)
+            assert exit_code(command) == 0, line
+    (told,) = re.findall(r"```\n(\d+ of \d+ solved.*?)```", page, re.DOTALL)
+    assert told in capsys.readouterr().out
+    written = Path("page.dcm").read_text()
+    assert written == Path("resolved.dcm").read_text()
+    shown = re.findall(r"^FESTWERT .*?^END$", page, re.DOTALL | re.MULTILINE)
+    assert len(shown) == 2 and all(text in written for text in shown)
+    assert written.count("FESTWERT ") == int(re.findall(r"writes (\d+) numbers", page)[0])

@@ -9,10 +9,10 @@ from typing import Annotated
 import typer
 
 from modewright.commands.diagnose import Map, Train, tell
-from modewright.commands.options import Json, usage_errors
+from modewright.commands.options import Json, calibration_title, usage_errors
 from modewright.console import announce, console
 from modewright.exits import PROBLEMS
-from modewright.files import OutputError, require_calibration, write_files
+from modewright.files import write_files
 
 Anyway = Annotated[bool, typer.Option("--anyway", help="fit to recordings with errors too")]
 
@@ -43,7 +43,7 @@ def fit(
     from modewright import show, show_diagnosis
     from modewright.diagnoses import UnusableRecordings, fit as fitted
 
-    title = _checked_title(out, name, date)
+    title = calibration_title(out, name, date)
     chosen = names_of(parameters) if parameters is not None else None
     try:
         with usage_errors():
@@ -58,23 +58,6 @@ def fit(
     else:
         show_diagnosis.print_fit(console(), found)
         announce([out] if out else [])
-
-
-def _checked_title(out: Path | None, name: str | None, date: str) -> str:
-    """Return the name of the calibration, which can be written as it is asked for."""
-    from language.calibration import DATE
-    from language.names import NAME
-
-    if out:
-        if out.suffix != ".yaml":
-            raise OutputError(f"{out}: a calibration ends with .yaml")
-        require_calibration(out)
-    title = name or (out.stem if out else "fitted")
-    if not NAME.fullmatch(title):
-        raise typer.BadParameter(f"`{title}` is not a name", param_hint="--name")
-    if date and not DATE.fullmatch(date):
-        raise typer.BadParameter("a date is written as `2026-11-21`", param_hint="--date")
-    return title
 
 
 def names_of(text: str) -> list[str]:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from modewright.exits import PROBLEMS
-from modewright.files import OutputError
+from modewright.files import OutputError, require_calibration
 
 if TYPE_CHECKING:
     from engine.trajectory import Trajectory
@@ -76,6 +76,23 @@ def usage_errors() -> Iterator[None]:
         yield
     except ValueError as error:
         raise typer.BadParameter(str(error)) from None
+
+
+def calibration_title(out: Path | None, name: str | None, date: str) -> str:
+    """Return the name of the calibration, which can be written as it is asked for."""
+    from language.calibration import DATE
+    from language.names import NAME
+
+    if out:
+        if out.suffix != ".yaml":
+            raise OutputError(f"{out}: a calibration ends with .yaml")
+        require_calibration(out)
+    title = name or (out.stem if out else "fitted")
+    if not NAME.fullmatch(title):
+        raise typer.BadParameter(f"`{title}` is not a name", param_hint="--name")
+    if date and not DATE.fullmatch(date):
+        raise typer.BadParameter("a date is written as `2026-11-21`", param_hint="--date")
+    return title
 
 
 def require_run(path: Path | None) -> None:

@@ -1,0 +1,161 @@
+"""CSV page: one line for each number - `name,value,unit`, and in tables `x,x_unit,y,y_unit`."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from codegen.exchange.characteristic import (
+    Axis,
+    Cell,
+    Characteristic,
+    PageFile,
+    stop_if_many,
+)
+from language.problem import Problems, Source, Span, nearest
+
+COLUMNS = ("name", "value", "unit", "x", "x_unit", "y", "y_unit")
+NEEDED = ("name", "value")
+SEPARATORS = ",;\t"
+
+Row = Mapping[str, Cell]
+
+
+@dataclass(frozen=True)
+class _Reading:
+    source: Source
+    problems: Problems
+
+
+def csv_text(title: str, heading: Sequence[str], page: Sequence[Characteristic]) -> str:
+    """Return a page as CSV; `title` and `heading` have no place in it."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    for one in page:
+        writer.writerows(_rows(one))
+    return text.getvalue()
+
+
+def _rows(one: Characteristic) -> Iterator[tuple[str, ...]]:
+    unit = one.unit.text if one.unit else ""
+    points: list[tuple[str, ...]] = [()]
+    for axis in one.axes:
+        beside = axis.unit.text if axis.unit else ""
+        points = [(*before, point.text, beside) for before in points for point in axis.points]
+    for cell, at in zip(one.values, points, strict=True):
+        row = (one.name.text, cell.text, unit, *at)
+        yield row + ("",) * (len(COLUMNS) - len(row))
+
+
+def read_csv(source: Source, text: str, problems: Problems) -> PageFile:
+    """Read a page in CSV; problems are reported, at last with SpecError."""
+    reading = _Reading(source, problems)
+    groups: dict[str, list[Row]] = {}
+    last = ""
+    for row in _read_rows(reading, text):
+        name = row["name"]
+        if name.text in groups and name.text != last:
+            label = f"`{name.text}` stands here twice"
+            place = groups[name.text][0]["name"].span
+            problems.error("duplicate", name.span, label, f"first at {place}")
+            stop_if_many(problems)
+        groups.setdefault(name.text, []).append(row)
+        last = name.text
+    problems.stop_if_any()
+    found = [_characteristic(rows, problems) for rows in groups.values()]
+    problems.stop_if_any()
+    return PageFile(source, tuple(found))
+
+
+def _read_rows(reading: _Reading, text: str) -> Iterator[Row]:
+    """Yield the cells of each line by their column."""
+    first = reading.source.lines[0]
+    separator = max(SEPARATORS, key=first.count)
+    lines = csv.reader(io.StringIO(text, newline=""), delimiter=separator, strict=True)
+    columns: list[str] = []
+    try:
+        for cells in lines:
+            span = Span(reading.source, lines.line_num, 1)
+            if not columns:
+                columns = [cell.strip().lower() for cell in cells]
+                _require_columns(columns, span, reading.problems)
+            elif any(cell.strip() for cell in cells):
+                yield from _row(columns, cells, span, reading.problems)
+    except csv.Error as error:
+        span = Span(reading.source, max(1, lines.line_num), 1)
+        reading.problems.error("form", span, f"this is not CSV: {error}")
+    stop_if_many(reading.problems)
+
+
+def _require_columns(columns: Sequence[str], span: Span, problems: Problems) -> None:
+    for column in NEEDED:
+        if column not in columns:
+            problems.error("column", span, f"the first line has no column `{column}`")
+    for number, column in enumerate(columns):
+        if column not in COLUMNS:
+            hint = nearest(column, COLUMNS) or f"known: {', '.join(COLUMNS)}"
+            problems.error("column", span, f"`{column}` is not a column of a page", hint)
+        elif column in columns[:number]:
+            problems.error("column", span, f"the column `{column}` stands here twice")
+    problems.stop_if_any()
+
+
+def _row(
+    columns: Sequence[str], cells: Sequence[str], span: Span, problems: Problems
+) -> Iterator[Row]:
+    """Yield the one row of a line, or none with the problem reported."""
+    texts = [cell.strip() for cell in cells]
+    if len(texts) != len(columns):
+        label = f"this line has {len(texts)} cells, the first one has {len(columns)}"
+        problems.error("row", span, label)
+    elif not texts[columns.index("name")]:
+        problems.error("missing", span, "this line has no name")
+    else:
+        at = span.source.lines[span.line - 1] if span.line <= len(span.source.lines) else ""
+        yield {
+            column: Cell(text, _inside(span, at, text))
+            for column, text in zip(columns, texts, strict=True)
+        }
+    stop_if_many(problems)
+
+
+def _inside(span: Span, line: str, text: str) -> Span:
+    """Return where a cell stands in its line, as near as can be told."""
+    start = max(line.find(text), 0) if text else 0
+    return span.inside(start, len(text))
+
+
+def _characteristic(rows: Sequence[Row], problems: Problems) -> Characteristic:
+    """Return the rows of one name as a characteristic; their points are a grid."""
+    first = rows[0]
+    axes: list[Axis] = []
+    for letter in "xy":
+        if letter in first and first[letter].text:
+            points = {row[letter].text: row[letter] for row in rows}
+            unit = first.get(f"{letter}_unit")
+            axes.append(Axis(tuple(points.values()), unit if unit and unit.text else None))
+    if not axes and len(rows) > 1:
+        label = f"`{first['name'].text}` stands here twice"
+        place = f"first at {first['name'].span}"
+        problems.error("duplicate", rows[1]["name"].span, label, place)
+    elif axes and not _is_grid(rows, axes):
+        label = f"the lines of `{first['name'].text}` are no whole table over x and y"
+        problems.error("table", rows[-1]["name"].span, label)
+    unit = first.get("unit")
+    values = tuple(row["value"] for row in rows)
+    return Characteristic(first["name"], values, unit if unit and unit.text else None, tuple(axes))
+
+
+def _is_grid(rows: Sequence[Row], axes: Sequence[Axis]) -> bool:
+    """Tell whether the points of the rows are those of a table, the last axis fastest."""
+    if math.prod(len(axis.points) for axis in axes) != len(rows):
+        return False
+    grid: list[tuple[str, ...]] = [()]
+    for axis in axes:
+        grid = [(*before, point.text) for before in grid for point in axis.points]
+    given = [tuple(row[letter].text for letter in "xy"[: len(axes)]) for row in rows]
+    return given == grid

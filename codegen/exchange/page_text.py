@@ -1,0 +1,67 @@
+"""Page text: the bytes of a file of calibration data, and the text that they are."""
+
+from __future__ import annotations
+
+import re
+import stat
+from pathlib import Path
+
+from language.problem import Problems, Source, Span, SpecError
+
+MAX_BYTES = 8 * 1024 * 1024
+"""Largest file read: the page of a large automaton has some 100 kB."""
+LINE_END = re.compile(r"\r\n|\r|\n")
+NO_TEXT = re.compile(r"[\x00-\x08\x0b\x0e-\x1f]")
+"""Characters that no text has: tabs, ends of lines and of pages are none of them."""
+UTF16 = (b"\xff\xfe", b"\xfe\xff")
+
+
+def page_bytes(path: Path, shown: str) -> bytes:
+    """Return what a file holds. Raises SpecError for what is no file, is empty or too large."""
+    place = Span(Source(shown), 1, 1)
+    problems = Problems()
+    data = b""
+    try:
+        status = path.stat()
+        if not stat.S_ISREG(status.st_mode):
+            label = "the file cannot be read: it is a folder, a pipe or a device"
+            problems.error("unreadable", place, label)
+        elif status.st_size > MAX_BYTES:
+            label = f"the file has {status.st_size} bytes; a page has at most {MAX_BYTES}"
+            problems.error("huge", place, label)
+        else:
+            data = path.read_bytes()
+            if not data.strip():
+                problems.error("empty", place, "the file is empty")
+    except OSError as error:
+        problems.error("unreadable", place, f"the file cannot be read: {error.strerror}")
+    except ValueError:
+        problems.error("unreadable", place, "this is not the name of a file")
+    problems.stop_if_any()
+    return data
+
+
+def page_text(data: bytes, shown: str, other: str | None = None) -> tuple[Source, str]:
+    """Return the text of a file in UTF-8, or else in the encoding `other`. Raises SpecError."""
+    problems = Problems()
+    if data.startswith(UTF16):
+        place = Span(Source(shown), 1, 1)
+        problems.error("binary", place, "this is UTF-16", "save it as UTF-8")
+        problems.stop_if_any()
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        if other is None:
+            line = data.count(b"\n", 0, error.start) + 1
+            place = Span(Source(shown), line, 1)
+            problems.error("binary", place, "this is not UTF-8 text", "save it as UTF-8")
+            raise SpecError(problems.found) from None
+        text = data.decode(other)
+    odd = NO_TEXT.search(text)
+    if odd:
+        line = len(LINE_END.findall(text, 0, odd.start())) + 1
+        place = Span(Source(shown), line, 1)
+        label = f"this is no text: it holds the character {ord(odd[0])}"
+        problems.error("binary", place, label)
+        problems.stop_if_any()
+    return Source(shown, tuple(LINE_END.split(text))), text

@@ -1,0 +1,94 @@
+"""Written: a value in SI as the shortest text of the language that has the same bits."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from decimal import Context, Decimal
+from fractions import Fraction
+
+from language.declaration import Parameter, Range
+from language.number import NumberType, rounded
+from language.quantity import MAX_EXPONENT
+from language.units import Unit
+
+MOST_DIGITS = 60
+"""Most digits that are tried; a unit with an offset may need many near its zero."""
+PLAIN = range(-5, 16)
+"""Decimal exponents of values that are written without one."""
+
+
+def value_in_unit(parameter: Parameter, value: float, number: NumberType) -> str:
+    """Return a value [SI] of a number type as a literal in the unit of a parameter.
+
+    Where no literal in that unit is near enough it is in SI. Read again it is the same value.
+    """
+    if parameter.type == "bool":
+        return "true" if value else "false"
+    if parameter.type == "enum":
+        return parameter.values[int(value)]
+    if parameter.type == "int":
+        return str(int(value))
+    found, unit = _nearest(parameter, value, number)
+    return _literal(found) if unit.text == "1" else f"{_literal(found)} {unit.text}"
+
+
+def is_written(parameter: Parameter, number: NumberType) -> bool:
+    """Tell whether the exact value of a real is that of the literal which it would be written as.
+
+    Another one has more digits than its type: `0.06000000001` in float32.
+    """
+    assert parameter.value is not None
+    found, unit = _nearest(parameter, rounded(parameter.value, number), number)
+    return Fraction(found) * unit.factor + unit.offset == parameter.value
+
+
+def calibration_text(name: str, of: str, origin: str, date: str, values: Mapping[str, str]) -> str:
+    """Return a calibration file; `values` are literals by parameter, empty texts are left out."""
+    lines = ["language: 1", f"calibration: {name}", f"of: {of}"]
+    lines += [f"from: {json.dumps(origin, ensure_ascii=False)}"] if origin else []
+    lines += [f"date: {date}"] if date else []
+    lines += ["parameters:"] if values else ["parameters: {}"]
+    lines += [f"  {parameter}: {text}" for parameter, text in values.items()]
+    return "\n".join(lines) + "\n"
+
+
+def _nearest(parameter: Parameter, value: float, number: NumberType) -> tuple[Decimal, Unit]:
+    """Return the shortest decimal of a value, and the unit that it is in."""
+    own, limits = parameter.unit, parameter.range
+    for unit in (own, Unit(str(own.dimension), Fraction(1), own.dimension)):
+        found = _shortest(value, unit, number, limits)
+        if found is not None:
+            return found, unit
+    raise ValueError(f"{value!r} of `{parameter.name}` has no literal in {own.text}")
+
+
+def _shortest(value: float, unit: Unit, number: NumberType, limits: Range | None) -> Decimal | None:
+    """Return the decimal with fewest digits that is the value again, inside of the limits."""
+    wanted = Fraction(value)
+    if limits:
+        wanted = min(max(wanted, limits[0]), limits[1])
+    exact = (wanted - unit.offset) / unit.factor
+    for digits in range(1, MOST_DIGITS):
+        found = _to_digits(exact, digits)
+        again = Fraction(found) * unit.factor + unit.offset
+        is_inside = limits is None or limits[0] <= again <= limits[1]
+        if is_inside and rounded(again, number) == value:
+            return found if abs(found.adjusted()) < MAX_EXPONENT else None
+    return None
+
+
+def _to_digits(exact: Fraction, digits: int) -> Decimal:
+    """Return a number rounded to so many significant digits."""
+    context = Context(prec=digits)
+    return context.divide(Decimal(exact.numerator), Decimal(exact.denominator)).normalize(context)
+
+
+def _literal(number: Decimal) -> str:
+    """Return a decimal as the language writes it: `0.05`, `1.0e-7`."""
+    exponent = number.adjusted() if number else 0
+    if exponent in PLAIN:
+        return f"{number:f}"
+    sign, figures, _ = number.as_tuple()
+    first, *rest = map(str, figures)
+    return f"{'-' if sign else ''}{first}.{''.join(rest) or '0'}e{exponent}"

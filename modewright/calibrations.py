@@ -1,0 +1,200 @@
+"""Calibrations: pages of automata written for, and read from, calibration tools."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from codegen.exchange.characteristic import PageFile
+from codegen.exchange.formats import FORMATS, read_page
+from codegen.exchange.page import page_constants, page_name, page_of
+from codegen.exchange.taking import Remark, Taken, taken
+from language.document import Document, Scalar
+from language.load import automaton_of, command_line_value, program_of
+from language.model import Automaton
+from language.problem import Problem, Problems, Source, Span
+from language.program import Constant, Program
+from language.project import Project, read_document, with_calibrations
+from language.written import calibration_text, is_written, value_in_unit
+
+Values = Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class CalibrationPage:
+    """The page of an automaton, its solved numbers solved for the values that it holds."""
+
+    automaton: Automaton = field(repr=False)
+    program: Program = field(repr=False)
+
+    @property
+    def tunable(self) -> tuple[Constant, ...]:
+        """The tunable parameters in the order of the page."""
+        return tuple(c for c in page_constants(self.program) if c.kind == "tunable")
+
+    @property
+    def solved(self) -> tuple[Constant, ...]:
+        """The solved numbers in the order of the page."""
+        return tuple(c for c in page_constants(self.program) if c.kind == "solved")
+
+    def text(self, form: str) -> str:
+        """Return the page as a file: `dcm`, `cdfx` or `csv`."""
+        name, number = self.program.name, self.program.number
+        heading = (f"calibration page of {name}, {number}, SI units", "written by modewright")
+        return FORMATS[form].write(name, heading, page_of(self.automaton, self.program))
+
+
+@dataclass(frozen=True)
+class Change:
+    """A solved number that is another one now; `relative` is |change| over the larger size."""
+
+    name: str
+    before: float
+    after: float
+
+    @property
+    def relative(self) -> float:
+        """How large the change is."""
+        size = max(abs(self.after), abs(self.before))
+        return abs(self.after / size - self.before / size)
+
+
+@dataclass(frozen=True)
+class ImportedPage:
+    """What a file of calibration data says of an automaton.
+
+    `values` are literals of the language by parameter; `stale` are solved numbers of the file that
+    were solved for other values; `warnings` are about the file.
+    """
+
+    page: CalibrationPage
+    values: Mapping[str, str]
+    remarks: tuple[Remark, ...]
+    stale: tuple[Change, ...]
+    warnings: tuple[Problem, ...]
+
+    def calibration(self, name: str, origin: str = "", date: str = "") -> str:
+        """Return the calibration file of the language with these values."""
+        return calibration_text(name, self.page.program.name, origin, date, self.values)
+
+
+@dataclass(frozen=True)
+class ResolvedPage:
+    """A page that was solved anew, the solved numbers that changed, and those that were absent."""
+
+    page: CalibrationPage
+    changes: tuple[Change, ...]
+    added: tuple[str, ...]
+    remarks: tuple[Remark, ...] = ()
+    warnings: tuple[Problem, ...] = ()
+
+
+def export_calibration(
+    reference: str,
+    values: Values | None = None,
+    root: Path | None = None,
+    calibrations: Sequence[str] = (),
+) -> CalibrationPage:
+    """Return the calibration page of an automaton. Raises SpecError."""
+    project = Project(root or Path())
+    return _page(_document(reference, project, calibrations), project, _scalars(values))
+
+
+def import_calibration(
+    file: Path, of: str, root: Path | None = None, form: str | None = None
+) -> ImportedPage:
+    """Return what a file of calibration data says of an automaton. Raises SpecError."""
+    project = Project(root or Path())
+    return _imported(file, form, _document(of, project, ()), project, {})
+
+
+def resolve_calibration(
+    reference: str,
+    page: Path | None = None,
+    values: Values | None = None,
+    root: Path | None = None,
+    calibrations: Sequence[str] = (),
+    form: str | None = None,
+) -> ResolvedPage:
+    """Return the page of an automaton solved anew, for the values of a file or a calibration.
+
+    Changes are those since the file, without one since the spec as it stands. Raises SpecError.
+    """
+    project = Project(root or Path())
+    document, scalars = _document(reference, project, calibrations), _scalars(values)
+    if page:
+        found = _imported(page, form, document, project, scalars)
+        absent = [remark.name for remark in found.remarks if remark.kind == "missing"]
+        solved = {page_name(found.page.program, c) for c in found.page.solved}
+        added = tuple(name for name in absent if name in solved)
+        kept = tuple(remark for remark in found.remarks if remark.name not in added)
+        return ResolvedPage(found.page, found.stale, added, kept, found.warnings)
+    before = _page(_document(reference, project, ()), project, {})
+    after = _page(document, project, scalars)
+    known = {constant.name: constant.value for constant in before.solved}
+    added = tuple(page_name(after.program, c) for c in after.solved if c.name not in known)
+    return ResolvedPage(after, _changes(known, after), added)
+
+
+def _imported(
+    file: Path,
+    form: str | None,
+    document: Document,
+    project: Project,
+    scalars: Mapping[str, Scalar],
+) -> ImportedPage:
+    problems = Problems()
+    read: PageFile = read_page(file, problems, form)
+    automaton = automaton_of(document, project, scalars)
+    found: Taken = taken(read, automaton, program_of(automaton), problems)
+    page = _page(document, project, {**scalars, **found.values})
+    values = {name: scalar.text for name, scalar in found.values.items()}
+    return ImportedPage(
+        page, values, found.remarks, _changes(found.solved, page), tuple(problems.found)
+    )
+
+
+def _changes(before: Mapping[str, float], page: CalibrationPage) -> tuple[Change, ...]:
+    """Return the solved numbers that are others than they were."""
+    return tuple(
+        Change(page_name(page.program, constant), before[constant.name], constant.value)
+        for constant in page.solved
+        if constant.name in before and constant.value != before[constant.name]
+    )
+
+
+def _page(document: Document, project: Project, scalars: Mapping[str, Scalar]) -> CalibrationPage:
+    """Return a page; a value with more digits than its type is taken as the page will hold it.
+
+    What is solved for a value then fits what a tool reads of it, to the last bit.
+    """
+    automaton = automaton_of(document, project, scalars)
+    program = program_of(automaton)
+    solved_for = {name for c in page_constants(program) for name in c.depends_on}
+    finer = {
+        name: _held(automaton, program, name)
+        for name in sorted(solved_for)
+        if automaton.parameters[name].type == "real"
+        and not is_written(automaton.parameters[name], program.number)
+    }
+    if finer:
+        automaton = automaton_of(document, project, {**scalars, **finer})
+        program = program_of(automaton)
+    return CalibrationPage(automaton, program)
+
+
+def _held(automaton: Automaton, program: Program, name: str) -> Scalar:
+    """Return the value of a parameter as a page holds it."""
+    value = next(c.value for c in program.constants if c.name == f"calibration.{name}")
+    text = value_in_unit(automaton.parameters[name], value, program.number)
+    return Scalar(text, Span(Source(f"page of {program.name}", (text,)), 1, 1, len(text)))
+
+
+def _document(reference: str, project: Project, calibrations: Sequence[str]) -> Document:
+    document = read_document(project.path_of(reference))
+    return with_calibrations(document, calibrations, "--calibration")
+
+
+def _scalars(values: Values | None) -> dict[str, Scalar]:
+    return {name: command_line_value(text, name=name) for name, text in (values or {}).items()}
