@@ -46,6 +46,7 @@ __all__ = [
     "compare",
     "diagnose",
     "fit",
+    "fmu",
     "generate",
     "graph",
     "load",
