@@ -27,7 +27,7 @@ if TYPE_CHECKING:
         import_calibration,
         resolve_calibration,
     )
-    from modewright.code import a2l, generate, metrics, prove
+    from modewright.code import a2l, fmu, generate, metrics, prove
     from modewright.diagnoses import diagnose, fit, save_diagnosis
     from modewright.diagram import Diagram, graph
     from modewright.recordings import CheckedRecordings, check_recordings
@@ -60,6 +60,7 @@ __all__ = [
     "diagnose",
     "export_calibration",
     "fit",
+    "fmu",
     "generate",
     "graph",
     "import_calibration",
@@ -101,6 +102,7 @@ PLACES = {
     "Trajectory": "engine.trajectory",
     "Verdict": "lockstep.compare",
     "a2l": "modewright.code",
+    "fmu": "modewright.code",
     "generate": "modewright.code",
     "metrics": "modewright.code",
     "prove": "modewright.code",

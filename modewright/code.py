@@ -7,6 +7,9 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from codegen.asam import a2l as asam
+from codegen.cmake import cmake_file
+from codegen.fmi.archive import fmu as fmu_of
+from codegen.fmi.variable import Version
 from codegen.instructions import Instructions, instructions as counted
 from codegen.metrics import Metrics, metrics as measured
 from codegen.proofs.all import CHECKS, proofs
@@ -32,6 +35,33 @@ def generate(
 ) -> dict[str, str]:
     """Return the C files of an automaton by name. Raises SpecError."""
     return c_files(_generated(reference, values, root, calibrations))
+
+
+def cmake(
+    reference: str,
+    values: Values | None = None,
+    root: Path | None = None,
+    calibrations: Sequence[str] = (),
+) -> dict[str, str]:
+    """Return the file by which CMake builds the C of an automaton, by name. Raises SpecError."""
+    return cmake_file(_generated(reference, values, root, calibrations))
+
+
+def fmu(
+    reference: str,
+    version: Version = 3,
+    values: Values | None = None,
+    root: Path | None = None,
+    calibrations: Sequence[str] = (),
+    *,
+    is_source_only: bool = False,
+) -> bytes:
+    """Return an automaton as a co-simulation FMU, version 2 or 3, with a binary of this machine.
+
+    `is_source_only` leaves the binary out. Raises SpecError; ValueError for another version and
+    for an automaton that has no C; ToolMissing, BuildError where there is a binary to make.
+    """
+    return fmu_of(_generated(reference, values, root, calibrations), version, is_source_only)
 
 
 def a2l(

@@ -85,6 +85,8 @@ def test_the_wheel_holds_specs_templates_and_the_skeleton_but_no_tests(wheel: Pa
     for name in (
         "spec/ev_driveline/plant.yaml",
         "codegen/templates/module.c.jinja",
+        "codegen/templates/fmi/fmi_3.c.jinja",
+        "codegen/fmi/headers/fmi3Functions.h",
         "language/expression.lark",
         "modewright/skeleton_files/room.yaml",
         "diagnosis/drifts/drift_of_balance.yaml",

@@ -25,11 +25,15 @@ def generate(
     only_check: Annotated[
         bool, typer.Option("--check", help="with --all: write nothing, fail where stale")
     ] = False,
+    with_cmake: Annotated[
+        bool, typer.Option("--cmake", help="a CMakeLists.txt beside it, with the flags it needs")
+    ] = False,
 ) -> None:
     """Print an automaton, sampled or continuous, as C99.
 
     \b
     modewright generate estimator --out build
+    modewright generate estimator --out build --cmake
     modewright generate --all --check
     """
     from modewright import code
@@ -37,11 +41,15 @@ def generate(
 
     if every == (automaton is not None):
         raise typer.BadParameter("name an automaton or use --all", param_hint="AUTOMATON")
+    if every and with_cmake:
+        raise typer.BadParameter("goes with an automaton, not with --all", param_hint="--cmake")
     if only_check:
         _stop_where_stale()
         return
     if automaton is not None:
         made = code.generate(automaton, values_of(sets), calibrations=calibrations or ())
+        if with_cmake:
+            made |= code.cmake(automaton, values_of(sets), calibrations=calibrations or ())
         files = {out / name: text.encode() for name, text in made.items()}
     else:
         files = generated_files(Path())

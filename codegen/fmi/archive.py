@@ -1,0 +1,44 @@
+"""Archive: an FMU as the bytes of a zip file, the same bytes whenever it is made."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from collections.abc import Mapping
+
+from codegen.fmi.binary import binary, binary_file
+from codegen.fmi.content import fmu_files, headers
+from codegen.fmi.variable import Version
+from language.program import Program
+
+FIRST_DAY = (1980, 1, 1, 0, 0, 0)
+"""The earliest time that a zip file can tell: no file in it has another."""
+PLAIN, RUNNABLE = 0o644, 0o755
+UNIX = 3
+"""Who made an entry, for the permissions that it has."""
+
+
+def fmu(program: Program, version: Version, is_source_only: bool = False) -> bytes:
+    """Return an FMU of a Program, with a binary for this machine or with sources alone.
+
+    Raises ValueError as `fmu_files` does; ToolMissing, BuildError where there is a binary to make.
+    """
+    files = fmu_files(program, version)
+    if not is_source_only:
+        where = binary_file(program.name, version)
+        sources = {path: data for path, data in files.items() if path.endswith((".c", ".h"))}
+        files[where] = binary(sources, headers(version))
+    return _zipped(files)
+
+
+def _zipped(files: Mapping[str, bytes]) -> bytes:
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        for path in sorted(files):
+            entry = zipfile.ZipInfo(path, FIRST_DAY)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.create_system = UNIX
+            mode = RUNNABLE if path.startswith("binaries/") else PLAIN
+            entry.external_attr = mode << 16
+            archive.writestr(entry, files[path])
+    return buffer.getvalue()

@@ -1,0 +1,46 @@
+"""Unit: units of a Program as FMI defines them, by exponents of the base units."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from language.symbols import BASE_SYMBOLS
+from language.units import UnitError, parse_unit, shown_unit
+
+SECOND = "s"
+BASE_ORDER = ("kg", "m", "s", "A", "K", "rad")
+"""Order in which exponents are written."""
+
+
+@dataclass(frozen=True)
+class UnitDefinition:
+    """A unit by its name, and the exponents of its base units that are not 0. All are SI."""
+
+    name: str
+    exponents: tuple[tuple[str, int], ...]
+
+
+def unit_name(text: str) -> str:
+    """Return the name of a unit of a Program; an empty text for a number, and for what is none."""
+    return shown_unit(text) if text and _is_unit(text) else ""
+
+
+def unit_definitions(texts: Iterable[str]) -> tuple[UnitDefinition, ...]:
+    """Return the definitions of units of a Program, each once, in order of their names."""
+    named = {unit_name(text): text for text in texts if unit_name(text)}
+    return tuple(UnitDefinition(name, _exponents(named[name])) for name in sorted(named))
+
+
+def _is_unit(text: str) -> bool:
+    try:
+        return not parse_unit(text).dimension.is_number
+    except UnitError:
+        return False
+
+
+def _exponents(text: str) -> tuple[tuple[str, int], ...]:
+    dimension = parse_unit(text).dimension
+    powers = dict(zip(BASE_SYMBOLS, dimension.powers, strict=True))
+    powers["rad"] = dimension.angle or 0
+    return tuple((base, powers[base]) for base in BASE_ORDER if powers[base])

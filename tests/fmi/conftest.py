@@ -1,0 +1,53 @@
+"""FMUs of shipped automata, each packed once, and tapes of what the engine did."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from fractions import Fraction
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from codegen.fmi.archive import fmu
+from codegen.fmi.variable import VERSIONS, Version
+from lockstep.compare import Tape
+from modewright.api import program
+from tests.fmi.importer import Unpacked, unpacked
+from tests.target.closed_loop import driveline, supervisor
+
+Ready = Callable[[str, Version], Unpacked]
+
+
+@pytest.fixture(params=VERSIONS, ids=lambda version: f"fmi{version}")
+def version(request: pytest.FixtureRequest) -> Version:
+    """Each version of FMI."""
+    found: Version = request.param
+    return found
+
+
+@pytest.fixture(scope="session")
+def ready(tapes: dict[str, Tape], tmp_path_factory: pytest.TempPathFactory) -> Ready:
+    """Return the FMU of an automaton, compiled and unpacked; of a tape's Program if it has one."""
+    folder = tmp_path_factory.mktemp("fmi")
+
+    @cache
+    def made(name: str, version: Version) -> Unpacked:
+        place: Path = folder / f"{name}_{version}"
+        used = tapes[name].program if name in tapes else program(name)
+        return unpacked(fmu(used, version), place, version)
+
+    return made
+
+
+@pytest.fixture(scope="session")
+def tapes() -> dict[str, Tape]:
+    """What the engine read and carried: the driveline and its estimators, the supervisor."""
+    found = driveline("float64", Fraction(21, 10), ["plant", "est"])
+    single = driveline("float32", Fraction(1), ["est"])
+    return {
+        "estimator": found["est"],
+        "driveline": found["plant"],
+        "estimator_float32": single["est"],
+        "supervisor": supervisor("float32", Fraction(21))["sup"],
+    }
