@@ -16,6 +16,8 @@ from language.program import Program
 from language.substitution import with_expressions
 
 LATCH = "latch"
+WITHIN = "within"
+"""A function of C alone."""
 APART = "latch_apart"
 """What takes the inputs one by one."""
 
@@ -23,8 +25,8 @@ APART = "latch_apart"
 def gated(program: Program, by_amount: bool = True) -> Program:
     """Return a Program that takes its inputs at once where all are within their ranges.
 
-    `by_amount` compares |x| where a range has two equal ends; tools that follow ranges through code
-    know x better without it.
+    `by_amount` compares the size of x with one end of a range, which takes one branch; tools that
+    follow ranges through code know x better without it.
     """
     largest = LARGEST[program.number]
     words = frozenset(variable.name for variable in program.variables if variable.values)
@@ -44,12 +46,17 @@ def gated(program: Program, by_amount: bool = True) -> Program:
 
 
 def centred(expr: Expr) -> Expr:
-    """Return `-a <= x <= a` as one comparison, |x| <= a; with a NaN both are false."""
+    """Return `low <= x <= high` as one comparison where 0 is between; with a NaN both are false.
+
+    |x| <= high where the ends are equal, else `within`, which compares bits.
+    """
     match expr:
         case Binary(
             "and", Compare(">=", value, Value(float(low))), Compare("<=", same, Value(float(high)))
-        ) if value == same and low == -high <= 0:
-            return Compare("<=", Call("abs", (value,)), Value(high))
+        ) if value == same and low <= 0 <= high:
+            if low == -high:
+                return Compare("<=", Call("abs", (value,)), Value(high))
+            return Call(WITHIN, (value, Value(low), Value(high)))
     return expr
 
 

@@ -38,7 +38,7 @@ from language.traversal import reads, walk
 from language.wiring import finished
 
 ENTRIES = ("init", "derive", "step")
-INLINE = ("min", "max", "clip", "sign", "pow2", "whole", "lookup", "lookup2")
+INLINE = ("min", "max", "clip", "sign", "pow2", "whole", "within", "lookup", "lookup2")
 
 
 def c_files(program: Program, by_amount: bool = True) -> dict[str, str]:

@@ -15,7 +15,7 @@ the step: a parabola through its values at the ends and the middle, the times of
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 
 from language.action import discrete_variables
 from language.constants import parameter_constants, values_of
@@ -118,7 +118,7 @@ def continuous_program(
     waits = waits_of(transitions, alarms)
     blocks = {
         **flows,
-        **_motion(field, method),
+        **_motion(field, method, flows),
         **stepping_blocks(field, waits, (AGE.name,) if histories else ()),
         **_in_modes(field, known, transitions, _selection(automaton, transitions, waits)),
         **invariant_block(automaton, known),
@@ -171,12 +171,12 @@ def _field(
     )
 
 
-def _motion(field: Field, method: Method) -> dict[str, Block]:
+def _motion(field: Field, method: Method, flows: Mapping[str, Block]) -> dict[str, Block]:
     """The flow of each mode up to the first change of a guard, by the method's steps."""
     armed = {slot: f"memory.armed_{slot}" for slot in field.slots}
     halvings = FLOW_HALVINGS[field.automaton.numbers]
     merge, is_wait = Ref("work.merge"), Ref("work.is_wait")
-    moves = motion_blocks(field, method, merge, halvings, lambda mode: armed, is_wait)
+    moves = motion_blocks(field, method, flows, merge, halvings, lambda mode: armed, is_wait)
     return {**method.blocks, **moves}
 
 

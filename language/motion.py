@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 
 from language.field import Field, any_guard, at_time
+from language.look import look_block, point_block
 from language.model import Mode
 from language.number import DIGITS, NumberType
 from language.operation import (
@@ -22,7 +23,6 @@ from language.operation import (
     Branch,
     Call,
     Expr,
-    Item,
     Loop,
     Op,
     Ref,
@@ -33,7 +33,6 @@ from language.operation import (
     multiply,
     real,
     subtract,
-    whole,
 )
 from language.program import Constant, Variable
 from language.region import slots
@@ -45,8 +44,6 @@ RUN_HALVINGS = 24
 FLOW_HALVINGS: Mapping[NumberType, int] = {"float64": 44, "float32": 24}
 """Halvings of a continuous automaton's step: 1 ms / 2^44 is below one ULP of a time of 1 s. In
 float32 the times within a step have 24 bits: from then on the middle is one of the two ends."""
-MOST_WRITTEN_OUT = 4
-"""Terms of a polynomial that is written out; a longer one is a loop."""
 
 Armed = Mapping[str, str]
 
@@ -75,18 +72,21 @@ def merge_time(number: NumberType, step: Fraction, time: Fraction = Fraction(0))
 def motion_blocks(
     field: Field,
     method: Method,
+    flows: Mapping[str, Block],
     merge: Expr,
     halvings: int,
     armed: Callable[[Mode], Armed | None],
     is_wait: Expr | None = None,
 ) -> dict[str, Block]:
-    """Return `point`, and `locate_<mode>` and `move_<mode>` of every mode.
+    """Return `point`, and `look_<mode>`, `locate_<mode>` and `move_<mode>` of every mode.
 
-    What crosses within `merge` [s] is one instant; `armed` gives a mode's guards as they were;
-    `is_wait` is whether a wait ends with the step: what crosses just after it is at that instant.
+    `flows` are the blocks of the field. What crosses within `merge` [s] is one instant; `armed`
+    gives a mode's guards as they were; `is_wait` is whether a wait ends with the step: what
+    crosses just after it is at that instant.
     """
-    blocks = {"point": _point(field, method.terms)}
+    blocks = {"point": point_block(field.states, method.terms)}
     for mode in field.automaton.modes.values():
+        blocks[f"look_{mode.name}"] = look_block(field, mode, method.terms, flows)
         crossed = any_guard(field, mode, armed(mode))
         blocks[f"locate_{mode.name}"] = _locate(field, mode, crossed, halvings, merge)
         blocks[f"move_{mode.name}"] = _move(field, mode, crossed, merge, is_wait)
@@ -103,6 +103,7 @@ def motion_variables(field: Field, method: Method) -> list[Variable]:
         Variable("work.low", "real", "s"),
         Variable("work.high", "real", "s"),
         Variable("work.halving", "whole"),
+        Variable("work.is_inside", "truth", about="a crossing lies inside the step"),
         Variable("work.term", "whole"),
         *(Variable(f"work.first_{k}", "truth") for k in field.slots),
     ]
@@ -114,56 +115,38 @@ def motion_variables(field: Field, method: Method) -> list[Variable]:
     return [*found, *method.variables]
 
 
-def _point(field: Field, terms: int) -> Block:
-    """The polynomial x(s) = x0 + s (d0 + s (d1 + ...)) at `work.s`, by Horner's rule."""
-    s = Ref("work.s")
-    if terms <= MOST_WRITTEN_OUT:
-        return tuple(_written_out(name, terms) for name in field.states)
-    first: list[Op] = [Assign(f"work.sum_{name}", real(0.0)) for name in field.states]
-    index = subtract(whole(terms - 1), Ref("work.term"))
-    body: list[Op] = []
-    last: list[Op] = []
-    for name in field.states:
-        total = Ref(f"work.sum_{name}")
-        value = add(multiply(total, s), Item(f"work.series_{name}", index))
-        body.append(Assign(f"work.sum_{name}", value))
-        last.append(Assign(f"work.at_{name}", add(Ref(f"state.{name}"), multiply(s, total))))
-    return (*first, Loop(terms, "work.term", tuple(body)), *last)
-
-
-def _written_out(name: str, terms: int) -> Assign:
-    s, series = Ref("work.s"), f"work.series_{name}"
-    total: Expr = Item(series, whole(terms - 1))
-    for term in reversed(range(terms - 1)):
-        total = add(multiply(total, s), Item(series, whole(term)))
-    return Assign(f"work.at_{name}", add(Ref(f"state.{name}"), multiply(s, total)))
-
-
 def _locate(field: Field, mode: Mode, crossed: Expr, halvings: int, merge: Expr) -> Block:
     """Halve (low, high]: a guard has changed at high, none has at low."""
-    low, high = Ref("work.low"), Ref("work.high")
+    low, high, inside = Ref("work.low"), Ref("work.high"), "work.is_inside"
     middle = add(low, multiply(real(0.5), subtract(high, low)))
-    keep = [Assign(f"work.end_{name}", Ref(f"work.at_{name}")) for name in field.states]
     body: Block = (
         *_look(mode, middle),
         Branch(
             crossed,
-            (Assign("work.high", Ref("work.s")), *keep),
+            (Assign("work.high", Ref("work.s")), Assign(inside, Value(True))),
             (Assign("work.low", Ref("work.s")),),
         ),
     )
     return (
         Assign("work.low", real(0.0)),
         Assign("work.high", Ref("work.h")),
+        Assign(inside, Value(False)),
         Loop(halvings, "work.halving", body),
+        Branch(Ref(inside), (Assign("work.s", high), *_kept(field))),
         *_merged(field, mode, merge),
         Assign("work.elapsed", Call("min", (high, Ref("work.h")))),
     )
 
 
 def _look(mode: Mode, s: Expr) -> Block:
-    """Put the point at `s` and read the guards there."""
-    return (Assign("work.s", s), Run("point"), Run(f"guards_{mode.name}"))
+    """Read the guards at `s`."""
+    return (Assign("work.s", s), Run(f"look_{mode.name}"))
+
+
+def _kept(field: Field) -> Block:
+    """Take the point at `work.s` for the end."""
+    keep = [Assign(f"work.end_{name}", Ref(f"work.at_{name}")) for name in field.states]
+    return (Run("point"), *keep)
 
 
 def _merged(field: Field, mode: Mode, merge: Expr) -> Block:
@@ -176,9 +159,8 @@ def _merged(field: Field, mode: Mode, merge: Expr) -> Block:
     for position, k in enumerate(watched):
         turned = Binary("and", Ref(f"work.guard_{k}"), Unary("not", Ref(f"work.first_{k}")))
         another = turned if position == 0 else Binary("or", another, turned)
-    keep = [Assign(f"work.end_{name}", Ref(f"work.at_{name}")) for name in field.states]
     high = Ref("work.high")
-    accepted: Block = (Assign("work.high", Ref("work.s")), *keep)
+    accepted: Block = (Assign("work.high", Ref("work.s")), *_kept(field))
     return (
         *_look(mode, high),
         *first,
@@ -205,7 +187,6 @@ def _move(field: Field, mode: Mode, crossed: Expr, merge: Expr, is_wait: Expr | 
 
 def _just_after(field: Field, mode: Mode, crossed: Expr, merge: Expr, is_wait: Expr) -> Block:
     """A guard that changes within `merge` after the end of a wait changes at that instant."""
-    keep = [Assign(f"work.end_{name}", Ref(f"work.at_{name}")) for name in field.states]
     look = (Run(f"series_{mode.name}"), *_look(mode, add(Ref("work.h"), merge)))
-    change = Branch(crossed, (Assign("work.crossed", Value(True)), *keep))
+    change = Branch(crossed, (Assign("work.crossed", Value(True)), *_kept(field)))
     return (Branch(is_wait, (*look, change)),)

@@ -93,7 +93,7 @@ def run_motion(
     made = {
         **blocks,
         **method.blocks,
-        **motion_blocks(field, method, merge, RUN_HALVINGS, lambda mode: None),
+        **motion_blocks(field, method, blocks, merge, RUN_HALVINGS, lambda mode: None),
     }
     made.update(_switches(field, problems))
     variables = (

@@ -106,13 +106,13 @@ typedef struct {
 
 static inline void latch_apart(estimator_simple_Self *self, const estimator_simple_In *in)
 {
-    if ((in->y_em >= (-400.0)) && (in->y_em <= 2400.0)) {
+    if (ha_within(in->y_em, -400.0, 2400.0)) {
         self->latched.y_em = in->y_em; /* inputs.y_em */
     } else {
         self->faults |= estimator_simple_FAULT_range_y_em;
         self->latched.y_em = ha_clip(in->y_em, -400.0, 2400.0);
     }
-    if ((in->y_w >= (-50.0)) && (in->y_w <= 300.0)) {
+    if (ha_within(in->y_w, -50.0, 300.0)) {
         self->latched.y_w = in->y_w; /* inputs.y_w */
     } else {
         self->faults |= estimator_simple_FAULT_range_y_w;
@@ -124,7 +124,7 @@ static inline void latch_apart(estimator_simple_Self *self, const estimator_simp
         self->faults |= estimator_simple_FAULT_range_T_em;
         self->latched.T_em = ha_clip(in->T_em, -400.0, 400.0);
     }
-    if ((in->T_br >= 0.0) && (in->T_br <= 3000.0)) {
+    if (ha_within(in->T_br, 0.0, 3000.0)) {
         self->latched.T_br = in->T_br; /* inputs.T_br */
     } else {
         self->faults |= estimator_simple_FAULT_range_T_br;
@@ -173,13 +173,13 @@ static inline void predict_drive(estimator_simple_Self *self,
         self->faults |= estimator_simple_FAULT_range_theta_d;
         self->state.theta_d = ha_clip(predicted_theta_d, -0.5, 0.5);
     }
-    if ((predicted_w_em >= (-400.0)) && (predicted_w_em <= 2400.0)) {
+    if (ha_within(predicted_w_em, -400.0, 2400.0)) {
         self->state.w_em = predicted_w_em;
     } else {
         self->faults |= estimator_simple_FAULT_range_w_em;
         self->state.w_em = ha_clip(predicted_w_em, -400.0, 2400.0);
     }
-    if ((predicted_w_w >= (-50.0)) && (predicted_w_w <= 300.0)) {
+    if (ha_within(predicted_w_w, -50.0, 300.0)) {
         self->state.w_w = predicted_w_w;
     } else {
         self->faults |= estimator_simple_FAULT_range_w_w;
@@ -204,7 +204,7 @@ static inline void correct_drive(estimator_simple_Self *self,
     const double new_w_em =
         self->state.w_em + ((cal->solved.drive_L_w_em_y_em * self->innovation.y_em)
         + (cal->solved.drive_L_w_em_y_w * self->innovation.y_w));
-    if ((new_w_em >= (-400.0)) && (new_w_em <= 2400.0)) {
+    if (ha_within(new_w_em, -400.0, 2400.0)) {
         self->state.w_em = new_w_em;
     } else {
         self->faults |= estimator_simple_FAULT_range_w_em;
@@ -213,7 +213,7 @@ static inline void correct_drive(estimator_simple_Self *self,
     const double new_w_w =
         self->state.w_w + ((cal->solved.drive_L_w_w_y_em * self->innovation.y_em)
         + (cal->solved.drive_L_w_w_y_w * self->innovation.y_w));
-    if ((new_w_w >= (-50.0)) && (new_w_w <= 300.0)) {
+    if (ha_within(new_w_w, -50.0, 300.0)) {
         self->state.w_w = new_w_w;
     } else {
         self->faults |= estimator_simple_FAULT_range_w_w;
@@ -256,13 +256,13 @@ static inline void predict_coast(estimator_simple_Self *self,
         self->faults |= estimator_simple_FAULT_range_theta_d;
         self->state.theta_d = ha_clip(predicted_theta_d, -0.5, 0.5);
     }
-    if ((predicted_w_em >= (-400.0)) && (predicted_w_em <= 2400.0)) {
+    if (ha_within(predicted_w_em, -400.0, 2400.0)) {
         self->state.w_em = predicted_w_em;
     } else {
         self->faults |= estimator_simple_FAULT_range_w_em;
         self->state.w_em = ha_clip(predicted_w_em, -400.0, 2400.0);
     }
-    if ((predicted_w_w >= (-50.0)) && (predicted_w_w <= 300.0)) {
+    if (ha_within(predicted_w_w, -50.0, 300.0)) {
         self->state.w_w = predicted_w_w;
     } else {
         self->faults |= estimator_simple_FAULT_range_w_w;
@@ -287,7 +287,7 @@ static inline void correct_coast(estimator_simple_Self *self,
     const double new_w_em =
         self->state.w_em + ((cal->solved.coast_L_w_em_y_em * self->innovation.y_em)
         + (cal->solved.coast_L_w_em_y_w * self->innovation.y_w));
-    if ((new_w_em >= (-400.0)) && (new_w_em <= 2400.0)) {
+    if (ha_within(new_w_em, -400.0, 2400.0)) {
         self->state.w_em = new_w_em;
     } else {
         self->faults |= estimator_simple_FAULT_range_w_em;
@@ -296,7 +296,7 @@ static inline void correct_coast(estimator_simple_Self *self,
     const double new_w_w =
         self->state.w_w + ((cal->solved.coast_L_w_w_y_em * self->innovation.y_em)
         + (cal->solved.coast_L_w_w_y_w * self->innovation.y_w));
-    if ((new_w_w >= (-50.0)) && (new_w_w <= 300.0)) {
+    if (ha_within(new_w_w, -50.0, 300.0)) {
         self->state.w_w = new_w_w;
     } else {
         self->faults |= estimator_simple_FAULT_range_w_w;
@@ -380,13 +380,13 @@ static inline void jump_gap(estimator_simple_Self *self)
             self->faults |= estimator_simple_FAULT_range_theta_d;
             self->state.theta_d = ha_clip(work->reset_theta_d, -0.5, 0.5);
         }
-        if ((work->reset_w_em >= (-400.0)) && (work->reset_w_em <= 2400.0)) {
+        if (ha_within(work->reset_w_em, -400.0, 2400.0)) {
             self->state.w_em = work->reset_w_em;
         } else {
             self->faults |= estimator_simple_FAULT_range_w_em;
             self->state.w_em = ha_clip(work->reset_w_em, -400.0, 2400.0);
         }
-        if ((work->reset_w_w >= (-50.0)) && (work->reset_w_w <= 300.0)) {
+        if (ha_within(work->reset_w_w, -50.0, 300.0)) {
             self->state.w_w = work->reset_w_w;
         } else {
             self->faults |= estimator_simple_FAULT_range_w_w;
@@ -417,13 +417,13 @@ static inline void jump_gap(estimator_simple_Self *self)
             self->faults |= estimator_simple_FAULT_range_theta_d;
             self->state.theta_d = ha_clip(work->reset_theta_d, -0.5, 0.5);
         }
-        if ((work->reset_w_em >= (-400.0)) && (work->reset_w_em <= 2400.0)) {
+        if (ha_within(work->reset_w_em, -400.0, 2400.0)) {
             self->state.w_em = work->reset_w_em;
         } else {
             self->faults |= estimator_simple_FAULT_range_w_em;
             self->state.w_em = ha_clip(work->reset_w_em, -400.0, 2400.0);
         }
-        if ((work->reset_w_w >= (-50.0)) && (work->reset_w_w <= 300.0)) {
+        if (ha_within(work->reset_w_w, -50.0, 300.0)) {
             self->state.w_w = work->reset_w_w;
         } else {
             self->faults |= estimator_simple_FAULT_range_w_w;
@@ -444,13 +444,13 @@ static inline void update_gap(estimator_simple_Self *self)
     const double next_w_w = self->latched.y_w; /* estimator_simple modes.gap.update.w_w */
     const double next_theta_b = 0.0; /* estimator_simple modes.gap.update.theta_b */
     const double next_theta_d = 0.0; /* estimator_simple modes.gap.update.theta_d */
-    if ((next_w_em >= (-400.0)) && (next_w_em <= 2400.0)) {
+    if (ha_within(next_w_em, -400.0, 2400.0)) {
         self->state.w_em = next_w_em;
     } else {
         self->faults |= estimator_simple_FAULT_range_w_em;
         self->state.w_em = ha_clip(next_w_em, -400.0, 2400.0);
     }
-    if ((next_w_w >= (-50.0)) && (next_w_w <= 300.0)) {
+    if (ha_within(next_w_w, -50.0, 300.0)) {
         self->state.w_w = next_w_w;
     } else {
         self->faults |= estimator_simple_FAULT_range_w_w;
@@ -506,9 +506,9 @@ static inline void compare_stamps(estimator_simple_Self *self,
 
 static inline void latch(estimator_simple_Self *self, const estimator_simple_In *in)
 {
-    if ((in->y_em >= (-400.0)) && (in->y_em <= 2400.0) && (in->y_w >= (-50.0))
-        && (in->y_w <= 300.0) && (fabs(in->T_em) <= 400.0) && (in->T_br >= 0.0)
-        && (in->T_br <= 3000.0) && (fabs(in->T_req) <= 400.0)) {
+    if (ha_within(in->y_em, -400.0, 2400.0) && ha_within(in->y_w, -50.0, 300.0)
+        && (fabs(in->T_em) <= 400.0) && ha_within(in->T_br, 0.0, 3000.0)
+        && (fabs(in->T_req) <= 400.0)) {
         self->latched.y_em = in->y_em; /* inputs.y_em */
         self->latched.y_w = in->y_w; /* inputs.y_w */
         self->latched.T_em = in->T_em; /* inputs.T_em */
@@ -534,13 +534,13 @@ static inline void start(estimator_simple_Self *self, const volatile estimator_s
         self->faults |= estimator_simple_FAULT_range_theta_d;
         self->state.theta_d = ha_clip(constant.alpha, -0.5, 0.5);
     }
-    if ((self->latched.y_em >= (-400.0)) && (self->latched.y_em <= 2400.0)) {
+    if (ha_within(self->latched.y_em, -400.0, 2400.0)) {
         self->state.w_em = self->latched.y_em; /* estimator_simple states.w_em.initial */
     } else {
         self->faults |= estimator_simple_FAULT_range_w_em;
         self->state.w_em = ha_clip(self->latched.y_em, -400.0, 2400.0);
     }
-    if ((self->latched.y_w >= (-50.0)) && (self->latched.y_w <= 300.0)) {
+    if (ha_within(self->latched.y_w, -50.0, 300.0)) {
         self->state.w_w = self->latched.y_w; /* estimator_simple states.w_w.initial */
     } else {
         self->faults |= estimator_simple_FAULT_range_w_w;

@@ -5,7 +5,9 @@
 #ifndef HA_MATH_H
 #define HA_MATH_H
 
+#include <stdbool.h>
 #include <stdint.h>
+#include <string.h>
 
 double ha_sin(double x); /* sine; |x| <= 1e5 rad, clamped; error < 0.85 ULP */
 double ha_cos(double x); /* cosine; |x| <= 1e5 rad, clamped; error < 0.85 ULP */
@@ -38,6 +40,21 @@ static inline double ha_clip(double x, double low, double high)
 static inline double ha_sign(double x)
 {
     return (x > 0.0) ? 1.0 : ((x < 0.0) ? -1.0 : 0.0);
+}
+
+/*
+ * low <= x <= high, where low <= 0 <= high; false for a NaN. Without their sign the bits of numbers
+ * are ordered as their sizes are, so that one comparison of whole numbers is enough for x >= 0.
+ */
+static inline bool ha_within(double x, double low, double high)
+{
+    const uint64_t sign = (uint64_t)1U << 63;
+    uint64_t bits, least, most;
+
+    (void)memcpy(&bits, &x, sizeof bits);
+    (void)memcpy(&least, &low, sizeof least);
+    (void)memcpy(&most, &high, sizeof most);
+    return (bits <= most) || ((bits >= sign) && ((bits & ~sign) <= (least & ~sign)));
 }
 
 /* A whole-valued x as a whole number, the nearest of 32 bits; a NaN is INT32_MIN */

@@ -5,7 +5,9 @@
 #ifndef HA_MATHF_H
 #define HA_MATHF_H
 
+#include <stdbool.h>
 #include <stdint.h>
+#include <string.h>
 
 float ha_sinf(float x); /* sine; |x| <= 1000 rad, clamped; error < 0.85 ULP */
 float ha_cosf(float x); /* cosine; |x| <= 1000 rad, clamped; error < 0.85 ULP */
@@ -38,6 +40,21 @@ static inline float ha_clipf(float x, float low, float high)
 static inline float ha_signf(float x)
 {
     return (x > 0.0F) ? 1.0F : ((x < 0.0F) ? -1.0F : 0.0F);
+}
+
+/*
+ * low <= x <= high, where low <= 0 <= high; false for a NaN. Without their sign the bits of numbers
+ * are ordered as their sizes are, so that one comparison of whole numbers is enough for x >= 0.
+ */
+static inline bool ha_withinf(float x, float low, float high)
+{
+    const uint32_t sign = (uint32_t)1U << 31;
+    uint32_t bits, least, most;
+
+    (void)memcpy(&bits, &x, sizeof bits);
+    (void)memcpy(&least, &low, sizeof least);
+    (void)memcpy(&most, &high, sizeof most);
+    return (bits <= most) || ((bits >= sign) && ((bits & ~sign) <= (least & ~sign)));
 }
 
 /* A whole-valued x as a whole number, the nearest of 32 bits; a NaN is INT32_MIN */

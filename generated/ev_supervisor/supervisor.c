@@ -41,7 +41,7 @@ static inline void latch_apart(supervisor_Self *self, const supervisor_In *in)
     } else {
         self->faults |= supervisor_FAULT_range_key;
     }
-    if ((in->U_dc >= 0.0F) && (in->U_dc <= 500.0F)) {
+    if (ha_withinf(in->U_dc, 0.0F, 500.0F)) {
         self->latched.U_dc = in->U_dc; /* inputs.U_dc */
     } else {
         self->faults |= supervisor_FAULT_range_U_dc;
@@ -51,7 +51,7 @@ static inline void latch_apart(supervisor_Self *self, const supervisor_In *in)
             self->latched.U_dc = 0.0F;
         }
     }
-    if ((in->U_pack >= 0.0F) && (in->U_pack <= 500.0F)) {
+    if (ha_withinf(in->U_pack, 0.0F, 500.0F)) {
         self->latched.U_pack = in->U_pack; /* inputs.U_pack */
     } else {
         self->faults |= supervisor_FAULT_range_U_pack;
@@ -71,7 +71,7 @@ static inline void latch_apart(supervisor_Self *self, const supervisor_In *in)
             self->latched.T_req = 0.0F;
         }
     }
-    if ((in->v >= (-20.0F)) && (in->v <= 80.0F)) {
+    if (ha_withinf(in->v, -20.0F, 80.0F)) {
         self->latched.v = in->v; /* inputs.v */
     } else {
         self->faults |= supervisor_FAULT_range_v;
@@ -302,7 +302,7 @@ static inline void update_operation_drive_derating_cool(supervisor_Work *work)
 static inline void store_operation_drive_derating_cool(supervisor_Self *self,
     const supervisor_Work *work)
 {
-    if ((work->next_share >= 0.0F) && (work->next_share <= 1.0F)) {
+    if (ha_withinf(work->next_share, 0.0F, 1.0F)) {
         self->discrete.share = work->next_share;
     } else {
         self->faults |= supervisor_FAULT_range_share;
@@ -320,7 +320,7 @@ static inline void update_operation_drive_derating_warm(const supervisor_Self *s
 static inline void store_operation_drive_derating_warm(supervisor_Self *self,
     const supervisor_Work *work)
 {
-    if ((work->next_share >= 0.0F) && (work->next_share <= 1.0F)) {
+    if (ha_withinf(work->next_share, 0.0F, 1.0F)) {
         self->discrete.share = work->next_share;
     } else {
         self->faults |= supervisor_FAULT_range_share;
@@ -1655,9 +1655,9 @@ static inline void jump(supervisor_Self *self, const volatile supervisor_Cal *ca
 
 static inline void latch(supervisor_Self *self, const supervisor_In *in)
 {
-    if ((in->key <= supervisor_key_crank) && (in->U_dc >= 0.0F) && (in->U_dc <= 500.0F)
-        && (in->U_pack >= 0.0F) && (in->U_pack <= 500.0F) && (fabsf(in->T_req) <= 400.0F)
-        && (in->v >= (-20.0F)) && (in->v <= 80.0F) && (in->temp >= 233.15F)
+    if ((in->key <= supervisor_key_crank) && ha_withinf(in->U_dc, 0.0F, 500.0F)
+        && ha_withinf(in->U_pack, 0.0F, 500.0F) && (fabsf(in->T_req) <= 400.0F)
+        && ha_withinf(in->v, -20.0F, 80.0F) && (in->temp >= 233.15F)
         && (in->temp <= 473.15F)) {
         self->latched.key = in->key; /* inputs.key */
         self->latched.U_dc = in->U_dc; /* inputs.U_dc */
@@ -1716,7 +1716,7 @@ static inline void start(supervisor_Self *self, supervisor_Work *work)
         self->discrete.T_cmd = ha_clipf(new_T_cmd, -400.0F, 400.0F);
     }
     const float new_share = 1.0F; /* supervisor discrete.share.initial */
-    if ((new_share >= 0.0F) && (new_share <= 1.0F)) {
+    if (ha_withinf(new_share, 0.0F, 1.0F)) {
         self->discrete.share = new_share;
     } else {
         self->faults |= supervisor_FAULT_range_share;

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import pytest
 
-from codegen.gate import APART, LATCH, centred, gated
+from codegen.build import FLAGS, compile_program, run_executable
+from codegen.gate import APART, LATCH, WITHIN, centred, gated
+from codegen.mathematics import math_files
+from codegen.names import REAL
 from codegen.source import c_files
 from language.evaluate import evaluate
+from language.number import NumberType
 from language.operation import Binary, Branch, Call, Compare, Expr, Ref, Run, Value
 from modewright.api import program as shipped
 from tests.language.making import program
@@ -37,9 +42,63 @@ def test_one_comparison_says_what_two_said(x: float) -> None:
         assert evaluate(centred(test), {"x": value}) == evaluate(test, {"x": value})
 
 
-@pytest.mark.parametrize(("low", "high"), [(-2.0, 3.0), (0.0, 2.0), (2.0, 2.0), (2.0, -2.0)])
+@pytest.mark.parametrize(("low", "high"), [(-2.0, 3.0), (0.0, 2.0), (-2.0, 0.0), (-0.0, 2.0)])
+def test_a_range_around_0_is_one_comparison_of_bits(low: float, high: float) -> None:
+    assert centred(between(low, high)) == Call(WITHIN, (X, Value(low), Value(high)))
+
+
+@pytest.mark.parametrize(("low", "high"), [(2.0, 2.0), (2.0, -2.0), (1.0, 3.0), (-3.0, -1.0)])
 def test_other_ranges_stay_two_comparisons(low: float, high: float) -> None:
     assert centred(between(low, high)) == between(low, high)
+
+
+BITS = """\
+#include <stdio.h>
+#include "ha_math{suffix}.h"
+static const {real} ends[][2] = {{
+    {{-400.0, 2400.0}}, {{0.0, 3000.0}}, {{-0.0, 1.0}}, {{-2.5, 0.0}}, {{-1e-37, 3e38}},
+    {{-3e38, 1e-40}}, {{0.0, 0.0}},
+}};
+int main(void)
+{{
+    uint{bits}_t seed = 1U;
+    long differing = 0;
+    for (long turn = 0; turn < 4000000; turn++) {{
+        for (int k = 0; k < 7; k++) {{
+            uint{bits}_t word = seed;
+            {real} x, near = ends[k][turn & 1];
+            if ((turn & 2) != 0) {{
+                (void)memcpy(&word, &near, sizeof word);
+                word += (uint{bits}_t)((turn >> 2) % 9 - 4);
+                word ^= ((turn & 1024) != 0) ? (uint{bits}_t)1U << {top} : 0U;
+            }}
+            (void)memcpy(&x, &word, sizeof x);
+            differing += ha_within{suffix}(x, ends[k][0], ends[k][1])
+                != ((x >= ends[k][0]) && (x <= ends[k][1]));
+        }}
+        seed = seed * {multiplier}U + 12345U;
+    }}
+    printf("%ld", differing);
+    return 0;
+}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("number", "suffix", "bits", "multiplier"),
+    [("float32", "f", 32, 1664525), ("float64", "", 64, 6364136223846793005)],
+)
+def test_bits_say_what_two_comparisons_say(
+    tmp_path: Path, number: NumberType, suffix: str, bits: int, multiplier: int
+) -> None:
+    """Any bits, NaN and infinities among them, and those around the ends."""
+    filled = {"suffix": suffix, "real": REAL[number], "bits": bits, "top": bits - 1}
+    text = BITS.format(**filled, multiplier=multiplier)
+    for name, source in {**math_files(number), "main.c": text}.items():
+        (tmp_path / name).write_text(source)
+    sources = [tmp_path / name for name in ("main.c", f"ha_math{suffix}.c")]
+    compile_program(sources, tmp_path / "main", [*FLAGS, "-w"])
+    assert run_executable(tmp_path / "main", b"") == b"0"
 
 
 def test_inputs_are_taken_at_once_or_each_apart() -> None:

@@ -1,0 +1,121 @@
+"""Look: the point of a polynomial through a step, and the guards there - of what they read alone.
+
+Where a guard is a conjunction, one part of which reads few states, those come first: inside a gap
+the angle says that no side is reached, whatever the speeds are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from functools import reduce
+
+from language.field import Field
+from language.model import Mode
+from language.operation import (
+    Assign,
+    Binary,
+    Block,
+    Branch,
+    Expr,
+    Item,
+    Loop,
+    Op,
+    Ref,
+    Run,
+    Value,
+    add,
+    multiply,
+    real,
+    subtract,
+    whole,
+)
+from language.traversal import block_names, expr_names, walk
+
+MOST_WRITTEN_OUT = 8
+"""Terms of a polynomial that is written out; a longer one is a loop."""
+FIXED = ("constant.", "calibration.", "derived.")
+GUARD, AT = "work.guard_", "work.at_"
+
+
+def point_block(states: Sequence[str], terms: int) -> Block:
+    """The polynomial x(s) = x0 + s (d0 + s (d1 + ...)) at `work.s`, by Horner's rule."""
+    s = Ref("work.s")
+    if terms <= MOST_WRITTEN_OUT:
+        return tuple(_written_out(name, terms) for name in states)
+    first: list[Op] = [Assign(f"work.sum_{name}", real(0.0)) for name in states]
+    index = subtract(whole(terms - 1), Ref("work.term"))
+    body: list[Op] = []
+    last: list[Op] = []
+    for name in states:
+        total = Ref(f"work.sum_{name}")
+        value = add(multiply(total, s), Item(f"work.series_{name}", index))
+        body.append(Assign(f"work.sum_{name}", value))
+        last.append(Assign(f"work.at_{name}", add(Ref(f"state.{name}"), multiply(s, total))))
+    return (*first, Loop(terms, "work.term", tuple(body)), *last)
+
+
+def _written_out(name: str, terms: int) -> Assign:
+    s, series = Ref("work.s"), f"work.series_{name}"
+    total: Expr = Item(series, whole(terms - 1))
+    for term in reversed(range(terms - 1)):
+        total = add(multiply(total, s), Item(series, whole(term)))
+    return Assign(f"work.at_{name}", add(Ref(f"state.{name}"), multiply(s, total)))
+
+
+def look_block(field: Field, mode: Mode, terms: int, flows: Mapping[str, Block]) -> Block:
+    """Return what reads the guards of a mode at `work.s`; `flows` are the blocks of the field."""
+    guards = f"guards_{mode.name}"
+    read = _read(guards, flows)
+    needed = [name for name in field.states if f"{AT}{name}" in read]
+    gate = _gate(field, flows[guards])
+    if gate is not None:
+        first = [name for name in needed if f"{AT}{name}" in set(expr_names(gate))]
+        rest = [name for name in needed if name not in first]
+        if rest:
+            closed = [Assign(op.target, Value(False)) for op in _guards(flows[guards])]
+            opened: Block = (*point_block(rest, terms), Run(guards))
+            return (*point_block(first, terms), Branch(gate, opened, tuple(closed)))
+    is_all = len(needed) == len(field.states)
+    point: Block = (Run("point"),) if is_all else point_block(needed, terms)
+    return (*point, Run(guards))
+
+
+def _read(name: str, flows: Mapping[str, Block]) -> set[str]:
+    """Return all that a block reads or writes, with the blocks that it runs."""
+    found, stack = set[str](), [name]
+    while stack:
+        block = flows[stack.pop()]
+        found |= set(block_names(block))
+        stack += [op.block for op in walk(block) if isinstance(op, Run)]
+    return found
+
+
+def _guards(block: Block) -> Iterator[Assign]:
+    return (op for op in block if isinstance(op, Assign) and op.target.startswith(GUARD))
+
+
+def _gate(field: Field, block: Block) -> Expr | None:
+    """Return what is false only where every guard is, and reads states alone; None if nothing."""
+    states = {f"{AT}{name}" for name in field.states}
+    if not all(isinstance(op, Assign) and op.target.startswith((GUARD, AT)) for op in block):
+        return None
+    gates = []
+    for guard in _guards(block):
+        parts = [part for part in _parts(guard.value) if _is_of(part, states)]
+        if not parts:
+            return None
+        gates.append(min(parts, key=lambda part: len(set(expr_names(part)) & states)))
+    return reduce(lambda one, other: Binary("or", one, other), gates) if gates else None
+
+
+def _parts(guard: Expr) -> list[Expr]:
+    match guard:
+        case Binary("and", left, right):
+            return [*_parts(left), *_parts(right)]
+    return [guard]
+
+
+def _is_of(part: Expr, states: set[str]) -> bool:
+    """Tell whether an expression reads some states and what is fixed, nothing else."""
+    names = set(expr_names(part))
+    return bool(names & states) and all(n in states or n.startswith(FIXED) for n in names)
