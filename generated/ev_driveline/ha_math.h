@@ -49,7 +49,9 @@ static inline double ha_sign(double x)
 static inline bool ha_within(double x, double low, double high)
 {
     const uint64_t sign = (uint64_t)1U << 63;
-    uint64_t bits, least, most;
+    uint64_t bits;
+    uint64_t least;
+    uint64_t most;
 
     (void)memcpy(&bits, &x, sizeof bits);
     (void)memcpy(&least, &low, sizeof least);

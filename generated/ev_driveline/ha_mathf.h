@@ -49,7 +49,9 @@ static inline float ha_signf(float x)
 static inline bool ha_withinf(float x, float low, float high)
 {
     const uint32_t sign = (uint32_t)1U << 31;
-    uint32_t bits, least, most;
+    uint32_t bits;
+    uint32_t least;
+    uint32_t most;
 
     (void)memcpy(&bits, &x, sizeof bits);
     (void)memcpy(&least, &low, sizeof least);
