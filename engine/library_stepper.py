@@ -38,6 +38,7 @@ OWN_MOTION = (
     "step",
     "series_",
     "locate_",
+    "look_",
     "segment",
     "settle",
 )

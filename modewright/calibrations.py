@@ -11,14 +11,13 @@ from codegen.exchange.formats import FORMATS, read_page
 from codegen.exchange.page import page_constants, page_name, page_of
 from codegen.exchange.taking import Remark, Taken, taken
 from language.document import Document, Scalar
-from language.load import automaton_of, command_line_value, program_of
+from language.load import automaton_of, program_of
 from language.model import Automaton
 from language.problem import Problem, Problems, Source, Span
 from language.program import Constant, Program
-from language.project import Project, read_document, with_calibrations
+from language.project import Project
 from language.written import calibration_text, is_written, value_in_unit
-
-Values = Mapping[str, str]
+from modewright.documents import Values, calibrated_document, scalars as as_scalars
 
 
 @dataclass(frozen=True)
@@ -98,7 +97,7 @@ def export_calibration(
 ) -> CalibrationPage:
     """Return the calibration page of an automaton. Raises SpecError."""
     project = Project(root or Path())
-    return _page(_document(reference, project, calibrations), project, _scalars(values))
+    return _page(calibrated_document(reference, project, calibrations), project, as_scalars(values))
 
 
 def import_calibration(
@@ -106,7 +105,7 @@ def import_calibration(
 ) -> ImportedPage:
     """Return what a file of calibration data says of an automaton. Raises SpecError."""
     project = Project(root or Path())
-    return _imported(file, form, _document(of, project, ()), project, {})
+    return _imported(file, form, calibrated_document(of, project, ()), project, {})
 
 
 def resolve_calibration(
@@ -122,7 +121,7 @@ def resolve_calibration(
     Changes are those since the file, without one since the spec as it stands. Raises SpecError.
     """
     project = Project(root or Path())
-    document, scalars = _document(reference, project, calibrations), _scalars(values)
+    document, scalars = calibrated_document(reference, project, calibrations), as_scalars(values)
     if page:
         found = _imported(page, form, document, project, scalars)
         absent = [remark.name for remark in found.remarks if remark.kind == "missing"]
@@ -130,7 +129,7 @@ def resolve_calibration(
         added = tuple(name for name in absent if name in solved)
         kept = tuple(remark for remark in found.remarks if remark.name not in added)
         return ResolvedPage(found.page, found.stale, added, kept, found.warnings)
-    before = _page(_document(reference, project, ()), project, {})
+    before = _page(calibrated_document(reference, project, ()), project, {})
     after = _page(document, project, scalars)
     known = {constant.name: constant.value for constant in before.solved}
     added = tuple(page_name(after.program, c) for c in after.solved if c.name not in known)
@@ -189,12 +188,3 @@ def _held(automaton: Automaton, program: Program, name: str) -> Scalar:
     value = next(c.value for c in program.constants if c.name == f"calibration.{name}")
     text = value_in_unit(automaton.parameters[name], value, program.number)
     return Scalar(text, Span(Source(f"page of {program.name}", (text,)), 1, 1, len(text)))
-
-
-def _document(reference: str, project: Project, calibrations: Sequence[str]) -> Document:
-    document = read_document(project.path_of(reference))
-    return with_calibrations(document, calibrations, "--calibration")
-
-
-def _scalars(values: Values | None) -> dict[str, Scalar]:
-    return {name: command_line_value(text, name=name) for name, text in (values or {}).items()}

@@ -25,16 +25,20 @@ MOST_SHOWN = 12
 def print_page(screen: Console, page: CalibrationPage) -> None:
     """Print the tunable parameters of a page, and how many numbers were solved."""
     for constant in page.tunable:
-        screen.print(_line(page, constant), highlight=False, markup=False)
+        screen.print(_line(page, constant), highlight=False, markup=False, soft_wrap=True)
     solved = counted(len(page.solved), "solved number")
-    screen.print(f"{counted(len(page.tunable), 'tunable parameter')}, {solved}", highlight=False)
+    screen.print(
+        f"{counted(len(page.tunable), 'tunable parameter')}, {solved}",
+        highlight=False,
+        soft_wrap=True,
+    )
 
 
 def print_import(screen: Console, found: ImportedPage) -> None:
     """Print the values that were taken and what is to be known of them."""
     _print_warnings(screen, found.warnings)
     for name, text in found.values.items():
-        screen.print(f"{name} = {text}", highlight=False, markup=False)
+        screen.print(f"{name} = {text}", highlight=False, markup=False, soft_wrap=True)
     _print_remarks(screen, found.remarks)
     if found.stale:
         worst = _worst(found.stale)
@@ -44,7 +48,7 @@ def print_import(screen: Console, found: ImportedPage) -> None:
             "`modewright calibration resolve` solves them anew",
             highlight=False,
         )
-    screen.print(f"{counted(len(found.values), 'value')} taken", highlight=False)
+    screen.print(f"{counted(len(found.values), 'value')} taken", highlight=False, soft_wrap=True)
 
 
 def print_resolved(screen: Console, found: ResolvedPage) -> None:
@@ -53,22 +57,25 @@ def print_resolved(screen: Console, found: ResolvedPage) -> None:
     print_page(screen, found.page)
     _print_remarks(screen, found.remarks)
     if found.added:
-        screen.print(f"{counted(len(found.added), 'solved number')} added", highlight=False)
+        screen.print(
+            f"{counted(len(found.added), 'solved number')} added", highlight=False, soft_wrap=True
+        )
     if not found.changes:
-        screen.print("no solved number changed", highlight=False)
+        screen.print("no solved number changed", highlight=False, soft_wrap=True)
         return
     worst = _worst(found.changes)
     screen.print(
         f"{_of_all(found.changes, found.page)} changed, the farthest {escape(worst.name)} "
         f"by {worst.relative:.2g} of its size",
         highlight=False,
+        soft_wrap=True,
     )
     ranked = sorted(found.changes, key=lambda change: -change.relative)
     for change in ranked[:MOST_SHOWN]:
         line = f"  {change.name}: {change.before:.6g} -> {change.after:.6g}, {change.relative:.2g}"
-        screen.print(line, highlight=False, markup=False)
+        screen.print(line, highlight=False, markup=False, soft_wrap=True)
     if len(ranked) > MOST_SHOWN:
-        screen.print(f"  ... and {len(ranked) - MOST_SHOWN} more", highlight=False)
+        screen.print(f"  ... and {len(ranked) - MOST_SHOWN} more", highlight=False, soft_wrap=True)
 
 
 def page_json(page: CalibrationPage) -> dict[str, Any]:
@@ -159,7 +166,9 @@ def _print_remarks(screen: Console, remarks: Sequence[Remark]) -> None:
             line = f"{where}[yellow]{kind}[/]: {told}"
             screen.print(line, highlight=False, soft_wrap=True)
         if len(mine) > MOST_SHOWN:
-            screen.print(f"... and {len(mine) - MOST_SHOWN} more {kind}", highlight=False)
+            screen.print(
+                f"... and {len(mine) - MOST_SHOWN} more {kind}", highlight=False, soft_wrap=True
+            )
 
 
 def _print_warnings(screen: Console, problems: Sequence[Problem]) -> None:
@@ -167,7 +176,7 @@ def _print_warnings(screen: Console, problems: Sequence[Problem]) -> None:
         text = render_all(problems[:MOST_SHOWN])
         screen.print(text, highlight=False, markup=False, soft_wrap=True)
     if len(problems) > MOST_SHOWN:
-        screen.print(f"... and {len(problems) - MOST_SHOWN} more", highlight=False)
+        screen.print(f"... and {len(problems) - MOST_SHOWN} more", highlight=False, soft_wrap=True)
 
 
 def _of_all(changes: Sequence[Change], page: CalibrationPage) -> str:

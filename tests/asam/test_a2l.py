@@ -12,6 +12,7 @@ import pytest
 from codegen.asam.a2l import Located, a2l, located
 from codegen.asam.description import described
 from codegen.asam.image import ImageError
+from codegen.exchange.page import page_constants, page_name
 from codegen.tool import ARM_COMPILER
 from language.program import Program
 from modewright.api import program as shipped
@@ -77,6 +78,13 @@ def test_a_parser_of_others_reads_all_of_it(name: str, tmp_path: Path) -> None:
         for one in found.characteristics:
             assert calibrated[one.name].lowerLimit == pytest.approx(one.limits[0], rel=1e-7)
             assert calibrated[one.name].upperLimit == pytest.approx(one.limits[1], rel=1e-7)
+
+
+@pytest.mark.parametrize("name", ["estimator", "supervisor"])
+def test_what_may_be_calibrated_is_named_as_in_pages_that_are_exchanged(name: str) -> None:
+    used = shipped(name)
+    ours = [one.name for one in described(used).characteristics]
+    assert sorted(ours) == sorted(page_name(used, one) for one in page_constants(used))
 
 
 @pytest.mark.parametrize("target", ["host", pytest.param("cortex-m4f", marks=NEEDS_ARM)])

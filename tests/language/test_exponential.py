@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -64,7 +65,9 @@ def test_a_decay_and_a_ramp_are_exact(tmp_path: Path) -> None:
 
 def test_two_half_steps_are_a_whole_one(tmp_path: Path) -> None:
     """E = Eh^2, F = (I + Eh) Fh: what the step to the middle is made of, seen by no affine flow."""
-    numbers = solved(swing(tmp_path).program(period="0.4 s"))
+    pulled = SWING.replace("v * 1 1/s", "v * 1 1/s + u * 1")
+    flow = Flow(tmp_path, pulled, {"x": 1.0, "v": 0.5}, parameters=PARAMETERS)
+    numbers = solved(flow.program(period="0.4 s"))
 
     def of(letter: str) -> NDArray[np.float64]:
         names = [[f"solved.one_{letter}.{row}.{column}" for column in "xv"] for row in "xv"]
@@ -72,6 +75,13 @@ def test_two_half_steps_are_a_whole_one(tmp_path: Path) -> None:
 
     assert np.allclose(of("Eh") @ of("Eh"), of("E"), rtol=EXACT, atol=0)
     assert np.allclose((np.eye(2) + of("Eh")) @ of("Fh"), of("F"), rtol=EXACT, atol=0)
+
+
+def test_a_state_that_follows_from_others_alone_is_not_pulled(tmp_path: Path) -> None:
+    """x' = v is its row of A: nothing else moves it, so that F has no column for it."""
+    numbers = solved(swing(tmp_path).program(period="0.4 s"))
+    assert "solved.one_F.x.v" in numbers
+    assert not [name for name in numbers if re.fullmatch(r"solved\.one_Fh?\.\w\.x", name)]
 
 
 def test_substeps_change_nothing_for_an_affine_flow(tmp_path: Path) -> None:

@@ -114,9 +114,9 @@ parameters:
   elapsed: {value: 3, tunable: true}
   page: {value: 4}
   settle: {value: 1}
-inputs: {is_new: {unit: "1"}, values: {unit: "1"}}
+inputs: {is_old: {unit: "1"}, values: {unit: "1"}}
 states: {state: {unit: "1", initial: 0}, equation: {unit: "1", initial: 1}}
-equations: {started: is_new * piece * elapsed * page * settle, fired: values, record: values + 1}
+equations: {started: is_old * piece * elapsed * page * settle, fired: values, record: values + 1}
 modes: {only: {update: {state: state + 1, equation: state}}}
 outputs: [started, fired, state, equation, record]
 """,

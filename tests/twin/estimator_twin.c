@@ -27,7 +27,7 @@
 #define PERIOD 0.00100000005F /* s */
 #define MERGE  4.88281273e-07F /* s: crossings closer than this are one instant */
 #define HALVINGS 24
-#define TERMS  17 /* of the Taylor sum of a partial period */
+#define TERMS  8 /* of the Taylor sum of a partial period */
 #define PIECES 5  /* of one period: `events: 4` and the rest */
 
 #define ALPHA           0.0255999994F   /* half of the gap */
@@ -102,7 +102,6 @@
 #define GAP_FH_WEM  0.000499995018F
 #define GAP_FH_T_WW (-1.24999957e-07F)
 #define GAP_FH_T_WEM 1.54319952e-08F
-#define GAP_FH_TB_TB 0.000459490373F
 #define GAP_E_WW    0.999997795F
 #define GAP_E_WEM   0.999960005F
 #define GAP_E_T_WW  (-0.000999998883F)
@@ -113,7 +112,6 @@
 #define GAP_F_WEM   0.000999980024F
 #define GAP_F_T_WW  (-4.99999658e-07F)
 #define GAP_F_T_WEM 6.17275688e-08F
-#define GAP_F_TB_TB 0.000846592826F
 
 /* Driveline on a flank, the same for both. */
 #define CON_A_WW_WW   (-0.131902352F)
@@ -169,14 +167,12 @@ typedef struct {
     float w_w, w_em, theta_d, theta_b;
 } point;
 
-/* What the linear part A leaves of the flow: rate - A * state.  That of theta_b is 0 on a flank. */
-typedef struct {
-    float w_w, w_em, theta_d, theta_b;
-} pull;
-
 typedef struct {
     float w_w, w_em;
 } accelerations;
+
+/* What the linear part A leaves of the flow: rate - A * state.  The angles flow as A says. */
+typedef accelerations pull;
 
 /* driveline equations.T_aer, T_rr, T_v and flow.w_w, w_em.
  * Bits: T_v ends with + m*g*r_w*sin(0) = + 0, which T_aer >= +0 makes an identity. */
@@ -199,18 +195,14 @@ INLINE float twist_rate(const point *x)
     return (x->w_em * PER_R) - x->w_w;
 }
 
-/* Gap: rate - A * x, with w_d, w_b (= w_free) and T_hs of x at hand.
- * Bits: A has rows (-1, 1/R) for theta_d and (-1, 1/R, k/c, -k/c) for theta_b, so A * x starts with
- * w_d itself; w_d - w_d is +0, or NaN where the list has NaN. */
-INLINE pull pull_in_gap(const estimator_twin *self, const point *x, float w_d, float w_b, float T_hs)
+/* Gap: rate - A * x, with T_hs of x at hand. */
+INLINE pull pull_in_gap(const estimator_twin *self, const point *x, float T_hs)
 {
     const accelerations rate = accelerate(self, x->w_w, x->w_em, T_hs);
     pull p;
 
     p.w_w = rate.w_w - (GAP_A_WW * x->w_w);
     p.w_em = rate.w_em - (GAP_A_WEM * x->w_em);
-    p.theta_d = w_d - w_d;
-    p.theta_b = w_b - ((w_d + (GAP_A_TB * x->theta_d)) - (GAP_A_TB * x->theta_b));
     return p;
 }
 
@@ -222,12 +214,11 @@ INLINE pull pull_in_gap_at(const estimator_twin *self, const point *x)
     const float w_b = w_d + (K_HS_PER_C_HS * stretch);
     const float T_hs = (K_HS * stretch) + (C_HS * (w_d - w_b));
 
-    return pull_in_gap(self, x, w_d, w_b, T_hs);
+    return pull_in_gap(self, x, T_hs);
 }
 
 /* Half and whole period of the gap flow from x under a constant pull: E * x + F * pull.
- * Bits: theta_d and theta_b share the leading products; pull.theta_d is +0 or NaN and its factors
- * in F are positive, so F * pull.theta_d is pull.theta_d. */
+ * Bits: theta_d and theta_b share the leading products and those with pull. */
 INLINE point half_period_in_gap(const point *x, const pull *p)
 {
     const float glide = (GAP_EH_T_WW * x->w_w) + (GAP_EH_T_WEM * x->w_em);
@@ -237,9 +228,8 @@ INLINE point half_period_in_gap(const point *x, const pull *p)
 
     at.w_w = (GAP_EH_WW * x->w_w) + (GAP_FH_WW * p->w_w);
     at.w_em = (GAP_EH_WEM * x->w_em) + (GAP_FH_WEM * p->w_em);
-    at.theta_d = (((glide + x->theta_d) + by_w_w) + by_w_em) + p->theta_d;
-    at.theta_b = (((((glide + (GAP_EH_TB_TD * x->theta_d)) + (GAP_EH_TB_TB * x->theta_b)) + by_w_w)
-                   + by_w_em) + p->theta_d) + (GAP_FH_TB_TB * p->theta_b);
+    at.theta_d = ((glide + x->theta_d) + by_w_w) + by_w_em;
+    at.theta_b = (((glide + (GAP_EH_TB_TD * x->theta_d)) + (GAP_EH_TB_TB * x->theta_b)) + by_w_w) + by_w_em;
     return at;
 }
 
@@ -252,9 +242,8 @@ INLINE point period_in_gap(const point *x, const pull *p)
 
     at.w_w = (GAP_E_WW * x->w_w) + (GAP_F_WW * p->w_w);
     at.w_em = (GAP_E_WEM * x->w_em) + (GAP_F_WEM * p->w_em);
-    at.theta_d = (((glide + x->theta_d) + by_w_w) + by_w_em) + p->theta_d;
-    at.theta_b = (((((glide + (GAP_E_TB_TD * x->theta_d)) + (GAP_E_TB_TB * x->theta_b)) + by_w_w)
-                   + by_w_em) + p->theta_d) + (GAP_F_TB_TB * p->theta_b);
+    at.theta_d = ((glide + x->theta_d) + by_w_w) + by_w_em;
+    at.theta_b = (((glide + (GAP_E_TB_TD * x->theta_d)) + (GAP_E_TB_TB * x->theta_b)) + by_w_w) + by_w_em;
     return at;
 }
 
@@ -270,37 +259,35 @@ INLINE float contact_w_em(const point *x, float by_theta_b)
     return (((CON_A_WEM_WW * x->w_w) + (CON_A_WEM_WEM * x->w_em)) + (CON_A_WEM_TD * x->theta_d)) + by_theta_b;
 }
 
-/* Flank: rate - A * x (driveline modes.drive_contact, coast_contact); w_b = 0. */
-static pull pull_on_flank(const estimator_twin *self, const point *x)
+/* Flank: rate - A * x, with T_hs of x at hand. */
+static pull pull_on_flank(const estimator_twin *self, const point *x, float T_hs)
 {
-    const float w_d = twist_rate(x);
-    const float T_hs = (K_HS * (x->theta_d - x->theta_b)) + (C_HS * w_d);
     const accelerations rate = accelerate(self, x->w_w, x->w_em, T_hs);
     pull p;
 
     p.w_w = rate.w_w - contact_w_w(x, CON_A_WW_TB * x->theta_b);
     p.w_em = rate.w_em - contact_w_em(x, CON_A_WEM_TB * x->theta_b);
-    p.theta_d = w_d - w_d;
-    p.theta_b = 0.0F;
     return p;
 }
 
+/* The same from the states alone (driveline modes.drive_contact, coast_contact); w_b = 0. */
+static pull pull_on_flank_at(const estimator_twin *self, const point *x)
+{
+    return pull_on_flank(self, x, (K_HS * (x->theta_d - x->theta_b)) + (C_HS * twist_rate(x)));
+}
+
 /* Half and whole period on a flank.  theta_b is +-alpha and stays there.
- * Bits: pull.theta_d and pull.theta_b are +0 (or the first NaN); what F makes of them adds up to
- * one + 0 in each row. */
+ * Bits: its factor in E is 1. */
 static point half_period_on_flank(const point *x, const pull *p)
 {
     point at;
 
-    at.w_w = ((((((0.999928594F * x->w_w) + (8.6838254e-06F * x->w_em)) + (0.0222118292F * x->theta_d))
-                + (-0.0222118292F * x->theta_b)) + (0.00049998262F * p->w_w)) + (2.1146298e-09F * p->w_em))
-              + p->theta_d;
-    at.w_em = ((((((0.0187440347F * x->w_w) + (0.997665942F * x->w_em)) + (-5.91898489F * x->theta_d))
-                 + (5.91898489F * x->theta_b)) + (4.56442831e-06F * p->w_w)) + (0.00049943151F * p->w_em))
-               + p->theta_d;
-    at.theta_d = ((((((-0.000499419111F * x->w_w) + (6.16560937e-05F * x->w_em)) + (0.999811709F * x->theta_d))
-                    + (0.000188313163F * x->theta_b)) + (-1.24904474e-07F * p->w_w)) + (1.54202073e-08F * p->w_em))
-                  + p->theta_d;
+    at.w_w = (((((0.999928594F * x->w_w) + (8.6838254e-06F * x->w_em)) + (0.0222118292F * x->theta_d))
+               + (-0.0222118292F * x->theta_b)) + (0.00049998262F * p->w_w)) + (2.1146298e-09F * p->w_em);
+    at.w_em = (((((0.0187440347F * x->w_w) + (0.997665942F * x->w_em)) + (-5.91898489F * x->theta_d))
+                + (5.91898489F * x->theta_b)) + (4.56442831e-06F * p->w_w)) + (0.00049943151F * p->w_em);
+    at.theta_d = (((((-0.000499419111F * x->w_w) + (6.16560937e-05F * x->w_em)) + (0.999811709F * x->theta_d))
+                   + (0.000188313163F * x->theta_b)) + (-1.24904474e-07F * p->w_w)) + (1.54202073e-08F * p->w_em);
     at.theta_b = x->theta_b;
     return at;
 }
@@ -309,15 +296,12 @@ static point period_on_flank(const point *x, const pull *p)
 {
     point at;
 
-    at.w_w = ((((((0.99984622F * x->w_w) + (1.8716255e-05F * x->w_em)) + (0.0443664901F * x->theta_d))
-                + (-0.0443664901F * x->theta_b)) + (0.000999926706F * p->w_w)) + (8.90859564e-09F * p->w_em))
-              + p->theta_d;
-    at.w_em = ((((((0.0403990373F * x->w_w) + (0.994972527F * x->w_em)) + (-11.8226233F * x->theta_d))
-                 + (11.8226233F * x->theta_b)) + (1.92292027e-05F * p->w_w)) + (0.000997606083F * p->w_em))
-               + p->theta_d;
-    at.theta_d = ((((((-0.000997552765F * x->w_w) + (0.00012315232F * x->w_em)) + (0.999247372F * x->theta_d))
-                    + (0.000752625347F * x->theta_b)) + (-4.99204873e-07F * p->w_w)) + (6.162945e-08F * p->w_em))
-                  + p->theta_d;
+    at.w_w = (((((0.99984622F * x->w_w) + (1.8716255e-05F * x->w_em)) + (0.0443664901F * x->theta_d))
+               + (-0.0443664901F * x->theta_b)) + (0.000999926706F * p->w_w)) + (8.90859564e-09F * p->w_em);
+    at.w_em = (((((0.0403990373F * x->w_w) + (0.994972527F * x->w_em)) + (-11.8226233F * x->theta_d))
+                + (11.8226233F * x->theta_b)) + (1.92292027e-05F * p->w_w)) + (0.000997606083F * p->w_em);
+    at.theta_d = (((((-0.000997552765F * x->w_w) + (0.00012315232F * x->w_em)) + (0.999247372F * x->theta_d))
+                   + (0.000752625347F * x->theta_b)) + (-4.99204873e-07F * p->w_w)) + (6.162945e-08F * p->w_em);
     at.theta_b = x->theta_b;
     return at;
 }
@@ -329,92 +313,73 @@ typedef struct {
     float w_w[TERMS], w_em[TERMS], theta_d[TERMS], theta_b[TERMS];
 } series;
 
-/* Bits: the list starts each sum with 0 * s + c[16], which is c[16] but for -0: hence c[16] + 0. */
-static void expand_in_gap(series *c, const point *x, const pull *p)
+/* Term i from the one before; written out, for division by 2, 4 and 8 is a multiplication then. */
+INLINE void next_in_gap(series *c, int i, float order)
 {
-    point a; /* A^i (A x + pull) / (i + 1)! */
-    float order = 1.0F;
-    float w_d = twist_rate(x);
-    int i;
+    const float w_d = (c->w_em[i - 1] * PER_R) - c->w_w[i - 1];
 
-    a.theta_b = ((w_d + (GAP_A_TB * x->theta_d)) - (GAP_A_TB * x->theta_b)) + p->theta_b;
-    a.theta_d = w_d + p->theta_d;
-    a.w_w = (GAP_A_WW * x->w_w) + p->w_w;
-    a.w_em = (GAP_A_WEM * x->w_em) + p->w_em;
-    for (i = 0; i < TERMS - 1; i++) {
-        c->w_w[i] = a.w_w;
-        c->w_em[i] = a.w_em;
-        c->theta_d[i] = a.theta_d;
-        c->theta_b[i] = a.theta_b;
-        order += 1.0F;
-        w_d = twist_rate(&a);
-        a.theta_b = ((w_d + (GAP_A_TB * a.theta_d)) - (GAP_A_TB * a.theta_b)) / order;
-        a.theta_d = w_d / order;
-        a.w_w = (GAP_A_WW * a.w_w) / order;
-        a.w_em = (GAP_A_WEM * a.w_em) / order;
-    }
-    c->w_w[i] = a.w_w + 0.0F;
-    c->w_em[i] = a.w_em + 0.0F;
-    c->theta_d[i] = a.theta_d + 0.0F;
-    c->theta_b[i] = a.theta_b + 0.0F;
+    c->w_w[i] = (GAP_A_WW * c->w_w[i - 1]) / order;
+    c->w_em[i] = (GAP_A_WEM * c->w_em[i - 1]) / order;
+    c->theta_d[i] = w_d / order;
+    c->theta_b[i] = ((w_d + (GAP_A_TB * c->theta_d[i - 1])) - (GAP_A_TB * c->theta_b[i - 1])) / order;
 }
 
-/* theta_b does not move on a flank: its terms are all +0 and not kept. */
+/* Bits: A has rows (-1, 1/R) for theta_d and (-1, 1/R, k/c, -k/c) for theta_b, so A * x starts with
+ * w_d itself. */
+static void expand_in_gap(series *c, const point *x, const pull *p)
+{
+    const float w_d = twist_rate(x);
+
+    c->w_w[0] = (GAP_A_WW * x->w_w) + p->w_w;
+    c->w_em[0] = (GAP_A_WEM * x->w_em) + p->w_em;
+    c->theta_d[0] = w_d;
+    c->theta_b[0] = (w_d + (GAP_A_TB * x->theta_d)) - (GAP_A_TB * x->theta_b);
+    next_in_gap(c, 1, 2.0F);
+    next_in_gap(c, 2, 3.0F);
+    next_in_gap(c, 3, 4.0F);
+    next_in_gap(c, 4, 5.0F);
+    next_in_gap(c, 5, 6.0F);
+    next_in_gap(c, 6, 7.0F);
+    next_in_gap(c, 7, 8.0F);
+}
+
+INLINE void next_on_flank(series *c, int i, float order)
+{
+    const point a = {c->w_w[i - 1], c->w_em[i - 1], c->theta_d[i - 1], 0.0F};
+
+    c->w_w[i] = contact_w_w(&a, -0.0F) / order;
+    c->w_em[i] = contact_w_em(&a, 0.0F) / order;
+    c->theta_d[i] = twist_rate(&a) / order;
+}
+
+/* theta_b does not move on a flank: its terms are all +0 and not kept (x + s * 0 is x). */
 static void expand_on_flank(series *c, const point *x, const pull *p)
 {
-    point a;
-    float order = 1.0F;
-    int i;
+    c->w_w[0] = contact_w_w(x, CON_A_WW_TB * x->theta_b) + p->w_w;
+    c->w_em[0] = contact_w_em(x, CON_A_WEM_TB * x->theta_b) + p->w_em;
+    c->theta_d[0] = twist_rate(x);
+    next_on_flank(c, 1, 2.0F);
+    next_on_flank(c, 2, 3.0F);
+    next_on_flank(c, 3, 4.0F);
+    next_on_flank(c, 4, 5.0F);
+    next_on_flank(c, 5, 6.0F);
+    next_on_flank(c, 6, 7.0F);
+    next_on_flank(c, 7, 8.0F);
+}
 
-    a.w_w = contact_w_w(x, CON_A_WW_TB * x->theta_b) + p->w_w;
-    a.w_em = contact_w_em(x, CON_A_WEM_TB * x->theta_b) + p->w_em;
-    a.theta_d = twist_rate(x) + p->theta_d;
-    for (i = 0; i < TERMS - 1; i++) {
-        const float w_d = twist_rate(&a);
-        const float w_w = contact_w_w(&a, -0.0F);
-        const float w_em = contact_w_em(&a, 0.0F);
-
-        c->w_w[i] = a.w_w;
-        c->w_em[i] = a.w_em;
-        c->theta_d[i] = a.theta_d;
-        order += 1.0F;
-        a.w_w = w_w / order;
-        a.w_em = w_em / order;
-        a.theta_d = w_d / order;
-    }
-    c->w_w[i] = a.w_w + 0.0F;
-    c->w_em[i] = a.w_em + 0.0F;
-    c->theta_d[i] = a.theta_d + 0.0F;
+/* one state after s */
+INLINE float sum(const float *c, float x, float s)
+{
+    return x + (s * ((((((((((((((c[7] * s) + c[6]) * s) + c[5]) * s) + c[4]) * s) + c[3]) * s) + c[2]) * s)
+                       + c[1]) * s) + c[0]));
 }
 
 /* w_w, w_em and theta_d after s */
-INLINE void point_at(point *at, const series *c, const point *x, float s)
+RARE static void point_at(point *at, const series *c, const point *x, float s)
 {
-    float w_w = c->w_w[TERMS - 1];
-    float w_em = c->w_em[TERMS - 1];
-    float theta_d = c->theta_d[TERMS - 1];
-    int i;
-
-    for (i = TERMS - 2; i >= 0; i--) {
-        w_w = (w_w * s) + c->w_w[i];
-        w_em = (w_em * s) + c->w_em[i];
-        theta_d = (theta_d * s) + c->theta_d[i];
-    }
-    at->w_w = x->w_w + (s * w_w);
-    at->w_em = x->w_em + (s * w_em);
-    at->theta_d = x->theta_d + (s * theta_d);
-}
-
-/* one of them after s, by all terms */
-static float whole_sum(const float *c, float x, float s)
-{
-    float sum = c[TERMS - 1];
-    int i;
-
-    for (i = TERMS - 2; i >= 0; i--) {
-        sum = (sum * s) + c[i];
-    }
-    return x + (s * sum);
+    at->w_w = sum(c->w_w, x->w_w, s);
+    at->w_em = sum(c->w_em, x->w_em, s);
+    at->theta_d = sum(c->theta_d, x->theta_d, s);
 }
 
 /* ---- crossings ----------------------------------------------------------------------------- */
@@ -443,58 +408,14 @@ INLINE bool flank_left(const point *x, int32_t flank)
     return (flank == DRIVE) ? (w_free(x) < 0.0F) : (w_free(x) > 0.0F);
 }
 
-/* The Taylor sums of the gap converge fast, but their bits are those of all 17 terms.  So the first
- * few are summed twice, from a bound of what the rest can be and from its negative.  Rounding is
- * monotone and s >= 0: the list's value lies between, and is known where both agree.  Else (once in
- * thousands; NaN; a 0, whose sign matters) all terms are summed.  That also keeps away from the
- * subnormal last terms of w_w, which some FPUs handle slowly. */
-#define TERMS_SPEED 3 /* that decide w_w, w_em, theta_d */
-#define TERMS_ANGLE 8 /* that decide theta_b */
-
-/* Most that the sum from term n on can be, for all s in 0 .. longest. */
-static float rest_from(int n, const float *c, float longest)
+/* flank_met() of the gap flow after s.  Points inside the gap need theta_b alone. */
+INLINE int32_t flank_met_at(point *at, const series *c, const point *x, float s)
 {
-    float most = fabsf(c[TERMS - 1]);
-    int i;
-
-    for (i = TERMS - 2; i >= n; i--) {
-        most = (most * longest) + fabsf(c[i]);
-    }
-    return most;
-}
-
-typedef struct {
-    float w_w, w_em, theta_d, theta_b; /* rest_from() of each series */
-} rests;
-
-INLINE float decided_sum(int n, const float *c, float rest, float x, float s)
-{
-    float low = -rest;
-    float high = rest;
-    int i;
-
-    for (i = n - 1; i >= 0; i--) {
-        low = (low * s) + c[i];
-        high = (high * s) + c[i];
-    }
-    low = x + (s * low);
-    high = x + (s * high);
-    if (UNLIKELY(!((low == high) && (low != 0.0F)))) {
-        return whole_sum(c, x, s);
-    }
-    return low;
-}
-
-/* flank_met() of the gap flow after s.  Most points inside the gap need theta_b alone. */
-static int32_t flank_met_at(point *at, const series *c, const rests *r, const point *x, float s)
-{
-    at->theta_b = decided_sum(TERMS_ANGLE, c->theta_b, r->theta_b, x->theta_b, s);
-    if (fabsf(at->theta_b) < ALPHA) {
+    at->theta_b = sum(c->theta_b, x->theta_b, s);
+    if (!(fabsf(at->theta_b) >= ALPHA)) {
         return GAP;
     }
-    at->w_w = decided_sum(TERMS_SPEED, c->w_w, r->w_w, x->w_w, s);
-    at->w_em = decided_sum(TERMS_SPEED, c->w_em, r->w_em, x->w_em, s);
-    at->theta_d = decided_sum(TERMS_SPEED, c->theta_d, r->theta_d, x->theta_d, s);
+    point_at(at, c, x, s);
     return flank_met(at);
 }
 
@@ -505,7 +426,8 @@ typedef struct {
 } piece;
 
 /* Where the gap is left within h: q->end, the time until there; *met: the flank met at q->end, before
- * and after.  Bits: only points where a guard held are kept, so the list's guards there are known. */
+ * and after.  Bits: only points where a guard held are kept, so the list's guards there are known;
+ * one evaluation more of the kept point would give the same states. */
 RARE static float locate_in_gap(piece *q, const series *c, float h, int32_t *met)
 {
     point at;
@@ -513,16 +435,11 @@ RARE static float locate_in_gap(piece *q, const series *c, float h, int32_t *met
     float high = h;
     int32_t first = GAP; /* the flank met at high, by the sums */
     int32_t later;       /* and one MERGE later */
-    rests r;
     int i;
 
-    r.w_w = rest_from(TERMS_SPEED, c->w_w, h + MERGE);
-    r.w_em = rest_from(TERMS_SPEED, c->w_em, h + MERGE);
-    r.theta_d = rest_from(TERMS_SPEED, c->theta_d, h + MERGE);
-    r.theta_b = rest_from(TERMS_ANGLE, c->theta_b, h + MERGE);
     for (i = 0; i < HALVINGS; i++) {
         const float s = low + (0.5F * (high - low));
-        const int32_t which = flank_met_at(&at, c, &r, &q->x, s);
+        const int32_t which = flank_met_at(&at, c, &q->x, s);
 
         if (which != GAP) {
             high = s;
@@ -535,9 +452,9 @@ RARE static float locate_in_gap(piece *q, const series *c, float h, int32_t *met
     if (first != GAP) {
         *met = first;
     } else { /* never met: the end of the step is kept, but the sums are asked there */
-        first = flank_met_at(&at, c, &r, &q->x, high);
+        first = flank_met_at(&at, c, &q->x, high);
     }
-    later = flank_met_at(&at, c, &r, &q->x, high + MERGE);
+    later = flank_met_at(&at, c, &q->x, high + MERGE);
     if ((later != GAP) && (later != first)) {
         high = high + MERGE;
         q->end = at;
@@ -587,9 +504,9 @@ RARE static point run_through_events(estimator_twin *self, point x, point end, p
     if (self->run_mode == GAP) {
         expand_in_gap(&c, &q->x, &q->p);
     } else {
-        q->p = pull_on_flank(self, &q->x);
+        q->p = pull_on_flank(self, &q->x, self->T_hs);
         q->end = half_period_on_flank(&q->x, &q->p);
-        q->p = pull_on_flank(self, &q->end);
+        q->p = pull_on_flank_at(self, &q->end);
         q->end = period_on_flank(&q->x, &q->p);
         crossed = flank_left(&q->end, self->run_mode);
         if (crossed) {
@@ -621,19 +538,19 @@ RARE static point run_through_events(estimator_twin *self, point x, point end, p
         if (self->run_mode == GAP) {
             q->p = pull_in_gap_at(self, &q->x);
             expand_in_gap(&c, &q->x, &q->p);
-            q->end.theta_b = whole_sum(c.theta_b, q->x.theta_b, 0.5F * h);
+            q->end.theta_b = sum(c.theta_b, q->x.theta_b, 0.5F * h);
             point_at(&q->end, &c, &q->x, 0.5F * h);
             q->p = pull_in_gap_at(self, &q->end);
             expand_in_gap(&c, &q->x, &q->p);
-            q->end.theta_b = whole_sum(c.theta_b, q->x.theta_b, h);
+            q->end.theta_b = sum(c.theta_b, q->x.theta_b, h);
             point_at(&q->end, &c, &q->x, h);
             met = flank_met(&q->end);
             crossed = (met != GAP);
         } else {
-            q->p = pull_on_flank(self, &q->x);
+            q->p = pull_on_flank_at(self, &q->x);
             expand_on_flank(&c, &q->x, &q->p);
             point_at(&q->end, &c, &q->x, 0.5F * h);
-            q->p = pull_on_flank(self, &q->end);
+            q->p = pull_on_flank_at(self, &q->end);
             expand_on_flank(&c, &q->x, &q->p);
             point_at(&q->end, &c, &q->x, h);
             crossed = flank_left(&q->end, self->run_mode);
@@ -680,8 +597,8 @@ RARE static int32_t jump_from_gap(estimator_twin *self)
     return self->run_mode;
 }
 
-/* Advance by the driveline's gap flow, then jump.  w_d, w_b and T_hs of the tick before are those
- * of the states that the flow starts from. */
+/* Advance by the driveline's gap flow, then jump.  T_hs of the tick before is that of the states
+ * that the flow starts from. */
 RARE static void tick_in_gap(estimator_twin *self, const estimator_twin_in *in, estimator_twin_out *out)
 {
     point x, end;
@@ -697,7 +614,7 @@ RARE static void tick_in_gap(estimator_twin *self, const estimator_twin_in *in, 
     self->fired = 0;
 
     if (self->run_mode == GAP) {
-        const pull first = pull_in_gap(self, &x, self->w_d, self->w_b, self->T_hs);
+        const pull first = pull_in_gap(self, &x, self->T_hs);
         const point middle = half_period_in_gap(&x, &first);
         const pull second = pull_in_gap_at(self, &middle);
 

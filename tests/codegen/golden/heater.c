@@ -54,7 +54,7 @@ static inline void jump_rest(heater_Self *self, const heater_In *in)
     }
     if (self->timer.rest_heating > 3U) {
         const double reset_heat = 0.1; /* heater modes.rest.transitions.heating.reset.heat */
-        if ((reset_heat >= 0.0) && (reset_heat <= 1000000.0)) {
+        if (ha_within(reset_heat, 0.0, 1000000.0)) {
             self->state.heat = reset_heat;
         } else {
             self->faults |= heater_FAULT_range_heat;
@@ -87,7 +87,7 @@ static inline void update_heating(heater_Self *self)
     /* heater modes.heating.update.heat */
     const double next_heat =
         self->state.heat + (self->equation.P * constant.t_tick) - constant.P_loss_t_tick;
-    if ((next_heat >= 0.0) && (next_heat <= 1000000.0)) {
+    if (ha_within(next_heat, 0.0, 1000000.0)) {
         self->state.heat = next_heat;
     } else {
         self->faults |= heater_FAULT_range_heat;
@@ -115,7 +115,7 @@ static inline void remember(void)
 static inline void start(heater_Self *self)
 {
     const double new_heat = 0.3; /* heater states.heat.initial */
-    if ((new_heat >= 0.0) && (new_heat <= 1000000.0)) {
+    if (ha_within(new_heat, 0.0, 1000000.0)) {
         self->state.heat = new_heat;
     } else {
         self->faults |= heater_FAULT_range_heat;
