@@ -244,6 +244,7 @@ def test_no_block_of_ours_that_integrates_or_locates_is_kept(
         "step",
         "series",
         "locate",
+        "look",
         "segment",
         "settle",
     }
