@@ -48,7 +48,7 @@ equations:
 modes: {run: {}}
 outputs: [T]
 """
-AUTOMATA = ("estimator", "supervisor", "driveline", "leaf")
+AUTOMATA = ("estimator_simple", "supervisor", "driveline")
 
 
 def text_of(used: Program, elf: Path | None = None) -> str:
@@ -88,7 +88,7 @@ def test_what_may_be_calibrated_is_named_as_in_pages_that_are_exchanged(name: st
 
 
 @pytest.mark.parametrize("target", ["host", pytest.param("cortex-m4f", marks=NEEDS_ARM)])
-@pytest.mark.parametrize("name", ["estimator", "supervisor", "maps"])
+@pytest.mark.parametrize("name", ["estimator_simple", "supervisor", "maps"])
 def test_addresses_are_those_of_the_linker(name: str, target: str, tmp_path: Path) -> None:
     used = program(MAPS) if name == "maps" else shipped(name)
     found, machine = described(used), TARGETS[target]
