@@ -8,20 +8,22 @@ from pathlib import Path
 
 from codegen.proofs.misra import misra
 from codegen.proofs.proof import Proof
+from codegen.proofs.sanitised import sanitised
 from codegen.proofs.stack import stack
 from codegen.proofs.strict import strict
 from codegen.proofs.values import values
 from codegen.source import c_files
 from language.program import Program
 
-CHECKS = ("warnings", "misra", "stack", "values")
+CHECKS = ("warnings", "misra", "stack", "sanitizers", "values")
 
 
 def proofs(program: Program, checks: Sequence[str] = CHECKS) -> Iterator[Proof]:
     """Yield what each check says. Raises ToolMissing, BuildError."""
     with tempfile.TemporaryDirectory(prefix="modewright-") as name:
         folder = Path(name)
-        (folder / "values").mkdir()
+        for inner in ("sanitizers", "values"):
+            (folder / inner).mkdir()
         files = c_files(program)
         for file, text in files.items():
             (folder / file).write_text(text)
@@ -30,6 +32,7 @@ def proofs(program: Program, checks: Sequence[str] = CHECKS) -> Iterator[Proof]:
             "warnings": lambda: strict(folder, sources),
             "misra": lambda: [misra(folder, sources)],
             "stack": lambda: [stack(folder, sources, f"{program.name}_Step")],
+            "sanitizers": lambda: [sanitised(program, folder / "sanitizers")],
             "values": lambda: [values(program, folder / "values")],
         }
         for check in checks:

@@ -9,11 +9,13 @@ import pytest
 
 from codegen.proofs.misra import misra
 from codegen.proofs.proof import Proof
+from codegen.proofs.sanitised import sanitised
 from codegen.proofs.stack import stack
 from codegen.proofs.strict import strict
 from codegen.source import c_files
 from codegen.tool import PACKAGES
 from language.program import Program
+from modewright.api import program
 from modewright.code import prove
 
 pytestmark = pytest.mark.skipif(
@@ -71,6 +73,24 @@ def test_each_tool_finds_a_mistake(tmp_path: Path) -> None:
     rules = {finding.rpartition(" ")[2] for finding in misra(tmp_path, ["wrong.c"]).findings}
     assert {"15.5", "15.6", "17.2"} <= rules
     assert "broken calls itself" in stack(tmp_path, ["wrong.c"], "broken").findings
+
+
+@pytest.mark.parametrize("name", ["estimator_float32", "supervisor", "driveline"])
+def test_hostile_inputs_find_nothing_undefined(name: str, tmp_path: Path) -> None:
+    found = sanitised(program(name), tmp_path)
+    assert found.findings == ()
+
+
+def test_a_store_beyond_its_array_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def torn(made: Program) -> dict[str, str]:
+        files = c_files(made)
+        text, place = files["supervisor.c"], "self->log[self->count_of_log]"
+        assert place in text
+        return {**files, "supervisor.c": text.replace(place, "self->log[self->count_of_log + 24]")}
+
+    monkeypatch.setattr("codegen.harness.c_files", torn)
+    (finding,) = sanitised(program("supervisor"), tmp_path).findings
+    assert "out of bounds" in finding
 
 
 def test_what_a_tool_cannot_read_does_not_pass(tmp_path: Path) -> None:

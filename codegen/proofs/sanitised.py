@@ -1,0 +1,85 @@
+"""Sanitised: generated C on hostile inputs, under the sanitizers of gcc for addresses and for C."""
+
+from __future__ import annotations
+
+import math
+import os
+import random
+import struct
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+
+from codegen.build import FLAGS, BuildError
+from codegen.harness import fed, write_harness
+from codegen.names import c_type
+from codegen.proofs.proof import SECONDS, Proof, told, version_of
+from language.program import Program, Variable
+
+SANITIZERS = (
+    "-fsanitize=address,undefined,float-divide-by-zero,float-cast-overflow",
+    "-fno-sanitize-recover=all",
+)
+STEPS, SEED = 20_000, 1
+SPECIAL = (0.0, -0.0, math.nan, math.inf, -math.inf, 5e-324, -1e-40, 3.4028234663852886e38)
+SCALES = (1.0, 100.0, 1e4, 1e30)
+FOUND = ("runtime error", "ERROR: AddressSanitizer")
+
+
+def sanitised(program: Program, folder: Path) -> Proof:
+    """Run the C of a Program for many steps. Raises ToolMissing, BuildError."""
+    sources = write_harness(program, folder)
+    flags = [flag for flag in FLAGS if flag != "-O2"]
+    command = ["gcc", *flags, "-g", "-O1", *SANITIZERS, *map(str, sources), "-o", "app", "-lm"]
+    done = told(command, folder)
+    if done.returncode:
+        raise BuildError(done.stderr.strip() or f"gcc ended with {done.returncode}")
+    tool, about = f"gcc {version_of('gcc', folder)}", f"{STEPS} steps on random inputs"
+    return Proof("sanitizers", tool, about, _complaints(folder / "app", _records(program)))
+
+
+def _complaints(app: Path, records: bytes) -> tuple[str, ...]:
+    options = os.environ | {"ASAN_OPTIONS": "detect_leaks=0"}
+    try:
+        done = subprocess.run(
+            [str(app)], input=records, capture_output=True, env=options, timeout=SECONDS
+        )
+    except subprocess.TimeoutExpired:
+        raise BuildError(f"the compiled program was not done after {SECONDS} s") from None
+    lines = done.stderr.decode(errors="replace").splitlines()
+    told_of = [line.strip() for line in lines if any(word in line for word in FOUND)]
+    if done.returncode and not told_of:
+        told_of = [f"the program ended with {done.returncode}"]
+    return tuple(text.rpartition("/")[2] for text in told_of[:1])
+
+
+def _records(program: Program) -> bytes:
+    """Return inputs of steps: of any size, held for a while, with numbers that are none between."""
+    generator, inputs = random.Random(SEED), fed(program)
+    values = [0.0 for _ in inputs]
+    records = []
+    for _ in range(STEPS):
+        for k, variable in enumerate(inputs):
+            if generator.random() < 0.05:
+                values[k] = _any(variable, program, generator)
+        records.append(_record(values))
+    return b"".join(records)
+
+
+def _record(values: Sequence[float]) -> bytes:
+    """Return the inputs of a step, the calibration unchanged."""
+    return struct.pack(f"<{len(values) + 1}d", *values, 0.0)
+
+
+def _any(variable: Variable, program: Program, generator: random.Random) -> float:
+    """Return any value of an input: of its range or not."""
+    if variable.type == "truth":
+        return float(generator.random() < 0.5)
+    if variable.type == "whole":
+        is_byte = c_type(variable, program.number) == "uint8_t"
+        low, high = (0, 255) if is_byte else (-(2**31), 2**31 - 1)
+        near = generator.randint(-3, 12)
+        return float(max(low, near) if generator.random() < 0.8 else generator.randint(low, high))
+    if generator.random() < 0.1:
+        return generator.choice(SPECIAL)
+    return generator.choice(SCALES) * generator.uniform(-1.0, 1.0)
