@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from modewright.commands.options import Calibrations, Json, Numbers, Sets, values_of
 from modewright.console import announce, console, working
 from modewright.files import OutputError, require_writable, write_files
+
+if TYPE_CHECKING:
+    from codegen.instructions import Instructions
 
 FORMATS = (".html", ".json")
 
@@ -46,14 +49,8 @@ def metrics(
     for automaton in automata:
         with working(f"compiling {automaton} for a Cortex-M4F"):
             given = values_of(sets), None, calibrations or (), numbers
-            measured = code.metrics(automaton, *given)
-            counts = None
-            if system and scenario:
-                try:
-                    counts = code.instructions(automaton, system, scenario, *given)
-                except ValueError as error:
-                    raise typer.BadParameter(str(error), param_hint="--system") from None
-            found.append((measured, counts))
+            counts = _counted(automaton, system, scenario, given)
+            found.append((code.metrics(automaton, *given), counts))
     data = show_metrics.metrics_json(found)
     if out:
         text = show_metrics.metrics_html(found) if out.suffix.lower() == ".html" else None
@@ -63,3 +60,17 @@ def metrics(
     else:
         console().print(show_metrics.metrics_table(found))
         announce([out] if out else [])
+
+
+def _counted(
+    automaton: str, system: str | None, scenario: str | None, given: Any
+) -> Instructions | None:
+    """Return the instructions of steps where a system is named that has the automaton."""
+    from modewright import code
+
+    if not (system and scenario):
+        return None
+    try:
+        return code.instructions(automaton, system, scenario, *given)
+    except ValueError as error:
+        raise typer.BadParameter(str(error), param_hint="--system") from None

@@ -53,10 +53,8 @@ def trace(
         found = traces.trace(specs, requirements, run=run)
     data = json.dumps(show_trace.trace_json(found), indent=2) + "\n"
     if out:
-        text = data if form == ".json" else show_trace.trace_csv(found)
-        if form == ".html":
-            text = show_trace.trace_html(found, ", ".join(specs))
-        write_files({out: text.encode()})
+        page = show_trace.trace_html(found, ", ".join(specs)) if form == ".html" else data
+        write_files({out: (show_trace.trace_csv(found) if form == ".csv" else page).encode()})
     if as_json:
         print(data, end="")
     else:
