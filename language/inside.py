@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from importlib import resources
 from pathlib import Path
 
 from language.problem import Problems, Span, SpecError
@@ -33,6 +32,8 @@ def require_inside(path: Path, span: Span, root: Path) -> None:
     named_in = Path(span.source.name)
     if os.environ.get(ALLOW_OUTSIDE) or not exists(path) or not exists(named_in):
         return
+    from importlib import resources  # not for the help of the command line
+
     roots = [root, root_of(named_in), Path(str(resources.files("spec")))]
     if os.environ.get(RECORDINGS):
         roots.append(Path(os.environ[RECORDINGS]))

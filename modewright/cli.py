@@ -7,6 +7,7 @@ import io
 import logging
 import os
 import sys
+from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import Annotated
 
@@ -46,6 +47,8 @@ from modewright.exits import EXIT_CODES, exit_code
 from modewright.files import require_writable
 from modewright.spread import spread
 
+COMPLETION = "_MODEWRIGHT_COMPLETE"
+"""Set by a shell that asks for completions; its words are elsewhere."""
 YOUNG_OBJECTS = 100_000
 """New objects after which garbage is looked for: trees of expressions have no circles."""
 COMMANDS = (
@@ -54,20 +57,39 @@ COMMANDS = (
     doctor,
 )  # fmt: skip
 
-app = typer.Typer(
-    no_args_is_help=True,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-    help="Hybrid automata in YAML: simulate them, print them as C, keep both in lock-step.",
-    epilog=EXIT_CODES,
-)
-for command in COMMANDS:
-    app.command(epilog=EXIT_CODES)(command)
-app.add_typer(recording, name="recording")
-app.add_typer(calibration, name="calibration")
+
+def application(words: Collection[str] | None = None) -> typer.Typer:
+    """Return the application; with the words of a command line only what they need is made whole.
+
+    Parameters of a command take longer to look at than a page of help to print: a command that
+    no word names has its name and its help alone.
+    """
+    made = typer.Typer(
+        no_args_is_help=True,
+        pretty_exceptions_enable=False,
+        rich_markup_mode=None,
+        help="Hybrid automata in YAML: simulate them, print them as C, keep both in lock-step.",
+        epilog=EXIT_CODES,
+        callback=options,
+    )
+    for command in COMMANDS:
+        whole = words is None or command.__name__ in words
+        made.command(epilog=EXIT_CODES)(command if whole else named(command))
+    made.add_typer(recording, name="recording")
+    made.add_typer(calibration, name="calibration")
+    return made
 
 
-@app.callback(epilog=EXIT_CODES)
+def named(command: Callable[..., None]) -> Callable[[], None]:
+    """Return a function with the name and the help of a command and without its parameters."""
+
+    def stand_in() -> None:
+        raise AssertionError(f"{command.__name__} is not made whole")
+
+    stand_in.__name__, stand_in.__doc__ = command.__name__, command.__doc__
+    return stand_in
+
+
 def options(
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="tell problems only")] = False,
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="tell each step")] = False,
@@ -83,6 +105,9 @@ def options(
         os.environ[ALLOW_OUTSIDE] = "1"
 
 
+app = application()
+
+
 def main() -> None:
     """Run the command line and leave with its exit code."""
     gc.set_threshold(YOUNG_OBJECTS, *gc.get_threshold()[1:])
@@ -93,4 +118,7 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # names of files need not be text
-    sys.exit(exit_code(lambda: app(spread(sys.argv[1:]), standalone_mode=False)))
+    words = spread(sys.argv[1:])
+    completes = COMPLETION in os.environ
+    run = application(None if completes else words)
+    sys.exit(exit_code(lambda: run(words, standalone_mode=False)))

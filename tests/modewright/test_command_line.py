@@ -8,9 +8,10 @@ import sys
 from pathlib import Path
 
 import pytest
+import typer
 
 import modewright as mw
-from modewright.cli import COMMANDS, app
+from modewright.cli import COMMANDS, app, application
 from modewright.exits import exit_code
 
 ROOT = Path(__file__).parent.parent.parent
@@ -40,6 +41,28 @@ def test_help_loads_no_heavy_module() -> None:
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert "Usage: modewright" in done.stdout
     assert [name for name in HEAVY if f"'{name}'" in done.stderr] == []
+
+
+def test_main_has_the_help_of_the_whole_application(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("--help") == 0
+    whole = capsys.readouterr().out.split("Usage: ")[1].split(" ", 1)[1]
+    done = subprocess.run(
+        [sys.executable, "-m", "modewright", "--help"], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.split("Usage: ")[1].split(" ", 1)[1].split("\n")[2:] == whole.split("\n")[2:]
+
+
+def test_a_command_is_whole_wherever_its_name_is_among_the_words() -> None:
+    assert [len(params_of(name)) for name in ("check", "simulate", "graph")] == [0, 0, 0]
+    assert len(params_of("check", "--log-file", "check", "simulate")) > 3
+    assert len(params_of("simulate", "--log-file", "check", "simulate")) > 3
+    assert len(params_of("graph", "--log-file", "check", "simulate")) == 0
+
+
+def params_of(name: str, *words: str) -> list[object]:
+    """Return the parameters (but --help) of a command of the application made for some words."""
+    group = typer.main.get_command(application(words))
+    return [p for p in group.commands[name].params if p.name != "help"]  # type: ignore[attr-defined]
 
 
 def test_importing_the_package_loads_nothing_until_a_name_is_used() -> None:
