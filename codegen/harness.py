@@ -21,6 +21,18 @@ INCLUDED = ("harness.h", "cortex_m4f.h")
 
 
 @dataclass(frozen=True)
+class Main:
+    """A main around a program: its template, and the files of the harness that only it needs."""
+
+    template: str
+    files: tuple[str, ...] = ()
+
+
+LOCKSTEP = Main("lockstep_main.c.jinja")
+"""Writes all that the program carries after each tick."""
+
+
+@dataclass(frozen=True)
 class Observed:
     """A variable that the executable writes after each tick: its name and its kind."""
 
@@ -62,16 +74,19 @@ def tunable(program: Program) -> tuple[Constant, ...]:
     )
 
 
-def write_harness(program: Program, folder: Path, machine: Machine = HOST) -> list[Path]:
+def write_harness(
+    program: Program, folder: Path, machine: Machine = HOST, main: Main = LOCKSTEP
+) -> list[Path]:
     """Write the C files of a program and a main around them; return the sources to compile."""
     (folder / "harness").mkdir(exist_ok=True)
-    for name in (*INCLUDED, *machine.files):
+    own = (*machine.files, *main.files)
+    for name in (*INCLUDED, *own):
         shutil.copyfile(harness_file(name), folder / "harness" / name)
     files = c_files(program)
-    files["main.c"] = render("lockstep_main.c.jinja", harness_context(program))
+    files["main.c"] = render(main.template, _context(program))
     for name, text in files.items():
         (folder / name).write_text(text)
-    names = (*files, *(f"harness/{name}" for name in machine.files))
+    names = (*files, *(f"harness/{name}" for name in own))
     return [folder / name for name in names if name.endswith(".c")]
 
 
@@ -81,11 +96,12 @@ def executable(
     flags: Sequence[str] = FLAGS,
     named: str | None = None,
     machine: Machine = HOST,
+    main: Main = LOCKSTEP,
 ) -> Iterator[Path]:
     """Give the compiled harness of a program, kept from an earlier run if there was one."""
     with tempfile.TemporaryDirectory(prefix="modewright-") as name:
         folder = Path(name)
-        sources = write_harness(program, folder, machine)
+        sources = write_harness(program, folder, machine, main)
         command, link = machine.command(named), machine.link(folder / "harness")
         version = compiler_version(command[0])
         key = key_of(sources, [*command, *flags, *WARNINGS, *machine.link(Path())], version)
@@ -93,7 +109,7 @@ def executable(
         yield stored(key, lambda target: linked(words, target), folder)
 
 
-def harness_context(program: Program) -> Mapping[str, object]:
+def _context(program: Program) -> Mapping[str, object]:
     """Return what a main around a program needs to know: inputs, tunables and what is compared."""
     program = stepped(program)
     place, real = CNames(program), REAL[program.number]

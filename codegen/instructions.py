@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import shutil
 import struct
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 
-from codegen.build import FLAGS, WARNINGS, linked
-from codegen.harness import harness_context, write_harness
-from codegen.machine import CORTEX_M4F, emulated, harness_file
-from codegen.rendering import render
+from codegen.build import FLAGS
+from codegen.harness import Main, executable
+from codegen.machine import CORTEX_M4F, emulated
 from language.program import Program
 
-FILES = ("instructions.h", "instructions.c")
+MAIN = Main("instructions_main.c.jinja", ("instructions.h", "instructions.c"))
 COUNTING = ("-icount", "shift=0")
 """Of the emulator: one instruction takes 1 ns."""
 
@@ -44,15 +40,6 @@ def instructions(program: Program, records: bytes, flags: Sequence[str] = FLAGS)
 
     QEMU tells what a step executes, not what it waits for. Raises ToolMissing, BuildError.
     """
-    with tempfile.TemporaryDirectory(prefix="modewright-") as name:
-        folder = Path(name)
-        sources = write_harness(program, folder, CORTEX_M4F)
-        for file in FILES:
-            shutil.copyfile(harness_file(file), folder / "harness" / file)
-        text = render("instructions_main.c.jinja", harness_context(program))
-        (folder / "main.c").write_text(text)
-        sources.append(folder / "harness" / "instructions.c")
-        words = [*CORTEX_M4F.command(None), *flags, *WARNINGS, *map(str, sources)]
-        linked([*words, *CORTEX_M4F.link(folder / "harness")], folder / "steps")
-        found = emulated(folder / "steps", records, COUNTING)
+    with executable(program, flags, machine=CORTEX_M4F, main=MAIN) as steps:
+        found = emulated(steps, records, COUNTING)
     return Instructions(struct.unpack(f"<{len(found) // 8}q", found))

@@ -9,15 +9,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from codegen.build import FLAGS, BuildError
+from codegen.build import FLAGS
 from codegen.machine import CORTEX
-from codegen.proofs.proof import told
 from codegen.proofs.stack import stack_of
 from codegen.source import c_files
-from codegen.tool import ARM_COMPILER
+from codegen.tool import ARM_COMPILER, ARM_SIZE, output_of
 from language.program import Program
 
-SIZE = "arm-none-eabi-size"
 STRUCTURES = ("Self", "In", "Out")
 PROBE = "const char of_{structure}[sizeof({name}_{structure})] = {{0}};\n"
 SECTION = re.compile(r"^(\.[\w.]+)\s+(\d+)\s+\d+", re.MULTILINE)
@@ -85,16 +83,9 @@ def metrics(program: Program) -> Metrics:
 
 def _sections(folder: Path, sources: Sequence[str]) -> Counter[str]:
     """Return the bytes of each section of all sources together."""
-    _done([ARM_COMPILER, *CORTEX, *FLAGS, "-fdata-sections", "-c", *sources], folder)
+    output_of([ARM_COMPILER, *CORTEX, *FLAGS, "-fdata-sections", "-c", *sources], folder)
     objects = [f"{Path(source).stem}.o" for source in sources]
     found: Counter[str] = Counter()
-    for line in SECTION.finditer(_done([SIZE, "-A", "-d", *objects], folder)):
+    for line in SECTION.finditer(output_of([ARM_SIZE, "-A", "-d", *objects], folder)):
         found[line[1]] += int(line[2])
     return found
-
-
-def _done(command: Sequence[str], folder: Path) -> str:
-    done = told(command, folder)
-    if done.returncode:
-        raise BuildError(done.stderr.strip() or f"{command[0]} ended with {done.returncode}")
-    return done.stdout

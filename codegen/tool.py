@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+import os
 import shutil
-from collections.abc import Mapping
+import subprocess
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 
+from codegen.build import BuildError
 from language.missing import ToolMissing
 
 ARM_COMPILER = "arm-none-eabi-gcc"
+ARM_SIZE = "arm-none-eabi-size"
 EMULATOR = "qemu-system-arm"
+SECONDS = 900
+"""Longest run of a tool before it is given up."""
 PACKAGES: Mapping[str, str] = {
     "gcc": "gcc libc6-dev",
     "clang-19": "clang-19",
     ARM_COMPILER: "gcc-arm-none-eabi libnewlib-arm-none-eabi",
+    ARM_SIZE: "binutils-arm-none-eabi",
     EMULATOR: "qemu-system-arm",
     "cppcheck": "cppcheck",
     "frama-c": "frama-c-base",
@@ -26,3 +34,28 @@ def needed(tool: str) -> str:
         package = PACKAGES.get(tool, tool)
         raise ToolMissing(f"`{tool}` is missing: apt-get install {package}")
     return tool
+
+
+def told(command: Sequence[str], folder: Path) -> subprocess.CompletedProcess[str]:
+    """Run a tool in a folder. Raises ToolMissing, BuildError."""
+    tool, *words = command
+    try:
+        return subprocess.run(
+            [needed(tool), *words],
+            cwd=folder,
+            env=os.environ | {"PWD": str(folder)},
+            capture_output=True,
+            text=True,
+            timeout=SECONDS,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        raise BuildError(f"{tool} was not done after {SECONDS} s") from None
+
+
+def output_of(command: Sequence[str], folder: Path) -> str:
+    """Return what a tool prints. Raises ToolMissing; BuildError with what it said."""
+    done = told(command, folder)
+    if done.returncode:
+        raise BuildError(done.stderr.strip() or f"{command[0]} ended with {done.returncode}")
+    return done.stdout

@@ -45,11 +45,7 @@ def trace(
     names = {name for document in documents for name in (document.name, *_of(document, project))}
     tests = [test for test in load_tests(tests_of(root), root) if names & _used(test, project)]
     verdicts = [_verdicts(test) if run else {} for test in tests]
-    code = {
-        document.name: c_files(program_of(automaton_of(document, project)))
-        for document, each in zip(documents, made, strict=True)
-        if each.kind == "automaton"
-    }
+    code = _code(documents, project)
     return traced(made, code, zip(tests, verdicts, strict=True), requirements(listed))
 
 
@@ -72,11 +68,8 @@ def trace_keys(specs: Sequence[str], root: Path | None = None) -> TracedKeys:
     named = {read_document(project.path_of(spec)).name for spec in specs}
     made = [_whole(document, project) for document in documents]
     systems = {document.name for document in made if document.kind == "system"}
-    code = {
-        document.name: c_files(program_of(automaton_of(document, project)))
-        for document, each in zip(documents, made, strict=True)
-        if each.kind == "automaton" and (document.name in named or named & systems)
-    }
+    meant = documents if named & systems else [d for d in documents if d.name in named]
+    code = _code(meant, project)
     found = keys_traced(made, code)
     files = dict.fromkeys(key.place.source.name for key in found.keys)
     every = {name: text for files in code.values() for name, text in files.items()}
@@ -127,6 +120,15 @@ def _whole(document: Document, project: Project) -> Document:
     if made.kind != "automaton":
         return made
     return dataclasses.replace(made, root=with_instances(made.root, project, Problems()))
+
+
+def _code(documents: Sequence[Document], project: Project) -> dict[str, dict[str, str]]:
+    """Return the C files of those documents that are automata."""
+    return {
+        document.name: c_files(program_of(automaton_of(document, project)))
+        for document in documents
+        if expanded(document, project).kind == "automaton"
+    }
 
 
 def _of(document: Document, project: Project) -> Iterator[str]:

@@ -90,6 +90,18 @@ def test_every_file_that_a_page_names_exists(page: str) -> None:
     assert missing == []
 
 
+def test_every_name_of_the_walkthrough_is_in_the_code_that_it_walks_through() -> None:
+    page = (ROOT / "docs" / "walkthrough.md").read_text()
+    folder = ROOT / "generated" / "ev_driveline"
+    files = ("estimator.c", "estimator.h", "ha_math.c")
+    code = "".join((folder / file).read_text() for file in files)
+    named = re.findall(r"`([A-Za-z_][\w.]*(?:->\w+)?\*?)`", page)
+    assert len(named) > 30
+    beside = {*files, "equations"}
+    missing = [name for name in named if name.rstrip("*") not in code and name not in beside]
+    assert missing == []
+
+
 def test_the_architecture_page_is_short_enough_to_be_read() -> None:
     assert len((ROOT / "docs" / "ARCHITECTURE.md").read_text().splitlines()) <= 120
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -191,8 +192,9 @@ def _methods(found: Description, number: NumberType) -> dict[Conversion, dict[st
         if conversion in methods:
             continue
         name = f"names.{_word(path)}" if conversion.names else f"unit.{_word(conversion.unit)}"
+        name = "names.truth" if conversion == TRUTH else name
         methods[conversion] = {
-            "name": "names.truth" if conversion == TRUTH else name,
+            "name": _unlike(name, {method["name"] for method in methods.values()}),
             "about": safe(conversion.unit or ", ".join(text for _, text in conversion.names)),
             "unit": safe(conversion.unit),
             "factor": repr(conversion.factor),
@@ -205,7 +207,14 @@ def _methods(found: Description, number: NumberType) -> dict[Conversion, dict[st
 def _word(text: str) -> str:
     """Return a unit or path as a word: `rad/s` as rad_per_s."""
     words = text.replace("/", "_per_").replace("*", "_").replace(".", "_").replace("^-", "_m")
-    return re.sub(r"\W", "", words) or "none"
+    word = re.sub(r"\W", "", words) or "none"
+    return f"_{word}" if word[0].isdigit() else word
+
+
+def _unlike(name: str, taken: Collection[str]) -> str:
+    """Return a name that is not taken: with a number behind it where it is."""
+    numbered = (f"{name}_{k}" for k in count(2))
+    return name if name not in taken else next(one for one in numbered if one not in taken)
 
 
 def _layouts(found: Description) -> list[dict[str, str]]:

@@ -8,7 +8,8 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
-from codegen.proofs.proof import Proof, told, version_of
+from codegen.proofs.proof import Proof, version_of
+from codegen.tool import told
 from language.missing import ToolMissing
 
 DEVIATIONS = {

@@ -2,17 +2,10 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from codegen.build import BuildError
-from codegen.tool import needed
-
-SECONDS = 900
-"""Longest run of a tool before it is given up."""
+from codegen.tool import told
 
 
 @dataclass(frozen=True)
@@ -31,23 +24,6 @@ class Proof:
     def holds(self) -> bool:
         """Tell whether nothing was found."""
         return not self.findings
-
-
-def told(command: Sequence[str], folder: Path) -> subprocess.CompletedProcess[str]:
-    """Run a tool in a folder. Raises ToolMissing, BuildError."""
-    tool, *words = command
-    try:
-        return subprocess.run(
-            [needed(tool), *words],
-            cwd=folder,
-            env=os.environ | {"PWD": str(folder)},
-            capture_output=True,
-            text=True,
-            timeout=SECONDS,
-            check=False,
-        )
-    except subprocess.TimeoutExpired:
-        raise BuildError(f"{tool} was not done after {SECONDS} s") from None
 
 
 def version_of(tool: str, folder: Path) -> str:

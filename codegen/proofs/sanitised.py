@@ -13,7 +13,8 @@ from pathlib import Path
 from codegen.build import FLAGS, BuildError
 from codegen.harness import fed, write_harness
 from codegen.names import c_type
-from codegen.proofs.proof import SECONDS, Proof, told, version_of
+from codegen.proofs.proof import Proof, version_of
+from codegen.tool import SECONDS, output_of
 from language.program import Program, Variable
 
 SANITIZERS = (
@@ -31,9 +32,7 @@ def sanitised(program: Program, folder: Path) -> Proof:
     sources = write_harness(program, folder)
     flags = [flag for flag in FLAGS if flag != "-O2"]
     command = ["gcc", *flags, "-g", "-O1", *SANITIZERS, *map(str, sources), "-o", "app", "-lm"]
-    done = told(command, folder)
-    if done.returncode:
-        raise BuildError(done.stderr.strip() or f"gcc ended with {done.returncode}")
+    output_of(command, folder)
     tool, about = f"gcc {version_of('gcc', folder)}", f"{STEPS} steps on random inputs"
     return Proof("sanitizers", tool, about, _complaints(folder / "app", _records(program)))
 

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from codegen.build import FLAGS, BuildError
 from codegen.machine import CORTEX
-from codegen.proofs.proof import Proof, told, version_of
-from codegen.tool import ARM_COMPILER
+from codegen.proofs.proof import Proof, version_of
+from codegen.tool import ARM_COMPILER, output_of
 
 LIMIT = 256
 """Bytes that a step may take."""
@@ -54,9 +54,7 @@ class Stack:
 
 def stack_of(folder: Path, sources: Sequence[str], entry: str) -> Stack:
     """Compile for a Cortex-M4F and add up what a function takes. Raises ToolMissing, BuildError."""
-    done = told([ARM_COMPILER, *CORTEX, *FLAGS, "-fcallgraph-info=su", "-c", *sources], folder)
-    if done.returncode:
-        raise BuildError(done.stderr.strip() or f"{ARM_COMPILER} ended with {done.returncode}")
+    output_of([ARM_COMPILER, *CORTEX, *FLAGS, "-fcallgraph-info=su", "-c", *sources], folder)
     calls = _read("\n".join((folder / f"{Path(s).stem}.ci").read_text() for s in sources))
     if entry not in calls.sizes:
         raise BuildError(f"{entry} is not in the compiled code")

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from codegen.build import FLAGS, WARNINGS
-from codegen.proofs.proof import Proof, told, version_of
+from codegen.proofs.proof import Proof, version_of
+from codegen.tool import told
 
 COMPILERS = ("gcc", "clang-19")
 

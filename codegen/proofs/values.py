@@ -11,9 +11,10 @@ from pathlib import Path
 from codegen.expression import literal
 from codegen.harness import fed, tunable
 from codegen.names import REAL, CNames, c_type
-from codegen.proofs.proof import Proof, told, version_of
+from codegen.proofs.proof import Proof, version_of
 from codegen.rendering import render
 from codegen.source import c_files, stepped
+from codegen.tool import told
 from language.number import LARGEST
 from language.program import Constant, Program, Variable
 

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from modewright.commands.options import Calibrations, Sets, values_of
-from modewright.console import announce
+from modewright.console import announce, console
 from modewright.files import OutputError, require_writable, write_files
 
 
@@ -44,3 +44,14 @@ def a2l(
         raise OutputError(str(error)) from None
     write_files({out: text.encode("ascii")})
     announce([out])
+    if lacks := _lacking(text, elf):
+        console().print(lacks, highlight=False, soft_wrap=True, markup=False)
+
+
+def _lacking(text: str, elf: Path | None) -> str:
+    """Return what an A2L has no addresses of, and why."""
+    if elf is None:
+        return "it has no addresses: link the C with -g and name the program by --elf"
+    if "/begin MEASUREMENT" in text and "ECU_ADDRESS" not in text:
+        return f"its measurements have no addresses: {elf} has no instance of the automaton"
+    return ""

@@ -9,7 +9,7 @@ from pathlib import Path
 import pya2l.model as model
 import pytest
 
-from codegen.asam.a2l import Located, a2l, located
+from codegen.asam.a2l import Located, _unlike, a2l, located
 from codegen.asam.description import described
 from codegen.asam.image import ImageError
 from codegen.exchange.page import page_constants, page_name
@@ -208,6 +208,33 @@ def test_another_layout_is_told(tmp_path: Path) -> None:
     torn = type(where.instance)("self", 0, {**where.instance.members, "faults": (0, 8)})
     with pytest.raises(ImageError, match=r"self\.faults has 8 bytes"):
         a2l(used, Located(where.image, where.page, torn))
+
+
+def test_names_of_conversions_are_words_and_differ(tmp_path: Path) -> None:
+    spec = MAPS.replace("  gain:", "  slow: {value: 2 1/s^2, tunable: true}\n  gain:")
+    spec = spec.replace("T: gain *", "T: slow / 2 1/s^2 *")
+    with read(text_of(program(spec)), tmp_path) as session:
+        names = list(every(session, "CompuMethod"))
+    assert "unit._1_per_s2" in names and len(set(names)) == len(names)
+    assert all(part.isidentifier() for name in names for part in name.split("."))
+    taken = ("unit.m", "unit.m_2")
+    assert [_unlike("unit.m", taken[:k]) for k in range(3)] == ["unit.m", "unit.m_2", "unit.m_3"]
+
+
+HIDDEN = "static char raw[4096]; static {name}_Cal page;\n#define self (*({name}_Self *)raw)"
+
+
+def test_the_command_says_what_has_no_address(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    used, out = shipped("contactor"), str(tmp_path / "contactor.a2l")
+    assert run("a2l", "contactor", "--out", out) == 0
+    assert "it has no addresses: link the C with -g" in capsys.readouterr().out
+    words = ("a2l", "contactor", "--out", out, "--page", "page", "--elf")
+    assert run(*words, str(linked(used, described(used), tmp_path))) == 0
+    assert "address" not in capsys.readouterr().out
+    assert run(*words, str(linked(used, described(used), tmp_path, declared=HIDDEN))) == 0
+    assert "its measurements have no addresses" in capsys.readouterr().out
 
 
 def test_the_command_writes_it(tmp_path: Path) -> None:

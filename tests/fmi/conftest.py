@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from fractions import Fraction
 from functools import cache
 from pathlib import Path
@@ -13,7 +13,7 @@ from codegen.fmi.archive import fmu
 from codegen.fmi.variable import VERSIONS, Version
 from lockstep.compare import Tape
 from modewright.api import program
-from tests.fmi.importer import Unpacked, unpacked
+from tests.fmi.importer import Importer, Unpacked, unpacked
 from tests.target.closed_loop import driveline, supervisor
 
 Ready = Callable[[str, Version], Unpacked]
@@ -51,3 +51,18 @@ def tapes() -> dict[str, Tape]:
         "estimator_float32": single["est"],
         "supervisor": supervisor("float32", Fraction(21))["sup"],
     }
+
+
+@pytest.fixture
+def importer(version: Version, ready: Ready) -> Iterator[Importer]:
+    """An instance of the estimator before initialization mode."""
+    made = Importer(ready("estimator", version))
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def stepping(importer: Importer) -> Importer:
+    """The same after initialization mode."""
+    importer.start({"y_em": 81.0, "y_w": 10.0}, stop=1.0)
+    return importer

@@ -22,10 +22,9 @@ from codegen.build import (
 )
 from codegen.harness import write_harness
 from codegen.source import c_files
-from engine.simulate import simulate
 from language.number import NUMBERS, NumberType, decimal
-from language.program import Program
 from language.system import in_numbers
+from lockstep import taping
 from lockstep.compare import Tape, compare
 from modewright.api import load, program
 from tests.lockstep.programs import taped
@@ -59,15 +58,8 @@ def tapes(request: pytest.FixtureRequest) -> dict[str, Tape]:
     narrow = in_numbers(loaded.system, request.param).instances
     instances = {**narrow, "plant": loaded.system.instances["plant"]}
     system = dataclasses.replace(loaded.system, instances=instances)
-    found: dict[str, Tape] = {}
-
-    def ticked(name: str, used: Program, stepper: object) -> None:
-        found[used.name] = found.get(used.name) or Tape(used, name)
-        found[used.name].record(stepper)  # type: ignore[arg-type]
-
     scenario = dataclasses.replace(loaded.scenario, horizon=Fraction(9, 10))
-    simulate(system, scenario, ticked=ticked)
-    return found
+    return {tape.program.name: tape for tape in taping.taped(system, scenario)[1].values()}
 
 
 @pytest.fixture(params=NUMBERS)

@@ -15,6 +15,7 @@ from language.problem import SpecError
 from language.program import Program
 from language.system import in_numbers
 from lockstep.compare import Tape, compare
+from lockstep.taping import taped
 from modewright.api import load, lockstep
 from tests.lockstep.heater import column
 
@@ -24,25 +25,17 @@ TURNED = 517
 TUNED = {"J_em": 0.051, "k_hs": 5000.0, "c_hs": 16.0, "sd_em": 0.25, "q_w": 31.0}
 
 
-def taped(number: NumberType) -> Tape:
+def estimator(number: NumberType) -> Tape:
     """Return the estimator's tape in a number type."""
     loaded = load("tuned", "retuned", root=ROOT)
-    found: list[Tape] = []
-
-    def ticked(name: str, used: Program, stepper: object) -> None:
-        if name == "est":
-            if not found:
-                found.append(Tape(used, name))
-            found[0].record(stepper)  # type: ignore[arg-type]
-
-    system = in_numbers(loaded.system, number)
-    assert simulate(system, loaded.scenario, ticked=ticked).stopped is None
-    return found[0]
+    run, tapes = taped(in_numbers(loaded.system, number), loaded.scenario)
+    assert run.stopped is None
+    return tapes["est"]
 
 
 @pytest.mark.parametrize("number", NUMBERS)
 def test_both_sides_turn_the_page_at_the_same_tick(number: NumberType) -> None:
-    tape = taped(number)
+    tape = estimator(number)
     verdict = compare(tape)
     assert verdict.is_equal, str(verdict.first)
     assert verdict.ticks == 701 and verdict.transitions == 5
@@ -56,7 +49,7 @@ def test_both_sides_turn_the_page_at_the_same_tick(number: NumberType) -> None:
 
 @pytest.mark.parametrize("number", NUMBERS)
 def test_what_follows_is_derived_anew_and_stale_numbers_set_their_fault(number: NumberType) -> None:
-    tape = taped(number)
+    tape = estimator(number)
     derived = column(tape, "equation.w_free"), column(tape, "state.theta_d")
     twist = zip(*derived, column(tape, "state.theta_b"), strict=True)
     for tick, (free, theta_d, theta_b) in enumerate(twist):
@@ -79,7 +72,7 @@ def test_c_that_does_not_compare_stamps_is_found(monkeypatch: pytest.MonkeyPatch
         return files
 
     monkeypatch.setattr("codegen.harness.c_files", without)
-    found = compare(taped("float64")).first
+    found = compare(estimator("float64")).first
     assert found and (found.tick, found.signal) == (TURNED, "faults")
 
 

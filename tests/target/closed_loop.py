@@ -8,11 +8,10 @@ from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
 
-from engine.simulate import simulate
 from language.number import NumberType
-from language.program import Program
 from language.system import in_numbers
 from lockstep.compare import Tape
+from lockstep.taping import taped
 from modewright.api import load
 
 TICK = Fraction(1, 100)
@@ -68,13 +67,6 @@ def _run(
         path = Path(folder) / "scenario_long.yaml"
         path.write_text("\n".join([*lines, ""]))
         loaded = load(system, str(path))
-    tapes: dict[str, Tape] = {}
-
-    def ticked(name: str, used: Program, stepper: object) -> None:
-        if name in instances:
-            tapes[name] = tapes.get(name) or Tape(used, name)
-            tapes[name].record(stepper)  # type: ignore[arg-type]
-
-    run = simulate(in_numbers(loaded.system, number), loaded.scenario, ticked=ticked)
+    run, tapes = taped(in_numbers(loaded.system, number), loaded.scenario)
     assert run.stopped is None, run.stopped
-    return tapes
+    return {name: tapes[name] for name in instances}

@@ -11,18 +11,19 @@ from functools import partial
 from pathlib import Path
 
 from codegen.build import FLAGS, WARNINGS, linked
-from codegen.harness import fed, write_harness
+from codegen.harness import LOCKSTEP, fed, write_harness
+from codegen.instructions import COUNTING, MAIN
 from codegen.machine import CORTEX_M4F, HOST, Machine, emulated
 from lockstep.compare import Tape
 
 HERE = Path(__file__).parent
-COUNTING = ("-icount", "shift=0")
-"""Of the emulator: one instruction takes 1 ns."""
 RUN: dict[str, Callable[[Path, bytes], bytes]] = {
     HOST.name: HOST.run,
     CORTEX_M4F.name: partial(emulated, options=COUNTING),
 }
 CLOCK = {HOST.name: "clock_host.c", CORTEX_M4F.name: "clock_target.c"}
+MAINS = {HOST.name: LOCKSTEP, CORTEX_M4F.name: MAIN}
+"""Around both is a main of our own: of these the files are used."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,8 @@ def duel(
         folder = Path(name)
         own = [HERE / f"{twin}_twin.c", HERE / f"{twin}_sides.c", HERE / "duel.c"]
         own.append(HERE / CLOCK[machine.name])
-        sources = [p for p in write_harness(tape.program, folder, machine) if p.name != "main.c"]
+        written = write_harness(tape.program, folder, machine, MAINS[machine.name])
+        sources = [path for path in written if path.name != "main.c"]
         for path in (*own, HERE / "duel.h", HERE / f"{twin}_twin.h"):
             shutil.copyfile(path, folder / path.name)
         sources += [folder / path.name for path in own]
