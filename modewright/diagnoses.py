@@ -29,6 +29,7 @@ from language.model import Automaton
 from language.project import Project, expanded, read_document, shown
 from modewright.files import OutputError, make_folder, remove_files, write_files
 from modewright.recordings import CheckedRecordings, check_recordings, held_out_findings
+from modewright.threads import OneThread
 
 Tell = Callable[[str], None]
 KEPT = "kept"
@@ -71,6 +72,7 @@ class _Budget:
         return time.monotonic() - self.begun
 
 
+@OneThread()
 def diagnose(
     spec: str,
     train: Sequence[str | Path],
@@ -266,6 +268,7 @@ def _candidates(folder: str | Path | None, project: Project) -> tuple[Effect, ..
     return found
 
 
+@OneThread()
 def fit(
     spec: str,
     train: Sequence[str | Path],
