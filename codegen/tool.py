@@ -18,7 +18,7 @@ SECONDS = 900
 """Longest run of a tool before it is given up."""
 PACKAGES: Mapping[str, str] = {
     "gcc": "gcc libc6-dev",
-    "clang-19": "clang-19",
+    "clang-19": "clang-19 libclang-rt-19-dev",
     ARM_COMPILER: "gcc-arm-none-eabi libnewlib-arm-none-eabi",
     ARM_SIZE: "binutils-arm-none-eabi",
     EMULATOR: "qemu-system-arm",

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
         import_calibration,
         resolve_calibration,
     )
-    from modewright.code import a2l, fmu, generate, metrics, prove
+    from modewright.code import a2l, fmu, fuzz, generate, metrics, prove
     from modewright.diagnoses import diagnose, fit, save_diagnosis
     from modewright.diagram import Diagram, graph
     from modewright.recordings import CheckedRecordings, check_recordings
@@ -61,6 +61,7 @@ __all__ = [
     "export_calibration",
     "fit",
     "fmu",
+    "fuzz",
     "generate",
     "graph",
     "import_calibration",
@@ -103,6 +104,7 @@ PLACES = {
     "Verdict": "lockstep.compare",
     "a2l": "modewright.code",
     "fmu": "modewright.code",
+    "fuzz": "modewright.code",
     "generate": "modewright.code",
     "metrics": "modewright.code",
     "prove": "modewright.code",

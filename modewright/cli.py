@@ -27,6 +27,7 @@ from modewright.commands.explain import explain
 from modewright.commands.fit import fit
 from modewright.commands.fmu import fmu
 from modewright.commands.format import format
+from modewright.commands.fuzz import fuzz
 from modewright.commands.generate import generate
 from modewright.commands.graph import graph
 from modewright.commands.lockstep import lockstep
@@ -53,8 +54,8 @@ YOUNG_OBJECTS = 100_000
 """New objects after which garbage is looked for: trees of expressions have no circles."""
 COMMANDS = (
     new, check, test, trace, diagnose, fit, effects, simulate, sweep, lockstep, replay, plot,
-    compare, graph, generate, a2l, fmu, metrics, prove, explain, diff, format, schema, lsp, demo,
-    doctor,
+    compare, graph, generate, a2l, fmu, metrics, prove, fuzz, explain, diff, format, schema, lsp,
+    demo, doctor,
 )  # fmt: skip
 
 

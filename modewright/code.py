@@ -17,11 +17,13 @@ from codegen.proofs.proof import Proof
 from codegen.source import c_files
 from language.limit import require_ranges
 from language.load import automaton_of, program_of
+from language.model import Automaton
 from language.number import NumberType
 from language.program import Program
 from language.project import Project
 from language.system import in_numbers
 from lockstep.compare import MOST_COUNTED
+from lockstep.fuzzing import RUNS, SEED, TICKS, Fuzzed, fuzz as fuzzed
 from lockstep.taping import taped
 from modewright.api import load
 from modewright.documents import Values, calibrated_document, scalars
@@ -96,6 +98,28 @@ def prove(
     yield from proofs(_generated(reference, values, root, calibrations), checks)
 
 
+def fuzz(
+    reference: str,
+    runs: int = RUNS,
+    ticks: int = TICKS,
+    seed: int = SEED,
+    values: Values | None = None,
+    root: Path | None = None,
+    calibrations: Sequence[str] = (),
+    numbers: NumberType | None = None,
+) -> Fuzzed:
+    """Try `runs` sequences of at most so many `ticks` on the C of an automaton and on the engine.
+
+    Raises SpecError, ValueError for a continuous automaton, ToolMissing, BuildError.
+    """
+    automaton, program = _made(reference, values, root, calibrations, numbers)
+    if not automaton.is_sampled:
+        raise ValueError(f"{automaton.name} is continuous: sequences are those of sampled automata")
+    ends = {name: one.range for name, one in automaton.inputs.items() if one.range}
+    ranges = {name: (float(low), float(high)) for name, (low, high) in ends.items()}
+    return fuzzed(program, ranges, runs, ticks, seed)
+
+
 def metrics(
     reference: str,
     values: Values | None = None,
@@ -141,6 +165,17 @@ def _generated(
     numbers: NumberType | None = None,
 ) -> Program:
     """Return the Program that C is made of."""
+    return _made(reference, values, root, calibrations, numbers)[1]
+
+
+def _made(
+    reference: str,
+    values: Values | None,
+    root: Path | None,
+    calibrations: Sequence[str],
+    numbers: NumberType | None,
+) -> tuple[Automaton, Program]:
+    """Return an automaton and the Program that C is made of."""
     project = Project(root or Path())
     document = calibrated_document(reference, project, calibrations)
     automaton = automaton_of(document, project, scalars(values))
@@ -148,4 +183,4 @@ def _generated(
         automaton = dataclasses.replace(automaton, numbers=numbers)
     if automaton.is_sampled:
         require_ranges(automaton)
-    return program_of(automaton)
+    return automaton, program_of(automaton)

@@ -15,6 +15,7 @@ from codegen.proofs.proof import Proof
 from engine.difference import ModeSequence, RunDifference
 from engine.trajectory import Event, Trajectory
 from lockstep.compare import Verdict
+from lockstep.fuzzing import Fuzzed
 from modewright.api import Replayed
 from modewright.doctor import Finding
 
@@ -106,6 +107,29 @@ def print_proofs(console: Console, proofs: Sequence[Proof]) -> None:
 def proof_json(proof: Proof) -> dict[str, Any]:
     """Return what a machine wants of a check of generated C."""
     return {**vars(proof), "findings": list(proof.findings), "holds": proof.holds}
+
+
+def print_fuzzed(console: Console, found: Fuzzed) -> None:
+    """Print what came of fuzzing: what was tried, and each thing that was found."""
+    console.print(
+        f"{found.program}: {found.distinct} different sequences of {found.runs}, "
+        f"{found.ticks} ticks, {found.transitions} transitions, {found.edges} edges of the C",
+        soft_wrap=True,
+        highlight=False,
+    )
+    console.print(f"modes: {', '.join(found.modes)}", soft_wrap=True, highlight=False)
+    for finding in found.findings:
+        console.print(f"sanitizers: {finding}", soft_wrap=True, highlight=False, markup=False)
+    told = f"; first: {found.first}" if found.first else ""
+    text = f"{found.differing} sequences differ from the engine{told}"
+    console.print(text, soft_wrap=True, highlight=False, markup=False)
+
+
+def fuzzed_json(found: Fuzzed) -> dict[str, Any]:
+    """Return what a machine wants of fuzzing."""
+    first = vars(found.first) if found.first else None
+    lists = {"modes": list(found.modes), "findings": list(found.findings)}
+    return {**vars(found), **lists, "first": first, "clean": found.is_clean}
 
 
 def trajectory_json(trajectory: Trajectory) -> dict[str, Any]:

@@ -1,0 +1,148 @@
+"""Fuzzing: sequences of inputs by which libFuzzer looks for every way through generated C.
+
+A sequence is bytes, one for each input of each tick: the place of its value in a table (`words`).
+The C runs under sanitizers and writes down each sequence with a sum of all that it carried.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+import struct
+import subprocess
+import tempfile
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from codegen.build import FLAGS, BuildError
+from codegen.harness import Main, fed, write_harness
+from codegen.names import c_type
+from codegen.proofs.sanitised import FOUND
+from codegen.tool import SECONDS, needed, output_of
+from language.number import LARGEST
+from language.program import Program, Variable, short
+
+FUZZER = "clang-19"
+SANITIZERS = (
+    "-fsanitize=fuzzer,address,undefined,float-divide-by-zero,float-cast-overflow",
+    "-fno-sanitize-recover=all",
+)
+WORDS, ABSOLUTE, SPREAD = 256, 96, 64
+"""Words of an input; those that are values, and how many of these are spread over its range. The
+others are changes: half of them small and smaller steps, as many none."""
+WITHOUT_RANGE = (-1000.0, 1000.0)
+LONGEST = 64
+"""Most ticks of a sequence that the C reads."""
+SEQUENCES = "sequences.bin"
+COVERED = re.compile(rb"cov: (\d+)")
+HEAD = struct.Struct("<II")
+Range = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Sequences:
+    """What libFuzzer tried: each sequence with the CRC-32 of its records, `edges` of the C that it
+    came along, and what sanitizers said.
+    """
+
+    tried: tuple[tuple[bytes, int], ...]
+    edges: int
+    findings: tuple[str, ...]
+
+
+def fuzzed(
+    program: Program, ranges: Mapping[str, Range], runs: int, ticks: int, seed: int
+) -> Sequences:
+    """Run libFuzzer on the C of a Program; `ranges` are those of inputs by name.
+
+    Raises ToolMissing, BuildError.
+    """
+    with tempfile.TemporaryDirectory(prefix="modewright-") as name:
+        folder = Path(name)
+        table = [words(v, program, ranges.get(short(v.name))) for v in fed(program)]
+        main = Main("fuzz_main.c.jinja")
+        sources = write_harness(program, folder, main=main)
+        (folder / "words.h").write_text(_words_header(table))
+        flags = [flag for flag in FLAGS if flag != "-O2"]
+        command = [FUZZER, *flags, "-O1", "-g", *SANITIZERS, *map(str, sources), "-o", "app", "-lm"]
+        output_of(command, folder)
+        (folder / "corpus").mkdir()
+        return _run(folder, runs, ticks * len(table), seed)
+
+
+def words(variable: Variable, program: Program, given: Range | None) -> tuple[float, ...]:
+    """Return what the bytes 0 to 255 mean for an input: values first, then changes of a real."""
+    if variable.type == "truth":
+        return (0.0, 1.0) * (WORDS // 2)
+    if variable.type == "whole":
+        is_byte = c_type(variable, program.number) == "uint8_t"
+        count = len(variable.values) or 8
+        odd = (count, count + 1, 255) if is_byte else (-1, count, -(2**31), 2**31 - 1)
+        usual = [k % count for k in range(WORDS - len(odd))]
+        return tuple(float(k) for k in (*usual, *odd))
+    low, high = given or WITHOUT_RANGE
+    span, most = high - low, LARGEST[program.number]
+    spread = [low + span * k / (SPREAD - 1) for k in range(SPREAD)]
+    edges = [math.nextafter(end, to) for end in (low, high) for to in (-math.inf, math.inf)]
+    special = [*edges, low - span, high + span, 0.0, -0.0, 1.0, -1.0, 5e-324, -1e-40, 1e30]
+    special += [most, -most, math.nan, math.inf, -math.inf]
+    special += [0.0] * (ABSOLUTE - SPREAD - len(special))
+    steps = [sign * span * 2.0 ** (-k / 2) for k in range(40) for sign in (1.0, -1.0)]
+    return (*spread, *special, *steps, *[0.0] * (WORDS - ABSOLUTE - len(steps)))
+
+
+def values_of(program: Program, table: list[tuple[float, ...]], sequence: bytes) -> Iterator[
+    list[float]
+]:  # fmt: skip
+    """Yield the inputs of each tick of a sequence, as the C reads them."""
+    real = [variable.type == "real" for variable in fed(program)]
+    last = [own[SPREAD // 2] for own in table]
+    for at in range(0, min(len(sequence) // len(table), LONGEST) * len(table), len(table)):
+        for k, byte in enumerate(sequence[at : at + len(table)]):
+            is_change = real[k] and byte >= ABSOLUTE
+            last[k] = last[k] + table[k][byte] if is_change else table[k][byte]
+        yield last
+
+
+def _run(folder: Path, runs: int, most: int, seed: int) -> Sequences:
+    command = [str(folder / "app"), f"-runs={runs}", f"-max_len={most}", f"-seed={seed}"]
+    command += ["-len_control=0", "-print_final_stats=0", "corpus"]
+    options = os.environ | {"ASAN_OPTIONS": "detect_leaks=0"}
+    needed(FUZZER)
+    try:
+        done = subprocess.run(
+            command, cwd=folder, capture_output=True, env=options, timeout=SECONDS
+        )
+    except subprocess.TimeoutExpired:
+        raise BuildError(f"the fuzzer was not done after {SECONDS} s") from None
+    lines = done.stderr.decode(errors="replace").splitlines()
+    told = [line.strip() for line in lines if any(word in line for word in FOUND)]
+    if done.returncode and not told:
+        told = [f"the fuzzer ended with {done.returncode}", *lines[-1:]]
+    edges = max((int(found) for found in COVERED.findall(done.stderr)), default=0)
+    data = (folder / SEQUENCES).read_bytes()
+    return Sequences(tuple(_tried(data)), edges, tuple(t.rpartition("/")[2] for t in told[:1]))
+
+
+def _tried(data: bytes) -> Iterator[tuple[bytes, int]]:
+    at = 0
+    while at < len(data):
+        size, checksum = HEAD.unpack_from(data, at)
+        at += HEAD.size
+        yield data[at : at + size], checksum
+        at += size
+
+
+def _words_header(table: list[tuple[float, ...]]) -> str:
+    """Return the table as C: hexadecimal digits of each double."""
+    rows = ",\n".join(f"    {{{', '.join(_literal(word) for word in own)}}}" for own in table)
+    sizes = f"#define ABSOLUTE {ABSOLUTE}\n#define FIRST {SPREAD // 2}\n#define LONGEST {LONGEST}\n"
+    return f"{sizes}static const double word[{len(table)}][{WORDS}] = {{\n{rows}\n}};\n"
+
+
+def _literal(value: float) -> str:
+    if math.isnan(value):
+        return "NAN"
+    return value.hex() if math.isfinite(value) else "-INFINITY" if value < 0.0 else "INFINITY"

@@ -1,0 +1,47 @@
+"""Command fuzz: sequences that libFuzzer finds, on generated C and on the engine."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from modewright.commands.options import Calibrations, Json, Numbers, Sets, values_of
+from modewright.console import console, working
+from modewright.exits import PROBLEMS
+
+
+def fuzz(
+    automaton: Annotated[str, typer.Argument(help="a sampled automaton: its name or file")],
+    runs: Annotated[int, typer.Option(min=1, help="how many sequences are tried")] = 20_000,
+    ticks: Annotated[int, typer.Option(min=1, max=64, help="the most of a sequence")] = 24,
+    seed: Annotated[int, typer.Option(min=1, help="of the fuzzer")] = 1,
+    numbers: Numbers = None,
+    sets: Sets = None,
+    calibrations: Calibrations = None,
+    as_json: Json = False,
+) -> None:
+    """Let libFuzzer look for every way through the C of an automaton, and compare with the engine.
+
+    The C runs under sanitizers; each sequence of inputs is done again by the engine, and every bit
+    that both carry has to be the same.
+
+    \b
+    modewright fuzz estimator
+    modewright fuzz supervisor --runs 200000 --json
+    """
+    from modewright import code, show
+
+    with working(f"trying {runs} sequences on {automaton}"):
+        try:
+            found = code.fuzz(
+                automaton, runs, ticks, seed, values_of(sets), None, calibrations or (), numbers
+            )
+        except ValueError as error:
+            raise typer.BadParameter(str(error), param_hint="AUTOMATON") from None
+    if as_json:
+        show.print_json(show.fuzzed_json(found))
+    else:
+        show.print_fuzzed(console(), found)
+    if not found.is_clean:
+        raise typer.Exit(PROBLEMS)

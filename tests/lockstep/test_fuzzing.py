@@ -1,0 +1,103 @@
+"""Fuzzing: what libFuzzer finds is the same in the engine; what is not is told."""
+
+from __future__ import annotations
+
+import json
+import math
+import shutil
+
+import pytest
+
+from codegen.fuzzing import ABSOLUTE, FUZZER, WORDS, values_of, words
+from codegen.harness import fed
+from codegen.source import c_files
+from language.program import Program
+from lockstep.fuzzing import fuzz
+from modewright import code
+from modewright.api import program
+from modewright.cli import app
+from modewright.exits import exit_code
+
+needs_fuzzer = pytest.mark.skipif(
+    not shutil.which(FUZZER), reason="no clang-19: make system-packages"
+)
+RUNS = 400
+
+
+@needs_fuzzer
+@pytest.mark.parametrize("name", ["contactor", "estimator_float32", "supervisor"])
+def test_engine_and_c_agree_on_what_is_found(name: str) -> None:
+    found = code.fuzz(name, RUNS)
+    assert found.is_clean, found
+    assert found.runs >= RUNS and found.distinct > RUNS / 2
+    assert found.ticks > found.distinct and found.transitions > 0 and found.edges > 10
+    assert len(found.modes) >= 2
+
+
+@needs_fuzzer
+@pytest.mark.parametrize(
+    ("name", "right", "wrong", "told"),
+    [
+        ("contactor", "self->faults = 0U;", "self->faults = 8U;", "`faults` is 0"),
+        ("estimator_simple", "latched.y_em - self", "latched.y_em + -0.5 * self", "in the engine"),
+    ],
+)
+def test_another_bit_is_found(
+    name: str, right: str, wrong: str, told: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    changed(name, right, wrong, monkeypatch)
+    found = fuzz(program(name), {}, RUNS)
+    assert not found.is_clean and found.differing > 0
+    assert told in str(found.first)
+
+
+@needs_fuzzer
+def test_a_store_beyond_its_array_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    place = "self->log[self->count_of_log"
+    changed("supervisor", f"{place}]", f"{place} + 24]", monkeypatch)
+    found = fuzz(program("supervisor"), {}, RUNS)
+    assert not found.is_clean and "out of bounds" in found.findings[0]
+
+
+def changed(name: str, right: str, wrong: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the C of an automaton be another one."""
+
+    def torn(made: Program) -> dict[str, str]:
+        files = c_files(made)
+        text = files[f"{name}.c"]
+        assert right in text
+        return {**files, f"{name}.c": text.replace(right, wrong)}
+
+    monkeypatch.setattr("codegen.harness.c_files", torn)
+
+
+def test_bytes_are_values_and_changes() -> None:
+    used = program("supervisor")
+    table = [words(v, used, (0.0, 500.0)) for v in fed(used)]
+    assert all(len(own) == WORDS for own in table)
+    names = [v.name for v in fed(used)]
+    volts, key = names.index("input.U_dc"), names.index("input.key")
+    assert table[volts][0] == 0.0 and table[volts][63] == 500.0
+    assert any(math.isnan(word) for word in table[volts][:ABSOLUTE])
+    assert {0.0, 1.0, 2.0, 3.0, 255.0} <= set(table[key])
+    ticks = [bytearray(len(table)) for _ in range(3)]
+    ticks[0][volts], ticks[1][volts], ticks[2][volts] = 63, ABSOLUTE + 2, 255
+    found = [list(tick) for tick in values_of(used, table, b"".join(map(bytes, ticks)) + b"\0")]
+    assert [tick[volts] for tick in found] == [500.0, 500.0 + 500.0 * 2**-0.5, found[1][volts]]
+
+
+@needs_fuzzer
+def test_the_command_tells_what_was_tried(capsys: pytest.CaptureFixture[str]) -> None:
+    words_of = ["fuzz", "contactor", "--runs", "300"]
+    assert exit_code(lambda: app(words_of, standalone_mode=False)) == 0
+    assert "0 sequences differ from the engine" in capsys.readouterr().out
+    assert exit_code(lambda: app([*words_of, "--json"], standalone_mode=False)) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["clean"] and found["modes"] == ["open", "shut"] and found["first"] is None
+
+
+def test_a_continuous_automaton_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(ValueError, match="driveline is continuous"):
+        code.fuzz("driveline", 10)
+    assert exit_code(lambda: app(["fuzz", "driveline"], standalone_mode=False)) == 2
+    assert "is continuous" in capsys.readouterr().err
