@@ -27,7 +27,7 @@ if TYPE_CHECKING:
         import_calibration,
         resolve_calibration,
     )
-    from modewright.code import a2l, fmu, fuzz, generate, metrics, prove
+    from modewright.code import a2l, dbc, fmu, fuzz, generate, metrics, prove
     from modewright.diagnoses import diagnose, fit, save_diagnosis
     from modewright.diagram import Diagram, graph
     from modewright.recordings import CheckedRecordings, check_recordings
@@ -57,6 +57,7 @@ __all__ = [
     "check",
     "check_recordings",
     "compare",
+    "dbc",
     "diagnose",
     "export_calibration",
     "fit",
@@ -103,6 +104,7 @@ PLACES = {
     "Trajectory": "engine.trajectory",
     "Verdict": "lockstep.compare",
     "a2l": "modewright.code",
+    "dbc": "modewright.code",
     "fmu": "modewright.code",
     "fuzz": "modewright.code",
     "generate": "modewright.code",

@@ -18,6 +18,7 @@ from modewright.commands.a2l import a2l
 from modewright.commands.calibration import calibration
 from modewright.commands.check import check
 from modewright.commands.compare import compare
+from modewright.commands.dbc import dbc
 from modewright.commands.demo import demo
 from modewright.commands.diagnose import diagnose
 from modewright.commands.diff import diff
@@ -54,8 +55,8 @@ YOUNG_OBJECTS = 100_000
 """New objects after which garbage is looked for: trees of expressions have no circles."""
 COMMANDS = (
     new, check, test, trace, diagnose, fit, effects, simulate, sweep, lockstep, replay, plot,
-    compare, graph, generate, a2l, fmu, metrics, prove, fuzz, explain, diff, format, schema, lsp,
-    demo, doctor,
+    compare, graph, generate, a2l, dbc, fmu, metrics, prove, fuzz, explain, diff, format, schema,
+    lsp, demo, doctor,
 )  # fmt: skip
 
 

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from codegen.asam import a2l as asam
+from codegen.can_database import FIRST, dbc as dbc_of
 from codegen.cmake import cmake_file
 from codegen.fmi.archive import fmu as fmu_of
 from codegen.fmi.variable import Version
@@ -84,6 +85,23 @@ def a2l(
     return asam.a2l(program, asam.located(program, elf, page, instance) if elf else None)
 
 
+def dbc(
+    reference: str,
+    first: int = FIRST,
+    values: Values | None = None,
+    root: Path | None = None,
+    calibrations: Sequence[str] = (),
+    *,
+    is_fd: bool = False,
+) -> str:
+    """Return a DBC of an automaton's inputs and outputs, from the identifier `first` on.
+
+    Raises SpecError, ToolMissing; ValueError where identifiers run out.
+    """
+    automaton, program = _made(reference, values, root, calibrations, None)
+    return dbc_of(program, _ranges(automaton), first, is_fd)
+
+
 def prove(
     reference: str,
     values: Values | None = None,
@@ -115,9 +133,7 @@ def fuzz(
     automaton, program = _made(reference, values, root, calibrations, numbers)
     if not automaton.is_sampled:
         raise ValueError(f"{automaton.name} is continuous: sequences are those of sampled automata")
-    ends = {name: one.range for name, one in automaton.inputs.items() if one.range}
-    ranges = {name: (float(low), float(high)) for name, (low, high) in ends.items()}
-    return fuzzed(program, ranges, runs, ticks, seed)
+    return fuzzed(program, _ranges(automaton), runs, ticks, seed)
 
 
 def metrics(
@@ -155,6 +171,12 @@ def instructions(
         raise ValueError(f"{system} has no instance of {program.name}")
     tape = taped(run, loaded.scenario)[1][name]
     return counted(program, b"".join(tape.inputs[:MOST_COUNTED]))
+
+
+def _ranges(automaton: Automaton) -> dict[str, tuple[float, float]]:
+    """Return the ranges [SI] of inputs by name."""
+    ends = {name: one.range for name, one in automaton.inputs.items() if one.range}
+    return {name: (float(low), float(high)) for name, (low, high) in ends.items()}
 
 
 def _generated(
