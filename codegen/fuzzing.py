@@ -7,38 +7,34 @@ The C runs under sanitizers and writes down each sequence with a sum of all that
 from __future__ import annotations
 
 import math
-import os
 import re
 import struct
-import subprocess
 import tempfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from codegen.build import FLAGS, BuildError
 from codegen.harness import Main, fed, write_harness
 from codegen.names import c_type
-from codegen.proofs.sanitised import FOUND
-from codegen.tool import SECONDS, needed, output_of
+from codegen.sanitizers import built, ran
 from language.number import LARGEST
 from language.program import Program, Variable, short
 
 FUZZER = "clang-19"
-SANITIZERS = (
-    "-fsanitize=fuzzer,address,undefined,float-divide-by-zero,float-cast-overflow",
-    "-fno-sanitize-recover=all",
-)
 WORDS, ABSOLUTE, SPREAD = 256, 96, 64
 """Words of an input; those that are values, and how many of these are spread over its range. The
 others are changes: half of them small and smaller steps, as many none."""
 WITHOUT_RANGE = (-1000.0, 1000.0)
+MAIN = Main("fuzz_main.c.jinja")
 LONGEST = 64
 """Most ticks of a sequence that the C reads."""
+STUCK = 60
+"""Seconds of one sequence after which libFuzzer takes it for one without end."""
 SEQUENCES = "sequences.bin"
-COVERED = re.compile(rb"cov: (\d+)")
+COVERED = re.compile(r"cov: (\d+)")
 HEAD = struct.Struct("<II")
 Range = tuple[float, float]
+Words = tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -61,19 +57,32 @@ def fuzzed(
     """
     with tempfile.TemporaryDirectory(prefix="modewright-") as name:
         folder = Path(name)
-        table = [words(v, program, ranges.get(short(v.name))) for v in fed(program)]
-        main = Main("fuzz_main.c.jinja")
-        sources = write_harness(program, folder, main=main)
+        table = words(program, ranges)
+        sources = write_harness(program, folder, main=MAIN)
         (folder / "words.h").write_text(_words_header(table))
-        flags = [flag for flag in FLAGS if flag != "-O2"]
-        command = [FUZZER, *flags, "-O1", "-g", *SANITIZERS, *map(str, sources), "-o", "app", "-lm"]
-        output_of(command, folder)
+        app = built(FUZZER, sources, folder, "fuzzer,")
         (folder / "corpus").mkdir()
-        return _run(folder, runs, ticks * len(table), seed)
+        return _run(app, runs, ticks * len(table), seed)
 
 
-def words(variable: Variable, program: Program, given: Range | None) -> tuple[float, ...]:
-    """Return what the bytes 0 to 255 mean for an input: values first, then changes of a real."""
+def words(program: Program, ranges: Mapping[str, Range]) -> list[Words]:
+    """Return what the bytes 0 to 255 mean for each input that a tick is fed."""
+    return [_words(v, program, ranges.get(short(v.name))) for v in fed(program)]
+
+
+def values_of(program: Program, table: list[Words], sequence: bytes) -> Iterator[Words]:
+    """Yield the inputs of each tick of a sequence, as the C reads them."""
+    real = [variable.type == "real" for variable in fed(program)]
+    last = [own[SPREAD // 2] for own in table]
+    for at in range(0, min(len(sequence) // len(table), LONGEST) * len(table), len(table)):
+        for k, byte in enumerate(sequence[at : at + len(table)]):
+            is_change = real[k] and byte >= ABSOLUTE
+            last[k] = last[k] + table[k][byte] if is_change else table[k][byte]
+        yield tuple(last)
+
+
+def _words(variable: Variable, program: Program, given: Range | None) -> Words:
+    """Return the words of an input: values first, then changes of a real."""
     if variable.type == "truth":
         return (0.0, 1.0) * (WORDS // 2)
     if variable.type == "whole":
@@ -93,37 +102,12 @@ def words(variable: Variable, program: Program, given: Range | None) -> tuple[fl
     return (*spread, *special, *steps, *[0.0] * (WORDS - ABSOLUTE - len(steps)))
 
 
-def values_of(program: Program, table: list[tuple[float, ...]], sequence: bytes) -> Iterator[
-    list[float]
-]:  # fmt: skip
-    """Yield the inputs of each tick of a sequence, as the C reads them."""
-    real = [variable.type == "real" for variable in fed(program)]
-    last = [own[SPREAD // 2] for own in table]
-    for at in range(0, min(len(sequence) // len(table), LONGEST) * len(table), len(table)):
-        for k, byte in enumerate(sequence[at : at + len(table)]):
-            is_change = real[k] and byte >= ABSOLUTE
-            last[k] = last[k] + table[k][byte] if is_change else table[k][byte]
-        yield last
-
-
-def _run(folder: Path, runs: int, most: int, seed: int) -> Sequences:
-    command = [str(folder / "app"), f"-runs={runs}", f"-max_len={most}", f"-seed={seed}"]
-    command += ["-len_control=0", "-print_final_stats=0", "corpus"]
-    options = os.environ | {"ASAN_OPTIONS": "detect_leaks=0"}
-    needed(FUZZER)
-    try:
-        done = subprocess.run(
-            command, cwd=folder, capture_output=True, env=options, timeout=SECONDS
-        )
-    except subprocess.TimeoutExpired:
-        raise BuildError(f"the fuzzer was not done after {SECONDS} s") from None
-    lines = done.stderr.decode(errors="replace").splitlines()
-    told = [line.strip() for line in lines if any(word in line for word in FOUND)]
-    if done.returncode and not told:
-        told = [f"the fuzzer ended with {done.returncode}", *lines[-1:]]
-    edges = max((int(found) for found in COVERED.findall(done.stderr)), default=0)
-    data = (folder / SEQUENCES).read_bytes()
-    return Sequences(tuple(_tried(data)), edges, tuple(t.rpartition("/")[2] for t in told[:1]))
+def _run(app: Path, runs: int, most: int, seed: int) -> Sequences:
+    options = [f"-runs={runs}", f"-max_len={most}", f"-seed={seed}", f"-timeout={STUCK}"]
+    done = ran(app, [*options, "-len_control=0", "corpus"])
+    edges = max((int(found) for line in done.lines for found in COVERED.findall(line)), default=0)
+    data = (app.parent / SEQUENCES).read_bytes()
+    return Sequences(tuple(_tried(data)), edges, done.found)
 
 
 def _tried(data: bytes) -> Iterator[tuple[bytes, int]]:
@@ -135,7 +119,7 @@ def _tried(data: bytes) -> Iterator[tuple[bytes, int]]:
         at += size
 
 
-def _words_header(table: list[tuple[float, ...]]) -> str:
+def _words_header(table: list[Words]) -> str:
     """Return the table as C: hexadecimal digits of each double."""
     rows = ",\n".join(f"    {{{', '.join(_literal(word) for word in own)}}}" for own in table)
     sizes = f"#define ABSOLUTE {ABSOLUTE}\n#define FIRST {SPREAD // 2}\n#define LONGEST {LONGEST}\n"

@@ -7,14 +7,14 @@ from collections.abc import Mapping
 from copy import copy
 from dataclasses import dataclass
 
-from codegen.fuzzing import Range, fuzzed, values_of, words
+from codegen.fuzzing import Range, Words, fuzzed, values_of, words
 from codegen.harness import fed
 from engine.interpreter import Interpreter
-from language.program import Program, short
+from engine.simulate import CONVERT
+from language.program import Program
 from lockstep.compare import Difference, Tape, compare
 
 RUNS, TICKS, SEED = 20_000, 24, 1
-KINDS = {"real": float, "whole": int, "truth": bool}
 MOST_LOOKED_AT = 20
 """Sequences with another sum of which values are compared one by one."""
 
@@ -54,7 +54,7 @@ def fuzz(
     engine's; `ranges` are those of inputs by name. Raises ToolMissing, BuildError.
     """
     found = fuzzed(program, ranges, runs, ticks, seed)
-    table = [words(v, program, ranges.get(short(v.name))) for v in fed(program)]
+    table = words(program, ranges)
     blank = Tape(program, program.name)
     done = taken = differing = 0
     modes: set[int] = set()
@@ -84,11 +84,11 @@ def fuzz(
     )
 
 
-def _taped(blank: Tape, table: list[tuple[float, ...]], sequence: bytes, modes: set[int]) -> Tape:
+def _taped(blank: Tape, table: list[Words], sequence: bytes, modes: set[int]) -> Tape:
     """Return what the engine does with a sequence; the modes that it is in are noted."""
     program, tape = blank.program, copy(blank)
     tape.inputs, tape.values, engine = [], [], Interpreter(program)
-    inputs = [(v.name, KINDS[v.type]) for v in fed(program)]
+    inputs = [(v.name, CONVERT[v.type]) for v in fed(program)]
     regions = tuple(program.mode_variables().values())
     for values in values_of(program, table, sequence):
         for (name, kind), value in zip(inputs, values, strict=True):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import itertools
 import os
 import shutil
 import time
@@ -22,11 +21,12 @@ from diagnosis.library import library
 from diagnosis.threshold import EVERYWHERE, Thresholds, thresholds_in, written
 from diagnosis.variant import needed, variant_text
 from diagnosis.wording import summary
-from engine.recorded_part import file_of, overlap
+from engine.recorded_part import file_of
 from language.effect import Effect
 from language.load import automaton_of
 from language.model import Automaton
 from language.project import Project, expanded, read_document, shown
+from modewright.apart import require_apart
 from modewright.files import OutputError, make_folder, remove_files, write_files
 from modewright.recordings import CheckedRecordings, check_recordings, held_out_findings
 from modewright.threads import OneThread
@@ -97,7 +97,7 @@ def diagnose(
     """
     clock = _Budget(budget, tell)
     tell = clock.tell
-    _require_apart(train, held_out)
+    require_apart(train, held_out)
     bootstrap, limits = _wanted(thresholds)
     checked = check_recordings(train, map, spec, root=root)
     case, automaton = _case(spec, train, held_out, checked, effects, root)
@@ -204,27 +204,6 @@ def base_of(dossier: Dossier, spec: str, folder: Path) -> str:
     return os.path.relpath(path.resolve(), folder.resolve())
 
 
-def _require_apart(train: Sequence[str | Path], held_out: Sequence[str | Path]) -> None:
-    """Raise ValueError where a recording is named twice, or is both learnt from and held out."""
-    for one, other in itertools.combinations(train, 2):
-        _require_other(other, "is named twice: each recording counts once", one)
-    for one, other in itertools.combinations(held_out, 2):
-        _require_other(other, "is held out twice: each recording counts once", one, opened=False)
-    for file in held_out:
-        path = file_of(Path(file))
-        if not path.is_file() or not os.access(path, os.R_OK):
-            raise ValueError(f"{file} cannot be held out: there is no such file that can be read")
-        for learnt in train:
-            _require_other(file, "is learnt from: it cannot be held out", learnt, opened=False)
-
-
-def _require_other(file: str | Path, what: str, earlier: str | Path, opened: bool = True) -> None:
-    """Raise ValueError where a recording has values of an earlier one."""
-    if overlap(Path(file), Path(earlier), opened):
-        same = file_of(Path(file)).resolve() == file_of(Path(earlier)).resolve()
-        raise ValueError(f"{file} {what}" if same else f"{file}, a copy of {earlier}, {what}")
-
-
 def _case(
     spec: str,
     train: Sequence[str | Path],
@@ -285,7 +264,7 @@ def fit(
     about the recordings is told. Those with errors are not used, but if it is wanted `anyway`.
     Raises UnusableRecordings where most of them are, SpecError, ValueError, ToolMissing.
     """
-    _require_apart(train, ())
+    require_apart(train, ())
     checked = check_recordings(train, map, spec, root=root)
     for severity, text in told(checked.check.findings):
         if severity != "note":

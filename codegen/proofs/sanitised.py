@@ -3,53 +3,31 @@
 from __future__ import annotations
 
 import math
-import os
 import random
 import struct
-import subprocess
 from collections.abc import Sequence
 from pathlib import Path
 
-from codegen.build import FLAGS, BuildError
 from codegen.harness import fed, write_harness
 from codegen.names import c_type
 from codegen.proofs.proof import Proof, version_of
-from codegen.tool import SECONDS, output_of
+from codegen.sanitizers import built, ran
+from codegen.tool import SECONDS
+from language.number import LARGEST
 from language.program import Program, Variable
 
-SANITIZERS = (
-    "-fsanitize=address,undefined,float-divide-by-zero,float-cast-overflow",
-    "-fno-sanitize-recover=all",
-)
 STEPS, SEED = 20_000, 1
-SPECIAL = (0.0, -0.0, math.nan, math.inf, -math.inf, 5e-324, -1e-40, 3.4028234663852886e38)
+SPECIAL = (0.0, -0.0, math.nan, math.inf, -math.inf, 5e-324, -1e-40, LARGEST["float32"])
 SCALES = (1.0, 100.0, 1e4, 1e30)
-FOUND = ("runtime error", "ERROR: AddressSanitizer")
 
 
 def sanitised(program: Program, folder: Path) -> Proof:
     """Run the C of a Program for many steps. Raises ToolMissing, BuildError."""
-    sources = write_harness(program, folder)
-    flags = [flag for flag in FLAGS if flag != "-O2"]
-    command = ["gcc", *flags, "-g", "-O1", *SANITIZERS, *map(str, sources), "-o", "app", "-lm"]
-    output_of(command, folder)
+    app = built("gcc", write_harness(program, folder), folder)
     tool, about = f"gcc {version_of('gcc', folder)}", f"{STEPS} steps on random inputs"
-    return Proof("sanitizers", tool, about, _complaints(folder / "app", _records(program)))
-
-
-def _complaints(app: Path, records: bytes) -> tuple[str, ...]:
-    options = os.environ | {"ASAN_OPTIONS": "detect_leaks=0"}
-    try:
-        done = subprocess.run(
-            [str(app)], input=records, capture_output=True, env=options, timeout=SECONDS
-        )
-    except subprocess.TimeoutExpired:
-        raise BuildError(f"the compiled program was not done after {SECONDS} s") from None
-    lines = done.stderr.decode(errors="replace").splitlines()
-    told_of = [line.strip() for line in lines if any(word in line for word in FOUND)]
-    if done.returncode and not told_of:
-        told_of = [f"the program ended with {done.returncode}"]
-    return tuple(text.rpartition("/")[2] for text in told_of[:1])
+    return Proof(
+        "sanitizers", tool, about, ran(app, given=_records(program), seconds=SECONDS).found
+    )
 
 
 def _records(program: Program) -> bytes:

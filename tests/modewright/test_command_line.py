@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import subprocess
 import sys
@@ -57,6 +58,18 @@ def test_a_command_is_whole_wherever_its_name_is_among_the_words() -> None:
     assert len(params_of("check", "--log-file", "check", "simulate")) > 3
     assert len(params_of("simulate", "--log-file", "check", "simulate")) > 3
     assert len(params_of("graph", "--log-file", "check", "simulate")) == 0
+
+
+def test_numbers_that_a_command_takes_by_default_are_those_of_its_function() -> None:
+    compared = 0
+    for command in COMMANDS:
+        of_function = inspect.signature(getattr(mw, command.__name__, command)).parameters
+        for name, option in inspect.signature(command).parameters.items():
+            own = of_function.get(name)
+            if own and {type(own.default), type(option.default)} <= {int, float}:
+                assert option.default == own.default, (command.__name__, name)
+                compared += 1
+    assert compared >= 3
 
 
 def params_of(name: str, *words: str) -> list[object]:

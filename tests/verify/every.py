@@ -15,16 +15,8 @@ from tests.verify.store import ROOT
 WHOLE = (
     *("first_drive", "complete", "lockstep_bits", "random_specs", "random_charts"),
     *("command_line", "editor", "static_checks", "charts", "studies", "fast", "open_cases"),
-    *(
-        "variants",
-        "tip_out",
-        "kept_stages",
-        "target_bits",
-        "machines",
-        "proofs",
-        "fuzzing",
-        "twins",
-    ),
+    *("variants", "tip_out", "kept_stages", "target_bits", "machines", "proofs", "fuzzing"),
+    "twins",
 )
 PART = (
     "first_drive",
