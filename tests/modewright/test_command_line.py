@@ -63,7 +63,8 @@ def test_a_command_is_whole_wherever_its_name_is_among_the_words() -> None:
 def test_numbers_that_a_command_takes_by_default_are_those_of_its_function() -> None:
     compared = 0
     for command in COMMANDS:
-        of_function = inspect.signature(getattr(mw, command.__name__, command)).parameters
+        function = getattr(mw, command.__name__, None)
+        of_function = inspect.signature(function).parameters if callable(function) else {}
         for name, option in inspect.signature(command).parameters.items():
             own = of_function.get(name)
             if own and {type(own.default), type(option.default)} <= {int, float}:
