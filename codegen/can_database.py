@@ -25,6 +25,8 @@ FD_LENGTHS = (8, 12, 16, 20, 24, 32, 48, 64)
 FIRST = 0x100
 HIGHEST, HIGHEST_EXTENDED = 0x7FF, 0x1FFFFFFF
 """Highest identifiers of 11 and of 29 bits."""
+MILLISECONDS = 1000
+"""In a second: what a DBC counts cycles in."""
 Range = tuple[float, float]
 EMPTY = """\
 VERSION "{digest}"
@@ -129,8 +131,14 @@ def _message(
         senders=[program.name if is_sent else OTHERS],
         is_extended_frame=identifier > HIGHEST,
         is_fd=is_fd,
-        cycle_time=round(program.period * 1000) if program.period else None,
+        cycle_time=_cycle(program),
     )
+
+
+def _cycle(program: Program) -> int | None:
+    """Return the period [ms] of an automaton; None where it has none, or a part of one."""
+    period = (program.period or 0) * MILLISECONDS
+    return int(period) if period and period.denominator == 1 else None
 
 
 def _signal(value: Carried, start: int, receiver: str) -> Any:
@@ -146,7 +154,10 @@ def _signal(value: Carried, start: int, receiver: str) -> Any:
         byte_order="little_endian",
         is_signed=value.kind not in UNSIGNED,
         conversion=BaseConversion.factory(
-            scale=1, offset=0, choices=OrderedDict(names) or None, is_float=value.kind in REAL
+            scale=value.conversion.factor,
+            offset=0,
+            choices=OrderedDict(names) or None,
+            is_float=value.kind in REAL,
         ),
         minimum=low,
         maximum=high,

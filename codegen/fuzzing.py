@@ -106,7 +106,8 @@ def _run(app: Path, runs: int, most: int, seed: int) -> Sequences:
     options = [f"-runs={runs}", f"-max_len={most}", f"-seed={seed}", f"-timeout={STUCK}"]
     done = ran(app, [*options, "-len_control=0", "corpus"])
     edges = max((int(found) for line in done.lines for found in COVERED.findall(line)), default=0)
-    data = (app.parent / SEQUENCES).read_bytes()
+    kept = app.parent / SEQUENCES
+    data = kept.read_bytes() if kept.exists() else b""  # none where the first one did not end
     return Sequences(tuple(_tried(data)), edges, done.found)
 
 

@@ -17,6 +17,8 @@ from modewright.cli import app
 from modewright.exits import exit_code
 from tests.language.making import program as made
 
+PERIODS = {"contactor": 10, "supervisor": 10, "estimator": 1, "estimator_float32": 1}
+"""What the specs say [ms]."""
 WIDE = """\
 language: 1
 automaton: wide
@@ -50,8 +52,7 @@ def test_all_that_is_received_and_sent_is_there(name: str, is_fd: bool) -> None:
     assert [m.frame_id for m in known.messages] == [0x100 + k for k in range(len(known.messages))]
     assert all(m.length <= (64 if is_fd else 8) for m in known.messages)
     assert {m.is_fd for m in known.messages} == {is_fd}
-    assert used.period
-    assert {m.cycle_time for m in known.messages} == {round(used.period * 1000)}
+    assert {m.cycle_time for m in known.messages} == {PERIODS[name]}
 
 
 @pytest.mark.parametrize("is_fd", [False, True])
@@ -82,6 +83,12 @@ def test_words_units_and_ranges_are_told() -> None:
     assert (1, "operation.precharge") in [
         (k, str(v)) for k, v in (signals["mode"].choices or {}).items()
     ]
+
+
+@pytest.mark.parametrize(("period", "cycle"), [("250 us", None), ("1.5 ms", None), ("20 ms", 20)])
+def test_a_cycle_is_told_where_it_is_one_of_milliseconds(period: str, cycle: int | None) -> None:
+    text = WIDE.replace("COUNTED", "u_0: {unit: 1}").replace("250 us", period)
+    assert {m.cycle_time for m in read(dbc(made(text), {})).messages} == {cycle}
 
 
 def test_frames_are_filled_in_turn_and_identifiers_end() -> None:

@@ -59,6 +59,15 @@ def test_a_store_beyond_its_array_is_found(monkeypatch: pytest.MonkeyPatch) -> N
     assert not found.is_clean and "out of bounds" in found.findings[0]
 
 
+@needs_fuzzer
+def test_what_fails_before_its_first_tick_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    wrong = "{ volatile int none = 0; self->faults = (uint32_t)(1 / none); }"
+    changed("contactor", "self->faults = 0U;", wrong, monkeypatch)
+    found = fuzz(program("contactor"), {}, RUNS)
+    assert not found.is_clean and found.runs == 0
+    assert "division by zero" in found.findings[0]
+
+
 def changed(name: str, right: str, wrong: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the C of an automaton be another one."""
 
