@@ -26,7 +26,7 @@ from language.region import with_regions
 from language.transition_table import with_transition_tables
 from language.truth_table import TruthTableReader
 from language.units import SECOND, fits
-from language.values import with_value
+from language.values import with_node
 from language.variable import VariableReader
 
 COMMON_KEYS = ("language", "automaton", "parameters", "inputs", "states", "discrete", "equations")
@@ -43,7 +43,7 @@ KEYS = (
 DEFAULT_STEP = Fraction(1, 1000)
 """Major step of a continuous automaton that gives none."""
 
-Values = Mapping[str, Scalar]
+Values = Mapping[str, Node]
 
 
 def read_automaton(
@@ -120,7 +120,7 @@ def _set_values(
                 "values", value.span, label, f"set what it follows from, given at {entry.span}"
             )
         else:
-            parameters = _with(parameters, name, with_value(entry.node, value))
+            parameters = _with(parameters, name, with_node(entry.node, value, problems))
     return _with(tree, "parameters", parameters) if values else tree
 
 

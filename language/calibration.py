@@ -6,23 +6,26 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from language.document import Document, Entry, Scalar, Table, require_kind
+from language.document import Document, Entry, Node, Scalar, Table, require_kind
 from language.problem import Problems, Span, nearest
 from language.reader import Reader
 from language.tree import put
-from language.values import with_value
+from language.values import with_node
 
 CALIBRATION_KEYS = ("language", "calibration", "of", "from", "date", "parameters")
-VALUE_KEYS = ("value", "std", "from", "date")
+VALUE_KEYS = ("value", "points", "std", "from", "date")
 DATE = re.compile(r"\d{4}-(0[1-9]|1[0-2])-(0[1-9]|[12]\d|3[01])")
 
 
 @dataclass(frozen=True)
 class CalibratedValue:
-    """A value of a parameter, its standard deviation and its origin as texts (empty: not told)."""
+    """A value of a parameter, its standard deviation and its origin as texts (empty: not told).
+
+    Of a table the value is `{points: ...}`.
+    """
 
     name: str
-    value: Scalar
+    value: Node
     std: str
     origin: str
     date: str
@@ -59,7 +62,8 @@ def calibrated(
             label = f"`{name}` is derived: set what it follows from"
             problems.error("values", value.span, label)
         else:
-            tree = put(tree, ("parameters", name), with_value(known[name], value.value))
+            made = with_node(known[name], value.value, problems)
+            tree = put(tree, ("parameters", name), made)
     return tree
 
 
@@ -95,6 +99,8 @@ class _CalibrationReader(Reader):
         if isinstance(entry.node, Scalar):
             return CalibratedValue(entry.key, entry.node, "", origin, date, entry.span)
         table = self.table(entry.node, what, VALUE_KEYS)
+        if "points" in table.entries:
+            return self._points(entry, table, origin, date)
         value = self.scalar(table.get("value"), f"{what}.value", entry.span)
         own, own_date = self._texts(table)
         node = table.get("std")
@@ -107,6 +113,15 @@ class _CalibrationReader(Reader):
                 self.problems.error("range", node.span, "`std` is not below zero")
         std = node.text if isinstance(node, Scalar) else ""
         return CalibratedValue(entry.key, value, std, own or origin, own_date or date, entry.span)
+
+    def _points(self, entry: Entry, table: Table, origin: str, date: str) -> CalibratedValue:
+        for key in ("value", "std"):
+            if key in table.entries:
+                label = f"a table has `points`, no `{key}`"
+                self.problems.error("form", table.entries[key].span, label)
+        own, own_date = self._texts(table)
+        points = Table({"points": table.entries["points"]}, table.span)
+        return CalibratedValue(entry.key, points, "", own or origin, own_date or date, entry.span)
 
     def _texts(self, table: Table) -> tuple[str, str]:
         texts = []

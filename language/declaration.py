@@ -51,11 +51,12 @@ class Fitting:
 
 @dataclass(frozen=True)
 class Axis:
-    """An axis of a table: its strictly ascending points in SI, exact."""
+    """An axis of a table: its strictly ascending points in SI, exact, and as they are `written`."""
 
     name: str
     unit: Unit
     points: tuple[Fraction, ...]
+    written: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from language.reader import Reader
 from language.requirement import requirements_in
 from language.rewrite import renamed, substituted
 from language.tree import at, put, resourced
-from language.values import with_value
+from language.values import with_node
 
 ALONE = (
     *("model", "regions", "instances", "tables", "faults", "fault_mode"),
@@ -204,8 +204,8 @@ class _InstanceReader(Reader):
             elif "derived" in known.node.entries:
                 label = f"`{value.key}` is derived: set what it follows from"
                 self.problems.error("values", value.span, label)
-            elif isinstance(value.node, Scalar):
-                made = with_value(known.node, value.node)
+            else:
+                made = with_node(known.node, value.node, self.problems)
                 body = put(body, ("parameters", value.key), made)
         return body
 

@@ -8,7 +8,7 @@ from language.automaton import read_automaton
 from language.check import check_automaton
 from language.check_number import check_numbers
 from language.continuous import continuous_program
-from language.document import Document, Scalar
+from language.document import Document, Node, Scalar
 from language.hoist import hoisted
 from language.model import Automaton
 from language.problem import Problems, Source, Span
@@ -20,7 +20,7 @@ from language.sampled import sampled_program
 def automaton_of(
     document: Document,
     project: Project,
-    values: Mapping[str, Scalar] | None = None,
+    values: Mapping[str, Node] | None = None,
     problems: Problems | None = None,
 ) -> Automaton:
     """Return the checked automaton of a document; warnings are left in `problems`.
@@ -32,7 +32,7 @@ def automaton_of(
 
 
 def load_automaton(
-    reference: str, project: Project, values: Mapping[str, Scalar] | None = None
+    reference: str, project: Project, values: Mapping[str, Node] | None = None
 ) -> Automaton:
     """Return the checked automaton of a name or path. Raises SpecError with all problems."""
     return automaton_of(project.read(project.path_of(reference)), project, values)

@@ -8,7 +8,7 @@ from fractions import Fraction
 from pathlib import Path
 
 from language.connection import ConnectionReader
-from language.document import Document, Entry, Scalar, require_kind
+from language.document import Document, Entry, Node, Scalar, Table, require_kind
 from language.experiment import Connection, Instance, System, SystemInput
 from language.graph import chain, circle, topological
 from language.load import automaton_of
@@ -17,6 +17,7 @@ from language.number import NumberType
 from language.problem import Problems, Span, SpecError, nearest
 from language.project import Project, expanded
 from language.reader import Reader
+from language.tree import one_line
 from language.units import SECOND, fits
 
 SYSTEM_KEYS = tuple(
@@ -130,11 +131,11 @@ class _SystemReader(Reader):
         key = f"instances.{entry.key}"
         table = self.table(entry.node, key, INSTANCE_KEYS)
         of = self.scalar(table.get("of"), "of", entry.span)
-        values: dict[str, Scalar] = {}
+        values: dict[str, Node] = {}
         for value in self.table(table.get("values"), f"{key}.values"):
-            scalar = self.scalar(value.node, f"values.{value.key}", value.span)
-            if scalar:
-                values[value.key] = scalar
+            is_table = isinstance(value.node, Table)
+            if is_table or self.scalar(value.node, f"values.{value.key}", value.span):
+                values[value.key] = value.node
         offset, unit = Fraction(0), None
         node = table.get("offset")
         if node is not None:
@@ -149,9 +150,9 @@ class _SystemReader(Reader):
             automaton = self._automaton(of, {**values, **mine})
         return Instance(entry.key, automaton, offset, key, entry.span)
 
-    def _automaton(self, of: Scalar, values: Mapping[str, Scalar]) -> Automaton:
+    def _automaton(self, of: Scalar, values: Mapping[str, Node]) -> Automaton:
         """Return a checked automaton; instances of one with equal values share it."""
-        wanted = (of.text, *((name, value.text) for name, value in values.items()))
+        wanted = (of.text, *((name, one_line(value)) for name, value in values.items()))
         if wanted not in self.read_before:
             path = self.project.path_of(of.text, of.span)
             if path not in self.documents:

@@ -61,7 +61,7 @@ class TableReader(Reader):
             second = second or axis
             first[at] = row
         rows = tuple(value for row in first.values() for value in row.values())
-        axis = Axis(names[0].text, outer or NO_UNIT, tuple(first))
+        axis = Axis(names[0].text, outer or NO_UNIT, tuple(first), tuple(points.entries))
         return (axis, second or Axis(names[1].text, NO_UNIT, ())), rows
 
     def _row(
@@ -75,7 +75,8 @@ class TableReader(Reader):
             if limits and not limits[0] <= value <= limits[1]:
                 self.problems.error("range", entry.node.span, "this value is outside the range")
             found[at] = value
-        return found, Axis(name.text, axis_unit or NO_UNIT, tuple(found))
+        axis = Axis(name.text, axis_unit or NO_UNIT, tuple(found), tuple(points.entries))
+        return found, axis
 
     def _point(
         self, entry: Entry, unit: Unit | None, key: str, before: list[Fraction]

@@ -55,3 +55,12 @@ def resourced(node: Node, source: Source) -> Node:
 
 def _within(span: Span, source: Source) -> Span:
     return dataclasses.replace(span, source=source)
+
+
+def one_line(node: Node) -> str:
+    """Return a node as YAML in one line: `{points: {0 degC: 10 N*m, 40 degC: 12.5 N*m}}`."""
+    if isinstance(node, Table):
+        return f"{{{', '.join(f'{entry.key}: {one_line(entry.node)}' for entry in node)}}}"
+    if isinstance(node, Items):
+        return f"[{', '.join(one_line(item) for item in node.nodes)}]"
+    return node.text

@@ -2,7 +2,21 @@
 
 from __future__ import annotations
 
-from language.document import Entry, Scalar, Table
+from language.document import Entry, Node, Scalar, Table
+from language.points import with_points
+from language.problem import Problems
+
+
+def with_node(parameter: Table, value: Node, problems: Problems) -> Table:
+    """Return a parameter with another value, or with values at points of its table."""
+    if isinstance(value, Scalar):
+        return with_value(parameter, value)
+    if isinstance(value, Table):
+        return with_points(parameter, value, problems)
+    problems.error(
+        "form", value.span, "a value is a number with a unit, a word, or `{points: ...}`"
+    )
+    return parameter
 
 
 def with_value(parameter: Table, value: Scalar) -> Table:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from decimal import Context, Decimal
 from fractions import Fraction
 
-from language.declaration import Parameter, Range
+from language.declaration import Axis, Parameter, Range
+from language.document import Entry, Scalar, Table
 from language.number import NumberType, rounded
+from language.problem import Span
 from language.quantity import MAX_EXPONENT
 from language.units import Unit
 
@@ -31,6 +33,25 @@ def value_in_unit(parameter: Parameter, value: float, number: NumberType) -> str
         return str(int(value))
     found, unit = _nearest(parameter, value, number)
     return _literal(found) if unit.text == "1" else f"{_literal(found)} {unit.text}"
+
+
+def points_of(parameter: Parameter, values: Sequence[float], number: NumberType, at: Span) -> Table:
+    """Return values [SI] of a table as `{points: {...}}`, in the order that a page has them.
+
+    The last axis varies fastest. Values are as `value_in_unit` writes them, points as the spec.
+    """
+    assert parameter.table
+    texts = iter([value_in_unit(parameter, value, number) for value in values])
+
+    def rows(axes: Sequence[Axis]) -> Table:
+        axis, *inner = axes
+        found = {}
+        for key in axis.written:
+            node = rows(inner) if inner else Scalar(next(texts), at)
+            found[key] = Entry(key, at, node)
+        return Table(found, at)
+
+    return Table({"points": Entry("points", at, rows(parameter.table.axes))}, at)
 
 
 def is_written(parameter: Parameter, number: NumberType) -> bool:

@@ -10,12 +10,13 @@ from codegen.exchange.characteristic import PageFile
 from codegen.exchange.formats import FORMATS, read_page
 from codegen.exchange.page import page_constants, page_name, page_of
 from codegen.exchange.taking import Remark, Taken, taken
-from language.document import Document, Scalar
+from language.document import Document, Node, Scalar
 from language.load import automaton_of, program_of
 from language.model import Automaton
 from language.problem import Problem, Problems, Source, Span
 from language.program import Constant, Program
 from language.project import Project
+from language.tree import one_line
 from language.written import calibration_text, is_written, value_in_unit
 from modewright.documents import Values, calibrated_document, scalars as as_scalars
 
@@ -101,11 +102,18 @@ def export_calibration(
 
 
 def import_calibration(
-    file: Path, of: str, root: Path | None = None, form: str | None = None
+    file: Path,
+    of: str,
+    root: Path | None = None,
+    form: str | None = None,
+    own_only: bool = False,
 ) -> ImportedPage:
-    """Return what a file of calibration data says of an automaton. Raises SpecError."""
+    """Return what a file of calibration data says of an automaton. Raises SpecError.
+
+    With `own_only` names of other functions of the ECU are passed over.
+    """
     project = Project(root or Path())
-    return _imported(file, form, calibrated_document(of, project, ()), project, {})
+    return _imported(file, form, calibrated_document(of, project, ()), project, {}, own_only)
 
 
 def resolve_calibration(
@@ -142,13 +150,14 @@ def _imported(
     document: Document,
     project: Project,
     scalars: Mapping[str, Scalar],
+    own_only: bool = False,
 ) -> ImportedPage:
     problems = Problems()
     read: PageFile = read_page(file, problems, form)
     automaton = automaton_of(document, project, scalars)
-    found: Taken = taken(read, automaton, program_of(automaton), problems)
+    found: Taken = taken(read, automaton, program_of(automaton), problems, own_only)
     page = _page(document, project, {**scalars, **found.values})
-    values = {name: scalar.text for name, scalar in found.values.items()}
+    values = {name: one_line(node) for name, node in found.values.items()}
     return ImportedPage(
         page, values, found.remarks, _changes(found.solved, page), tuple(problems.found)
     )
@@ -163,12 +172,12 @@ def _changes(before: Mapping[str, float], page: CalibrationPage) -> tuple[Change
     )
 
 
-def _page(document: Document, project: Project, scalars: Mapping[str, Scalar]) -> CalibrationPage:
+def _page(document: Document, project: Project, values: Mapping[str, Node]) -> CalibrationPage:
     """Return a page; a value with more digits than its type is taken as the page will hold it.
 
     What is solved for a value then fits what a tool reads of it, to the last bit.
     """
-    automaton = automaton_of(document, project, scalars)
+    automaton = automaton_of(document, project, values)
     program = program_of(automaton)
     solved_for = {name for c in page_constants(program) for name in c.depends_on}
     finer = {
@@ -178,7 +187,7 @@ def _page(document: Document, project: Project, scalars: Mapping[str, Scalar]) -
         and not is_written(automaton.parameters[name], program.number)
     }
     if finer:
-        automaton = automaton_of(document, project, {**scalars, **finer})
+        automaton = automaton_of(document, project, {**values, **finer})
         program = program_of(automaton)
     return CalibrationPage(automaton, program)
 

@@ -19,6 +19,7 @@ from language.problem import Problems, SpecError
 from language.project import Project, expanded, read_document, with_calibrations
 from language.provenance import Row, difference_text, differences, rows, spec_text
 from language.system import read_system
+from language.tree import one_line
 
 Pass = Literal["document", "model", "lowered", "parameters", "inputs", "program", "numbers"]
 Values = Mapping[str, str]
@@ -69,7 +70,7 @@ def _calibration_text(document: Document, project: Project) -> str:
             if parameter and ("." not in name or name.startswith(owner)):
                 texts = [kinds[own], *([f"std {value.std}"] if value.std else [])]
                 texts += [text for text in (value.origin, value.date) if text]
-                lines.append(f"{owner}{own} = {value.value.text}  # {', '.join(texts)}")
+                lines.append(f"{owner}{own} = {one_line(value.value)}  # {', '.join(texts)}")
     return "".join(f"{line}\n" for line in lines)
 
 

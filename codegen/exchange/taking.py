@@ -1,11 +1,12 @@
 """Taking: what a file says of the tunable parameters of an automaton, checked against its spec.
 
-A value is taken where its name, type, unit and range are those of the spec. Tables stay those of
-the spec, for no calibration can set one. Solved numbers are never taken.
+A value is taken where its name, type, unit and range are those of the spec, values of a table where
+its points are. Solved numbers are never taken.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -22,18 +23,18 @@ from codegen.exchange.characteristic import (
 from codegen.exchange.exact import exact, unit_of
 from codegen.exchange.page import axes_of, page_constants, page_name
 from language.declaration import Parameter
-from language.document import Scalar
+from language.document import Node, Scalar
 from language.kind import LARGEST_WHOLE
 from language.model import Automaton
 from language.number import NumberType, decimal, rounded
 from language.problem import Problems, Span, nearest
 from language.program import Constant, Program, short
 from language.units import NO_UNIT, Unit
-from language.written import value_in_unit
+from language.written import points_of, value_in_unit
 
 PLACE = re.compile(r"\d{1,4}(\.0*)?", re.ASCII)
 """The number of a word in its list, as tools without words write it: `1`, `1.0000`."""
-RemarkKind = Literal["rounded", "converted", "no unit", "not taken", "missing"]
+RemarkKind = Literal["rounded", "converted", "no unit", "missing", "passed over"]
 
 
 @dataclass(frozen=True)
@@ -48,12 +49,12 @@ class Remark:
 
 @dataclass(frozen=True)
 class Taken:
-    """Literals of the language by parameter, in the order of the page, and what is told of them.
+    """Values of the language by parameter, in the order of the page, and what is told of them.
 
     `solved` are the solved numbers of the file, in the working type, by the names of constants.
     """
 
-    values: Mapping[str, Scalar]
+    values: Mapping[str, Node]
     solved: Mapping[str, float]
     remarks: tuple[Remark, ...]
 
@@ -71,12 +72,24 @@ class _Desk:
         self.remarks.append(Remark(kind, cell.text, text, at or cell.span))
 
 
-def taken(file: PageFile, automaton: Automaton, program: Program, problems: Problems) -> Taken:
-    """Return what a file says of an automaton's page. Raises SpecError with all problems."""
+def taken(
+    file: PageFile,
+    automaton: Automaton,
+    program: Program,
+    problems: Problems,
+    own_only: bool = False,
+) -> Taken:
+    """Return what a file says of an automaton's page. Raises SpecError with all problems.
+
+    With `own_only` names that do not begin with the automaton's are passed over: they are of other
+    functions of the ECU.
+    """
     known = {page_name(program, constant): constant for constant in page_constants(program)}
     desk = _Desk(automaton, program.number, problems)
+    if own_only:
+        file = _own(file, program.name, desk)
     given = _known(file, known, program.name, problems)
-    values: dict[str, Scalar] = {}
+    values: dict[str, Node] = {}
     solved: dict[str, float] = {}
     for name, constant in known.items():
         if name not in given:
@@ -85,11 +98,23 @@ def taken(file: PageFile, automaton: Automaton, program: Program, problems: Prob
         elif constant.kind == "solved":
             solved.update(_solved(given[name], constant, desk))
         else:
-            literal = _literal(given[name], constant, desk)
-            if literal is not None:
-                values[short(constant.name)] = Scalar(literal, given[name].values[0].span)
+            node = _value(given[name], constant, desk)
+            if node is not None:
+                values[short(constant.name)] = node
     problems.stop_if_any()
     return Taken(values, solved, tuple(desk.remarks))
+
+
+def _own(file: PageFile, owner: str, desk: _Desk) -> PageFile:
+    """Return what is the automaton's of a file that other functions of the ECU have values in."""
+    own = tuple(one for one in file.characteristics if one.name.text.startswith(f"{owner}."))
+    for one in file.characteristics:
+        if not one.name.text.startswith(f"{owner}."):
+            desk.remark("passed over", one.name, "is of another function")
+    if file.characteristics and not own:
+        label = f"no name of this file begins with `{owner}.`"
+        desk.problems.error("name", file.characteristics[0].name.span, label)
+    return dataclasses.replace(file, characteristics=own)
 
 
 def _known(
@@ -118,12 +143,11 @@ def _solved(one: Characteristic, constant: Constant, desk: _Desk) -> dict[str, f
     return {} if value is None else {constant.name: value}
 
 
-def _literal(one: Characteristic, constant: Constant, desk: _Desk) -> str | None:
+def _value(one: Characteristic, constant: Constant, desk: _Desk) -> Node | None:
     """Return the value of a parameter as a calibration file has it, None where it is not taken."""
     parameter = desk.automaton.parameters[short(constant.name)]
     if parameter.table:
-        _compare_table(one, constant, parameter, desk)
-        return None
+        return _table(one, constant, parameter, desk)
     cell = _single(one, desk.problems)
     if cell is None:
         return None
@@ -133,7 +157,9 @@ def _literal(one: Characteristic, constant: Constant, desk: _Desk) -> str | None
         value = _whole(cell, parameter, desk.problems)
     else:
         value = _word(cell, parameter, desk.problems)
-    return None if value is None else value_in_unit(parameter, value, desk.number)
+    if value is None:
+        return None
+    return Scalar(value_in_unit(parameter, value, desk.number), cell.span)
 
 
 def _single(one: Characteristic, problems: Problems) -> Cell | None:
@@ -146,11 +172,16 @@ def _single(one: Characteristic, problems: Problems) -> Cell | None:
 def _real(one: Characteristic, cell: Cell, parameter: Parameter, desk: _Desk) -> float | None:
     """Return a real in SI, in the working type and in its range; what was done to it is told."""
     unit = _unit(one, parameter.unit, one.unit, desk)
+    return _item(one, cell, unit, parameter, desk) if unit else None
+
+
+def _item(
+    one: Characteristic, cell: Cell, unit: Unit, parameter: Parameter, desk: _Desk
+) -> float | None:
+    """Return a value of a parameter, single or of a table, that is in a unit."""
     number = exact(cell, desk.problems)
-    if unit is None or number is None:
-        return None
-    value = _in_type(number, unit, cell, desk)
-    if value is None:
+    value = None if number is None else _in_type(number, unit, cell, desk)
+    if number is None or value is None:
         return None
     shown = decimal(value, desk.number)
     if unit.factor != 1 or unit.offset:
@@ -214,28 +245,28 @@ def _word(cell: Cell, parameter: Parameter, problems: Problems) -> int | None:
     return None
 
 
-def _compare_table(
+def _table(
     one: Characteristic, constant: Constant, parameter: Parameter, desk: _Desk
-) -> None:
-    """Report a table that is another one than that of the spec."""
+) -> Node | None:
+    """Return the values of a table at its points, which are compiled in.
+
+    None where it is no such table, which is reported.
+    """
     assert parameter.table
     told = len(desk.problems.found)
+    has_points = not one.axes or _have_points(one, parameter, desk)
+    if len(one.values) != len(constant.items) or not has_points:
+        if len(desk.problems.found) == told:
+            label = f"`{one.name.text}` has other points than the table of the spec"
+            hint = "a calibration holds the values at its points: change these in a variant"
+            desk.problems.error("table", one.name.span, label, hint)
+        return None
     unit = _unit(one, parameter.table.unit, one.unit, desk)
-    is_same = unit is not None and len(one.values) == len(constant.items)
-    if is_same and unit:
-        is_same = all(
-            _is_value(cell, unit, item, desk)
-            for cell, item in zip(one.values, constant.items, strict=True)
-        )
-    if one.axes:
-        is_same &= _have_points(one, parameter, desk)
-    if is_same:
-        text = "is a table, which no calibration can set: it stays that of the spec, an equal one"
-        desk.remark("not taken", one.name, text)
-    elif len(desk.problems.found) == told:
-        label = f"`{one.name.text}` is another table than that of the spec"
-        hint = "a calibration cannot set a table: change it in the spec, or in a variant"
-        desk.problems.error("table", one.name.span, label, hint)
+    found = [_item(one, cell, unit, parameter, desk) for cell in one.values] if unit else []
+    values = [value for value in found if value is not None]
+    if len(values) < len(constant.items):
+        return None
+    return points_of(parameter, values, desk.number, one.values[0].span)
 
 
 def _have_points(one: Characteristic, parameter: Parameter, desk: _Desk) -> bool:

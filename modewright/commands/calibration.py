@@ -74,12 +74,16 @@ def import_page(
         str | None, typer.Option("--name", help="of the calibration; that of its file if absent")
     ] = None,
     date: Annotated[str, typer.Option("--date", help="of the page: '2026-11-21'")] = "",
+    own_only: Annotated[
+        bool, typer.Option("--own-only", help="pass over names of other functions of the ECU")
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Make a calibration of the language from a page of a calibration tool.
 
     \b
     modewright calibration import page.dcm --of estimator --out spec/rig_7.yaml
+    modewright calibration import ecu.dcm --of estimator --own-only --out spec/rig_7.yaml
 
     A name that is not known and a value outside of its range are problems: nothing is written.
     Solved numbers are compared and never taken.
@@ -90,7 +94,7 @@ def import_page(
     _require_format(form)
     title = calibration_title(out, name, date)
     with working(f"reading {page}"), _told_as_json(as_json):
-        found = import_calibration(page, of, form=form)
+        found = import_calibration(page, of, form=form, own_only=own_only)
     write_files({out: found.calibration(title, visible(page.name), date).encode()})
     if as_json:
         show.print_json(show_calibration.import_json(found))

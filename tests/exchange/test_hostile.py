@@ -80,12 +80,12 @@ CASES: dict[str, tuple[bytes, str]] = {
         "`kinds_float64.gain` is a single value",
     ),
     "table.dcm": (
-        block("WERT 10 12.5 2", kind="FESTWERTEBLOCK", name="kinds_float64.line 3"),
-        "`kinds_float64.line` is another table than that of the spec [MW316]",
+        block("WERT 10 12.5", kind="FESTWERTEBLOCK", name="kinds_float64.line 2"),
+        "`kinds_float64.line` has other points than the table of the spec [MW316]",
     ),
     "points.dcm": (
         block("ST/X 1 2 3", "WERT 10 12.5 1", kind="KENNLINIE", name="kinds_float64.line 3"),
-        "`kinds_float64.line` is another table than that of the spec",
+        "`kinds_float64.line` has other points than the table of the spec",
     ),
     "type.dcm": (block("WERT 1.5", name="kinds_float64.whole"), "`1.5` is not whole, `whole` is"),
     "word.dcm": (

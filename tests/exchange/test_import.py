@@ -134,6 +134,19 @@ def test_what_a_page_lacks_is_told_and_stays_as_in_the_spec() -> None:
     assert found.calibration("taken").splitlines()[-2:] == ["parameters:", "  gain: 1"]
 
 
+def test_names_of_other_functions_are_passed_over_if_that_is_wanted() -> None:
+    file = page("kinds_float64.gain,1,1", "boost.gain,3,1", "kinds_float64_2.gain,4,1")
+    found = import_calibration(file, "kinds_float64", own_only=True)
+    passed = [remark.name for remark in found.remarks if remark.kind == "passed over"]
+    assert found.values == {"gain": "1"}
+    assert passed == ["boost.gain", "kinds_float64_2.gain"]
+    with pytest.raises(mw.SpecError, match="no name of this file begins with `kinds_float32"):
+        import_calibration(file, "kinds_float32", own_only=True)
+    wrong = page("kinds_float64.gian,1,1", "boost.gain,3,1")
+    with pytest.raises(mw.SpecError, match="no tunable parameter or solved number"):
+        import_calibration(wrong, "kinds_float64", own_only=True)
+
+
 def test_an_empty_table_of_values_is_still_a_calibration() -> None:
     found = import_calibration(page(), "kinds_float64")
     text = found.calibration("nothing")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+from fractions import Fraction
 from pathlib import Path
 
 import pytest
@@ -9,7 +11,8 @@ from hypothesis import given, settings, strategies as st
 
 from codegen.exchange.formats import FORMATS
 from language.number import NumberType, decimal, rounded
-from modewright.calibrations import export_calibration, import_calibration
+from language.program import short
+from modewright.calibrations import CalibrationPage, export_calibration, import_calibration
 from tests.exchange.tuned import NUMBERS, bits, project
 
 FORMS = st.sampled_from(sorted(FORMATS))
@@ -21,13 +24,15 @@ def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def goes_round(root: Path, name: str, values: dict[str, str], form: str) -> None:
-    page = export_calibration(name, values, root)
+    comes_back(root, export_calibration(name, values, root), name, form)
+
+
+def comes_back(root: Path, page: CalibrationPage, name: str, form: str) -> None:
     first = page.text(form)
     file = root / f"page.{form}"
     file.write_bytes(first.encode())
     found = import_calibration(file, name, root)
-    assert not found.stale and not found.warnings
-    assert {remark.kind for remark in found.remarks} <= {"not taken"}
+    assert not found.stale and not found.warnings and not found.remarks
     calibration = root / "spec" / "taken.yaml"
     calibration.write_text(found.calibration("taken"), "utf-8")
     again = export_calibration(name, root=root, calibrations=["taken"])
@@ -100,6 +105,26 @@ def test_solved_numbers_go_round(
         "sd_em": f"{literal(noise, number)} rpm",
     }
     goes_round(root, f"solved_{number}", values, form)
+
+
+@settings(max_examples=10)
+@given(number=st.sampled_from(NUMBERS), form=FORMS, data=st.data())
+def test_the_values_of_tables_go_round(
+    root: Path, number: NumberType, form: str, data: st.DataObject
+) -> None:
+    drawn = data.draw(st.lists(reals(-1e9, 1e9), min_size=9, max_size=9))
+    line, area = [literal(v, number) for v in drawn[:3]], [literal(v, number) for v in drawn[3:]]
+    rows = [dict(zip("012", area[k : k + 3], strict=True)) for k in (0, 3)]
+    points = {"363.15 K": rows[1], "0 degC": rows[0]}
+    text = f"language: 1\ncalibration: given\nof: kinds_{number}\nparameters:\n"
+    text += f"  line: {{points: {{0 degC: {line[0]}, 40 degC: {line[1]}, 90 degC: {line[2]}}}}}\n"
+    text += f"  area: {json.dumps({'points': points})}\n".replace('"', "")
+    (root / "spec" / "given.yaml").write_text(text, "utf-8")
+    page = export_calibration(f"kinds_{number}", root=root, calibrations=["given"])
+    tables = {short(c.name): c.items for c in page.tunable if c.items}
+    assert tables["line"] == tuple(rounded(Fraction(value), number) for value in line)
+    assert tables["area"] == tuple(rounded(Fraction(value), number) for value in area)
+    comes_back(root, page, f"kinds_{number}", form)
 
 
 def test_a_value_finer_than_its_type_is_solved_for_as_the_page_holds_it(root: Path) -> None:

@@ -122,3 +122,84 @@ def test_a_bare_number_is_in_the_unit_of_the_parameter(tmp_path: Path) -> None:
     text = FIT.format(of="driveline").replace("5.2 kN*m/rad", "5200")
     project_of(tmp_path, fit=text)
     assert value(project, "better", "k_hs") == 5200
+
+
+LIMITED = """language: 1
+automaton: limited
+period: 10 ms
+numbers: float64
+parameters:
+  one: {value: 2}
+  lim:
+    tunable: true
+    range: [0, 50]
+    table: {over: T, unit: N*m, points: {20 degC: 40, 90 degC: 5}}
+  map: {table: {over: [T, w], points: {20: {0: 1, 9: 2}, 90: {0: 3, 9: 4}}}}
+inputs: {T: {unit: degC, range: [-40, 150]}, w: {unit: rad/s, range: [0, 9]}}
+equations: {most: "lookup(lim, T)", share: "one * lookup(map, T, w)"}
+modes: {run: {}}
+outputs: [most, share]
+"""
+RIG = """language: 1
+system: rig
+inputs: {T: {unit: degC}}
+instances: {a: {of: limited}, b: {of: limited, values: {lim: {points: {90 degC: 6}}}}}
+connections: {a.T: T, b.T: T, a.w: 0 rad/s, b.w: 0 rad/s}
+"""
+
+
+def tabled(folder: Path, parameters: str) -> Project:
+    head = "language: 1\ncalibration: tables\nof: limited\nparameters:\n"
+    warm = "language: 1\nvariant: warm\nextends: limited\ncalibrations: [tables]\n"
+    return project_of(folder, limited=LIMITED, tables=head + parameters, warm=warm, rig=RIG)
+
+
+def items(project: Project, name: str, parameter: str) -> list[float]:
+    table = load_automaton(name, project).parameters[parameter].table
+    assert table
+    return [float(value) for value in table.values]
+
+
+def test_a_calibration_has_values_at_points_of_a_table(tmp_path: Path) -> None:
+    """However a point is written; those that are not named stay."""
+    rows = "{90: {9 rad/s: 8}, 20: {0: -1, 9: -2}}"
+    lim = "{points: {363.15 K: 0.004 kN*m}}"
+    project = tabled(tmp_path, f"  lim: {lim}\n  map: {{points: {rows}}}\n")
+    assert items(project, "warm", "lim") == [40, 4]
+    assert items(project, "warm", "map") == [-1, -2, 3, 8]
+    assert load_automaton("warm", project).parameters["lim"].kind == "tunable"
+    assert explaining.explained("tables", "model", {}, tmp_path).splitlines() == [
+        f"lim = {lim}  # tunable",
+        f"map = {{points: {rows}}}  # fixed",
+    ]
+    assert mw.check("tables", tmp_path) == [] == mw.check("warm", tmp_path)
+
+
+def test_instances_have_values_at_points_of_their_own(tmp_path: Path) -> None:
+    project = tabled(tmp_path, "  lim: {points: {20 degC: 30}}\n")
+    plain = read_system(read_document(project.path_of("rig")), project).instances
+    found = {name: one.automaton.parameters["lim"].table for name, one in plain.items()}
+    assert {name: [float(v) for v in table.values] for name, table in found.items() if table} == {
+        "a": [40, 5],
+        "b": [40, 6],
+    }
+
+
+@pytest.mark.parametrize(
+    ("parameters", "label"),
+    [
+        ("  lim: {points: {50 degC: 3}}", "the table has no point `50 degC`"),
+        ("  lim: {points: {90 rad: 3}}", "the table has no point `90 rad`"),
+        ("  lim: {points: {90 degC: 3 s}}", "`s` does not fit the unit `N*m`"),
+        ("  lim: {points: {90 degC: 51}}", "this value is outside the range"),
+        ("  lim: {points: {90 degC: {0: 1}}}", "at `90 degC` the table has a value"),
+        ("  map: {points: {90: 3}}", "at `90` the table has a row of values"),
+        ("  lim: {points: 3}", "the values of a table are `{points: {...}}`"),
+        ("  lim: {points: {90 degC: 3}, std: 1 N*m}", "a table has `points`, no `std`"),
+        ("  one: {points: {90 degC: 3}}", "this parameter has no table"),
+    ],
+)  # fmt: skip
+def test_what_is_no_value_at_a_point(tmp_path: Path, parameters: str, label: str) -> None:
+    project = tabled(tmp_path, parameters + "\n")
+    (line,) = told(lambda: load_automaton("warm", project))
+    assert line.endswith(label)
