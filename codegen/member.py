@@ -84,14 +84,22 @@ def field_of(variable: Variable, number: NumberType) -> Field:
 def _constant(constant: Constant, number: NumberType) -> Field:
     comment = "; ".join(text for text in (shown_unit(constant.unit), constant.key) if text)
     if constant.range:
-        low, high = constant.range
-        comment += f"; {decimal(low, number)} to {decimal(high, number)}"
+        low, high = (
+            str(int(end)) if constant.type == "whole" else decimal(end, number)
+            for end in constant.range
+        )
+        comment += f"; {low} to {high}"
     value = literal(constant.value, number)
     if constant.items:
         value = f"{{{', '.join(literal(item, number) for item in constant.items)}}}"
-    kind = c_type(Variable(constant.name, constant.type, values=constant.values), number)
+    kind = _kind(constant, number)
     comment = "; ".join(text for text in (comment, constant.about) if text)
     return Field(kind, c_member(constant.name), safe(comment), value, len(constant.items))
+
+
+def _kind(constant: Constant, number: NumberType) -> str:
+    unit = constant.unit if constant.type == "whole" else ""
+    return c_type(Variable(constant.name, constant.type, unit, values=constant.values), number)
 
 
 def _groups(program: Program) -> list[tuple[str, list[Field]]]:

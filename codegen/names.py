@@ -8,7 +8,7 @@ from functools import cached_property
 
 from language.model import CHART
 from language.number import NumberType
-from language.program import MODE, Program, Variable, mode_variable, short
+from language.program import MODE, TICKS, Program, Variable, mode_variable, short
 
 REAL: Mapping[NumberType, str] = {"float64": "double", "float32": "float"}
 MODES = ("memory.mode", "memory.run_mode")
@@ -82,7 +82,8 @@ class CNames:
     @cached_property
     def _unsigned(self) -> frozenset[str]:
         kinds = {v.name: c_type(v, self.number) for v in self.program.variables}
-        return frozenset(name for name, kind in kinds.items() if kind.startswith("uint"))
+        ticks = (c.name for c in self.program.constants if c.unit == TICKS)
+        return frozenset((*(n for n, kind in kinds.items() if kind.startswith("uint")), *ticks))
 
     def _values(self, name: str) -> tuple[str, ...]:
         return next((values for known, values in _lists(self.program) if known == name), ())
@@ -101,7 +102,7 @@ def c_type(variable: Variable, number: NumberType) -> str:
         return "bool"
     if variable.values:
         return "uint8_t"
-    if variable.name.startswith("timer."):
+    if variable.name.startswith("timer.") or variable.unit == TICKS:
         return "uint16_t"
     if variable.name == "memory.faults":
         return "uint32_t"

@@ -92,6 +92,8 @@ def _all_tunable(batch: Batch, scenario: Scenario) -> Adjustment | None:
             made.append(programs_of(system, scenario))
     except SpecError:
         return None
+    if any(_is_whole(made[0], name) for name in names):
+        return None
     low, high = ({n: digest(_without_values(p)) for n, p in part.items()} for part in made)
     tuned = {name: _tunable_of(name, batch) for name in names}
     return Adjustment(systems[0], scenario, made[0], tuned, {}) if low == high else None
@@ -214,9 +216,18 @@ def _why_rebuilt(batch: Batch, scenario: Scenario, name: str) -> str | None:
         made = [programs_of(_as_tunable(system, owner, short), scenario)[owner] for system in ends]
     except SpecError as error:
         return f"{error.problems[0].label}: a Program for each value"
+    if _is_whole({owner: made[0]}, name):
+        return f"`{name}` is kept in ticks: a Program for each value"
     if len({digest(_without_values(program)) for program in made}) == 1:
         return None
     return f"`{owner}` has numbers or times that are solved from it: a Program for each value"
+
+
+def _is_whole(programs: Mapping[str, Program], name: str) -> bool:
+    """Tell whether a tunable is no real in its Program: a wait is kept in ticks."""
+    owner, _, own = name.partition(".")
+    constants = programs[owner].constants if owner in programs else ()
+    return any(c.name == f"calibration.{own}" and c.type != "real" for c in constants)
 
 
 def _alone(system: System, owner: str) -> System:
@@ -229,7 +240,9 @@ def _alone(system: System, owner: str) -> System:
 def _without_values(program: Program) -> Program:
     """Return a Program in which tunables, and what follows from them, have no value."""
     constants = tuple(
-        dataclasses.replace(c, value=0.0) if c.kind in ("tunable", "derived") else c
+        dataclasses.replace(c, value=0.0)
+        if c.kind in ("tunable", "derived") and c.type == "real"
+        else c
         for c in program.constants
     )
     return dataclasses.replace(program, constants=constants)

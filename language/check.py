@@ -38,6 +38,7 @@ from language.region import sources, with_regions
 from language.scope import Scope
 from language.syntax import KEPT, Tree, whole_literal
 from language.units import Dimension, Unit, common, fits, shown_unit
+from language.wait import check_tunable_waits
 
 WHOLES = (Whole, Enumeration)
 
@@ -62,6 +63,7 @@ def check_automaton(automaton: Automaton, problems: Problems) -> Automaton:
         check_automaton(checked.model, problems)
     problems.stop_if_any()
     check_unused(checked, problems)
+    check_tunable_waits(checked, problems)
     return checked
 
 

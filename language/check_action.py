@@ -15,6 +15,7 @@ from language.parameter import parameter_kinds
 from language.problem import Problems, nearest
 from language.syntax import EDGES, MEMORY, TIMES, names
 from language.units import SECOND
+from language.wait import tunable_wait
 
 
 def check_assignments(
@@ -63,7 +64,8 @@ def check_ways(
         guard.truth(transition.when.tree, "when")
         if transition.wait:
             constant.quantity(transition.wait.tree, SECOND, "wait")
-            _check_fixed(automaton, transition.wait, problems)
+            if tunable_wait(automaton, transition.wait) is None:
+                _check_fixed(automaton, transition.wait, problems)
         check_assignments(automaton, transition.reset, check, problems)
         if transition.rewind:
             check.truth(transition.rewind.until.tree, "until")

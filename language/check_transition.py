@@ -4,7 +4,6 @@ that are nearer to each other than a period. Warnings: nothing of it is ambiguou
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from fractions import Fraction
@@ -25,6 +24,7 @@ from language.precedence import (
 from language.problem import Problems, Span, SpecError
 from language.region import by_priority
 from language.transition_table import STAY
+from language.wait import range_in_ticks, ticks_of, tunable_wait
 
 BY_PRIORITY = "give it a smaller priority, or "
 BY_ORDER = "let the other guard exclude it, choose the other `order`, or "
@@ -73,6 +73,8 @@ def check_waits(automaton: Automaton, inquiry: Inquiry, problems: Problems) -> N
     for mode in automaton.all_modes:
         guards = _Guards(automaton, mode, inquiry)
         for earlier, later in _pairs(mode):
+            if any(tunable_wait(automaton, way.wait) for way in (earlier, later)):
+                continue
             first, second = (_wait(automaton, way) for way in (earlier, later))
             apart = abs(first - second)
             if first and second and 0 < apart < automaton.period:
@@ -128,9 +130,12 @@ class _Guards:
         return self.known[transition.key]
 
     def held(self, transition: Transition) -> Fraction:
-        """Return how long a guard has to hold: whole ticks of a sampled automaton, else [s]."""
+        """Return how long a guard has to hold: whole ticks of a sampled automaton, else [s].
+
+        At most, where that is tunable.
+        """
         if transition.key not in self.waits:
-            self.waits[transition.key] = _held(self.automaton, transition)
+            self.waits[transition.key] = _held(self.automaton, transition, 1)
         return self.waits[transition.key]
 
     def _guard(self, transition: Transition) -> Expr | None:
@@ -185,7 +190,7 @@ class _Guards:
         if guard is None:
             return False
         before = {way.key for way in winners(self.automaton, self.mode, transition)}
-        wait = self.held(transition)
+        wait = _held(self.automaton, transition, 0)
         first = self._first(transition)
         at_once = [way for way in first if way.key in before and not self.held(way)]
         lasted = self._lasted(wait)
@@ -208,7 +213,7 @@ class _Guards:
 
     def _first(self, transition: Transition) -> list[Transition]:
         """Return the transitions that fire first wherever both guards hold from one time on."""
-        wait = self.held(transition)
+        wait = _held(self.automaton, transition, 0)
         before = {way.key: way for way in winners(self.automaton, self.mode, transition)}
         own = self.mode.transitions
         along = {way.key: way for way in own if comes_along(self.automaton, way, transition)}
@@ -260,10 +265,16 @@ def _wait(automaton: Automaton, transition: Transition) -> Fraction:
     return exact_value(transition.wait, automaton) if transition.wait else Fraction(0)
 
 
-def _held(automaton: Automaton, transition: Transition) -> Fraction:
-    """Return how long a guard has to hold: whole ticks of a sampled automaton, else [s]."""
+def _held(automaton: Automaton, transition: Transition, end: int) -> Fraction:
+    """Return how long a guard has to hold: whole ticks of a sampled automaton, else [s].
+
+    Of a tunable wait that is an end of its range: 0 the shortest, 1 the longest.
+    """
+    tunable = tunable_wait(automaton, transition.wait)
+    if tunable:
+        return range_in_ticks(automaton, automaton.parameters[tunable])[end]
     wait = _wait(automaton, transition)
-    return Fraction(math.ceil(wait / automaton.period)) if automaton.period else wait
+    return Fraction(ticks_of(automaton, wait)) if automaton.period else wait
 
 
 def _pairs(mode: Mode) -> Iterator[tuple[Transition, Transition]]:

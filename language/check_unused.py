@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Iterator, Mapping
-from typing import Any
+from collections.abc import Iterator
 
-from language.declaration import Formula
-from language.model import Automaton, Balance, Mode
-from language.problem import Problems, Span
-from language.syntax import names
+from language.model import Automaton, Mode
+from language.problem import Problems
+from language.reading import all_names
 
 HINT = "make it an output, or remove it"
 
@@ -19,7 +16,7 @@ def check_unused(automaton: Automaton, problems: Problems) -> None:
     writer. What an automaton has from its model is looked at there.
     """
     model = automaton.model
-    read = {*_names(automaton), *map(automaton.source_of, automaton.outputs)}
+    read = {*all_names(automaton), *map(automaton.source_of, automaton.outputs)}
     read |= {name for m in automaton.all_modes for way in m.transitions for name in way.events}
     read |= {*_observed(automaton), *(_run_names(automaton) if model else ())}
     for name, parameter in automaton.parameters.items():
@@ -84,24 +81,3 @@ def _run_names(automaton: Automaton) -> Iterator[str]:
     if any(mode.run for mode in automaton.modes.values()):
         yield from automaton.model.inputs
         yield from automaton.model.states
-
-
-def _names(automaton: Automaton) -> Iterator[str]:
-    """Yield the names in all expressions of an automaton; its own ones, no model's."""
-    stack: list[Any] = [
-        getattr(automaton, field.name)
-        for field in dataclasses.fields(automaton)
-        if field.name != "model"
-    ]
-    while stack:
-        thing = stack.pop()
-        if isinstance(thing, Formula):
-            yield from thing.reads
-        elif isinstance(thing, Balance):
-            yield from (name.path for side in (thing.left, thing.right) for name in names(side))
-        elif isinstance(thing, Mapping):
-            stack += thing.values()
-        elif isinstance(thing, tuple):
-            stack += thing
-        elif dataclasses.is_dataclass(thing) and not isinstance(thing, Span):
-            stack += [getattr(thing, field.name) for field in dataclasses.fields(thing)]

@@ -18,6 +18,7 @@ from language.parameter import constant_names, constant_of, owner, parameter_kin
 from language.problem import Problems, SpecError
 from language.program import Constant
 from language.syntax import Arithmetic, Name, Negative, Number, Power, Tree
+from language.wait import ticks_of, tunable_waits
 
 
 def parameter_constants(automaton: Automaton, problems: Problems) -> dict[str, Constant]:
@@ -31,6 +32,8 @@ def parameter_constants(automaton: Automaton, problems: Problems) -> dict[str, C
         if parameter.derived:
             formula = assigned(parameter.derived.tree, known, False)
             value = float(evaluate(formula, values, automaton.numbers))
+        elif name in tunable_waits(automaton):
+            value = ticks_of(automaton, parameter.value or Fraction(0))
         else:
             value = rounded(parameter.value or Fraction(0), automaton.numbers)
         if not math.isfinite(value):

@@ -10,6 +10,7 @@ from language.document import Entry, Node, Scalar, Table
 from language.experiment import Page, System
 from language.problem import Problems, Source, Span, nearest
 from language.stimulus import StimulusReader
+from language.wait import tunable_waits
 
 
 def read_pages(node: Node | None, system: System, problems: Problems) -> tuple[Page, ...]:
@@ -46,7 +47,11 @@ class _PageReader(StimulusReader):
         super().__init__(problems)
         self.system = system
         self.tunable: dict[str, dict[str, Parameter]] = {
-            name: {p.name: p for p in instance.automaton.parameters.values() if _may_change(p)}
+            name: {
+                p.name: p
+                for p in instance.automaton.parameters.values()
+                if _may_change(p) and p.name not in tunable_waits(instance.automaton)
+            }
             for name, instance in system.instances.items()
         }
 
@@ -86,5 +91,5 @@ class _PageReader(StimulusReader):
 
 
 def _may_change(parameter: Parameter) -> bool:
-    """Tables, whole numbers and words stay as they are while a system runs."""
+    """Tables, whole numbers, waits and words stay as they are while a system runs."""
     return parameter.kind == "tunable" and parameter.type == "real" and parameter.table is None

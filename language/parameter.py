@@ -16,8 +16,9 @@ from language.operation import (
     Ref,
     Value,
 )
-from language.program import Constant, value_type
+from language.program import TICKS, Constant, value_type
 from language.units import Unit
+from language.wait import range_in_ticks, tunable_waits
 
 
 @once
@@ -77,15 +78,17 @@ def constant_of(automaton: Automaton, name: str, kind: str, value: float) -> Con
     """Return the Program's constant for a parameter."""
     parameter = automaton.parameters[name]
     groups = {"fixed": "constant", "tunable": "calibration", "derived": "derived"}
-    limits = parameter.range
+    is_wait = name in tunable_waits(automaton)
+    limits = range_in_ticks(automaton, parameter) if is_wait else parameter.range
+    kept: Type = "int" if is_wait else parameter.type
     return Constant(
         name=f"{groups[kind]}.{name}",
         kind=kind,  # type: ignore[arg-type]
-        value=typed(value, parameter.type),
-        unit=si_text(automaton, name),
+        value=typed(value, kept),
+        unit=TICKS if is_wait else si_text(automaton, name),
         key=f"{owner(automaton, name)} {parameter.key}",
         range=(rounded(limits[0]), rounded(limits[1])) if limits else None,
-        type=value_type(parameter.type),
+        type=value_type(kept),
         values=parameter.values,
         items=tuple(rounded(item) for item in parameter.table.values) if parameter.table else (),
         about=parameter.about,

@@ -29,6 +29,10 @@ LOG = "memory.log"
 LOGGED = "memory.count_of_log"
 """The transitions of a tick with several micro-steps, a 0 after each step, and how many entries."""
 ValueType = Literal["real", "truth", "whole"]
+TICKS = "tick"
+"""The unit of a tunable wait on a calibration page."""
+MOST_TICKS = 65535
+"""What a counter of ticks goes up to (rule 4)."""
 
 
 @dataclass(frozen=True)
@@ -90,6 +94,7 @@ class TransitionInfo:
 
     `slot` is the ending of the variables of its guard, see language/region.py; `rewind` are the
     ticks that it looks back; `between` are the paths of source and target in a chart, "" for none.
+    `tunable` is the constant that holds the ticks of a tunable wait.
     """
 
     number: int
@@ -104,6 +109,12 @@ class TransitionInfo:
     slot: str = "0"
     rewind: int = 0
     between: tuple[str, str] | None = None
+    tunable: str | None = None
+
+    @property
+    def most(self) -> int:
+        """What the timer counts to: one more than the wait, or than the longest tunable one."""
+        return MOST_TICKS if self.tunable else self.ticks + 1
 
 
 @dataclass(frozen=True)

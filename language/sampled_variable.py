@@ -45,7 +45,7 @@ def sampled_variables(
     found += input_variables(automaton, "before")
     for info in transitions:
         if info.timer:
-            about = f"ticks that the guard has been true, at most {info.ticks + 1}"
+            about = f"ticks that the guard has been true, at most {info.most}"
             found.append(Variable(info.timer, "whole", about=about))
     found += observer_variables(automaton)
     found += covariance_variables(automaton)

@@ -37,6 +37,7 @@ from language.operation import (
 )
 from language.program import Variable, mode_variable
 from language.region import by_priority
+from language.transition import awaited
 
 NOTHING = (1, 0)
 """First and last node of an inside that is empty."""
@@ -87,11 +88,11 @@ def _watched(charting: Charting, node: Node, mode: Mode) -> tuple[Block, Block]:
         if info.timer:
             timer = Ref(info.timer)
             key = f"{automaton.name} {transition.when.key}"
-            counts.insert(0, Count(info.timer, enabled, info.ticks + 1, key))
+            counts.insert(0, Count(info.timer, enabled, info.most, key))
             begin = (Assign(info.timer, whole(1)),)
             begun = (Branch(Compare("==", timer, whole(0)), begin),)
             later.insert(0, Branch(enabled, begun, (Assign(info.timer, whole(0)),)))
-            enabled = Compare(">", timer, whole(info.ticks))
+            enabled = Compare(">", timer, awaited(info))
         take = Assign(wish(node.region), whole(info.number), info.key)
         chain = (Branch(enabled, (take,), chain),)
     return _counting(charting, mode, edges, tuple(counts), tuple(later)), chain

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import ChainMap
 from collections.abc import Callable, Mapping
 from fractions import Fraction
@@ -33,9 +32,7 @@ from language.problem import Problems
 from language.program import TransitionInfo, fired_variable, mode_variable
 from language.region import by_priority, slot
 from language.rewind import carry_on, equations_there, known_there
-
-MAX_TICKS = 65534
-"""Longest wait: the counters are uint16 and count one further (semantics, rule 4)."""
+from language.wait import MAX_TICKS, ticks_of, tunable_wait
 
 
 def transition_infos(automaton: Automaton, problems: Problems) -> tuple[TransitionInfo, ...]:
@@ -48,13 +45,14 @@ def transition_infos(automaton: Automaton, problems: Problems) -> tuple[Transiti
             if transition.wait:
                 with problems.collecting():
                     wait = exact_value(transition.wait, automaton)
-            ticks = math.ceil(wait / automaton.period) if automaton.period else 0
+            ticks = ticks_of(automaton, wait) if automaton.period else 0
+            tunable = tunable_wait(automaton, transition.wait)
             if transition.wait and wait < 0:
                 problems.error("wait", transition.wait.span, "a wait is not negative")
             if transition.wait and ticks > MAX_TICKS:
                 label = f"a wait of {ticks} ticks is longer than {MAX_TICKS}"
                 problems.error("wait", transition.wait.span, label)
-            timed = ticks > 0 if automaton.period else wait > 0
+            timed = (ticks > 0 or tunable is not None) if automaton.period else wait > 0
             target = 0 if automaton.tree else automaton.target(transition).number
             found.append(
                 TransitionInfo(
@@ -70,9 +68,15 @@ def transition_infos(automaton: Automaton, problems: Problems) -> tuple[Transiti
                     slot=slot(mode.region, k),
                     rewind=back.get(id(transition), 0),
                     between=_between(automaton, transition),
+                    tunable=f"calibration.{tunable}" if tunable else None,
                 )
             )
     return tuple(found)
+
+
+def awaited(info: TransitionInfo) -> Expr:
+    """Return the ticks that a guard must have held, without the first."""
+    return Ref(info.tunable, whole=True) if info.tunable else whole(info.ticks)
 
 
 def _between(automaton: Automaton, transition: Transition) -> tuple[str, str] | None:
@@ -122,8 +126,8 @@ def sampled_jump(
         enabled = expression(transition.when.tree, known)
         if info.timer:
             key = f"{automaton.name} {transition.when.key}"
-            counters.insert(0, Count(info.timer, enabled, info.ticks + 1, key))
-            enabled = Compare(">", Ref(info.timer), whole(info.ticks))
+            counters.insert(0, Count(info.timer, enabled, info.most, key))
+            enabled = Compare(">", Ref(info.timer), awaited(info))
         fire: list[Op] = [Assign(fired_variable(mode.region), whole(info.number), info.key)]
         if not automaton.regions:
             fire = _micro_step(automaton, transition, infos, (now, known), fire)

@@ -74,6 +74,13 @@ def calibration_text(name: str, of: str, origin: str, date: str, values: Mapping
     return "\n".join(lines) + "\n"
 
 
+def exact_text(number: Fraction) -> str:
+    """Return a number that has a finite decimal as the language writes it."""
+    return _literal(
+        Context(prec=MOST_DIGITS).divide(number.numerator, number.denominator).normalize()
+    )
+
+
 def _nearest(parameter: Parameter, value: float, number: NumberType) -> tuple[Decimal, Unit]:
     """Return the shortest decimal of a value, and the unit that it is in."""
     own, limits = parameter.unit, parameter.range

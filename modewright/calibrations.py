@@ -7,9 +7,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from codegen.exchange.characteristic import PageFile
+from codegen.exchange.desk import Remark
 from codegen.exchange.formats import FORMATS, read_page
 from codegen.exchange.page import page_constants, page_name, page_of
-from codegen.exchange.taking import Remark, Taken, taken
+from codegen.exchange.taking import Taken, taken
 from language.document import Document, Node, Scalar
 from language.load import automaton_of, program_of
 from language.model import Automaton

@@ -8,8 +8,8 @@ from typing import Any
 from rich.console import Console
 from rich.markup import escape
 
+from codegen.exchange.desk import Remark
 from codegen.exchange.page import page_name, value_text
-from codegen.exchange.taking import Remark
 from language.problem import Problem, render_all
 from language.program import Constant, short
 from language.text import visible

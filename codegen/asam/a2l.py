@@ -130,7 +130,8 @@ def _common(
     """Return what both have: name, type, limits, address."""
     place = where.place(one) if where else None
     page = f"{program.name}_default_cal.{one.path}" if isinstance(one, Characteristic) else ""
-    low, high = (_number(end, one.type, program.number) for end in one.limits)
+    factor = one.conversion.factor
+    low, high = (_number(end * factor, one.type, program.number) for end in one.limits)
     known = {
         "name": one.name,
         "about": safe(one.about),
@@ -240,7 +241,8 @@ def _mask(one: Measurement) -> str | None:
 
 
 def _number(value: float, kind: str, number: NumberType) -> str:
-    return decimal(float(value), number) if kind in ("double", "float") else str(int(value))
+    is_real = kind in ("double", "float") or value != int(value)
+    return decimal(float(value), number) if is_real else str(int(value))
 
 
 def _hex(address: int) -> str:

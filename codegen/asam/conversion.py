@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass
 
-from language.program import Constant, Program, Variable, fired_variable
+from language.program import TICKS, Constant, Program, Variable, fired_variable
 from language.units import shown_unit
 
 
@@ -34,7 +34,8 @@ def conversion_of(item: Variable | Constant, program: Program) -> Conversion:
         return Conversion("" if item.unit == "1" else shown_unit(item.unit))
     if item.type == "truth":
         return TRUTH
-    if item.name.startswith("timer.") and program.period:
+    is_count = item.name.startswith("timer.") or item.unit == TICKS
+    if is_count and program.period:
         return Conversion("ms", float(program.period * PER_SECOND))
     return _numbered(program).get(item.name, COUNT)
 

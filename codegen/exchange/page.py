@@ -12,8 +12,9 @@ from codegen.source import stepped
 from language.declaration import LookupTable
 from language.model import Automaton
 from language.number import NumberType, decimal, rounded
-from language.program import Constant, Program, short
+from language.program import TICKS, Constant, Program, short
 from language.units import shown_unit
+from language.written import exact_text
 
 STAMP = "solved.stamp_"
 
@@ -54,6 +55,8 @@ def _characteristic(automaton: Automaton, program: Program, constant: Constant) 
     if constant.kind == "tunable":
         table = automaton.parameters[short(constant.name)].table
     items = constant.items or (constant.value,)
+    if constant.unit == TICKS:
+        return _wait(automaton, program, constant)
     is_text = constant.type == "truth" or bool(constant.values)
     is_told = constant.type == "real" and (
         constant.kind == "tunable" or constant.name.startswith(STAMP)
@@ -66,6 +69,14 @@ def _characteristic(automaton: Automaton, program: Program, constant: Constant) 
         is_text,
         constant.about,
     )
+
+
+def _wait(automaton: Automaton, program: Program, constant: Constant) -> Characteristic:
+    """Return a tunable wait, which is kept in ticks, as the time that it is."""
+    assert automaton.period
+    time = int(constant.value) * automaton.period
+    name = Cell(page_name(program, constant))
+    return Characteristic(name, (Cell(exact_text(time)),), Cell("s"), about=constant.about)
 
 
 def axes_of(table: LookupTable, number: NumberType) -> tuple[Axis, ...]:

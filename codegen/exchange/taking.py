@@ -7,44 +7,36 @@ its points are. Solved numbers are never taken.
 from __future__ import annotations
 
 import dataclasses
+import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from fractions import Fraction
-from typing import Literal
 
 from codegen.exchange.characteristic import (
     MAX_PROBLEMS,
-    Axis,
     Cell,
     Characteristic,
     PageFile,
 )
-from codegen.exchange.exact import exact, unit_of
-from codegen.exchange.page import axes_of, page_constants, page_name
+from codegen.exchange.desk import Desk, Remark, in_type, real_of, unit_beside
+from codegen.exchange.exact import exact
+from codegen.exchange.page import page_constants, page_name
+from codegen.exchange.points import table_of
 from language.declaration import Parameter
 from language.document import Node, Scalar
 from language.kind import LARGEST_WHOLE
 from language.model import Automaton
-from language.number import NumberType, decimal, rounded
-from language.problem import Problems, Span, nearest
-from language.program import Constant, Program, short
-from language.units import NO_UNIT, Unit
-from language.written import points_of, value_in_unit
+from language.problem import Problems, nearest
+from language.program import TICKS, Constant, Program, short
+from language.units import NO_UNIT, parse_unit
+from language.written import exact_text, value_in_unit
 
+SECOND_UNIT = parse_unit("s")
+NEAR = Fraction(1, 10**6)
+"""Ticks by which the time of a tool may miss a whole one: it has multiplied doubles."""
 PLACE = re.compile(r"\d{1,4}(\.0*)?", re.ASCII)
 """The number of a word in its list, as tools without words write it: `1`, `1.0000`."""
-RemarkKind = Literal["rounded", "converted", "no unit", "missing", "passed over"]
-
-
-@dataclass(frozen=True)
-class Remark:
-    """What is worth knowing of a name of the file: its place (None where it is absent), a text."""
-
-    kind: RemarkKind
-    name: str
-    text: str
-    span: Span | None = None
 
 
 @dataclass(frozen=True)
@@ -57,19 +49,6 @@ class Taken:
     values: Mapping[str, Node]
     solved: Mapping[str, float]
     remarks: tuple[Remark, ...]
-
-
-@dataclass(frozen=True)
-class _Desk:
-    """What is compared with, and what was found until now."""
-
-    automaton: Automaton
-    number: NumberType
-    problems: Problems
-    remarks: list[Remark] = field(default_factory=list)
-
-    def remark(self, kind: RemarkKind, cell: Cell, text: str, at: Span | None = None) -> None:
-        self.remarks.append(Remark(kind, cell.text, text, at or cell.span))
 
 
 def taken(
@@ -85,7 +64,7 @@ def taken(
     functions of the ECU.
     """
     known = {page_name(program, constant): constant for constant in page_constants(program)}
-    desk = _Desk(automaton, program.number, problems)
+    desk = Desk(automaton, program.number, problems)
     if own_only:
         file = _own(file, program.name, desk)
     given = _known(file, known, program.name, problems)
@@ -105,7 +84,7 @@ def taken(
     return Taken(values, solved, tuple(desk.remarks))
 
 
-def _own(file: PageFile, owner: str, desk: _Desk) -> PageFile:
+def _own(file: PageFile, owner: str, desk: Desk) -> PageFile:
     """Return what is the automaton's of a file that other functions of the ECU have values in."""
     own = tuple(one for one in file.characteristics if one.name.text.startswith(f"{owner}."))
     for one in file.characteristics:
@@ -134,23 +113,25 @@ def _known(
     return given
 
 
-def _solved(one: Characteristic, constant: Constant, desk: _Desk) -> dict[str, float]:
+def _solved(one: Characteristic, constant: Constant, desk: Desk) -> dict[str, float]:
     cell = _single(one, desk.problems)
     number = exact(cell, desk.problems) if cell else None
     if cell is None or number is None:
         return {}
-    value = _in_type(number, NO_UNIT, cell, desk)
+    value = in_type(number, NO_UNIT, cell, desk)
     return {} if value is None else {constant.name: value}
 
 
-def _value(one: Characteristic, constant: Constant, desk: _Desk) -> Node | None:
+def _value(one: Characteristic, constant: Constant, desk: Desk) -> Node | None:
     """Return the value of a parameter as a calibration file has it, None where it is not taken."""
     parameter = desk.automaton.parameters[short(constant.name)]
     if parameter.table:
-        return _table(one, constant, parameter, desk)
+        return table_of(one, constant, parameter, desk)
     cell = _single(one, desk.problems)
     if cell is None:
         return None
+    if constant.unit == TICKS:
+        return _wait(one, cell, constant, desk)
     if parameter.type == "real":
         value = _real(one, cell, parameter, desk)
     elif parameter.type == "int":
@@ -169,53 +150,35 @@ def _single(one: Characteristic, problems: Problems) -> Cell | None:
     return None
 
 
-def _real(one: Characteristic, cell: Cell, parameter: Parameter, desk: _Desk) -> float | None:
+def _real(one: Characteristic, cell: Cell, parameter: Parameter, desk: Desk) -> float | None:
     """Return a real in SI, in the working type and in its range; what was done to it is told."""
-    unit = _unit(one, parameter.unit, one.unit, desk)
-    return _item(one, cell, unit, parameter, desk) if unit else None
+    unit = unit_beside(one, parameter.unit, one.unit, desk)
+    return real_of(one, cell, unit, parameter, desk) if unit else None
 
 
-def _item(
-    one: Characteristic, cell: Cell, unit: Unit, parameter: Parameter, desk: _Desk
-) -> float | None:
-    """Return a value of a parameter, single or of a table, that is in a unit."""
+def _wait(one: Characteristic, cell: Cell, constant: Constant, desk: Desk) -> Node | None:
+    """Return a tunable wait, a time of whole ticks; what is none is rounded up, and told."""
+    assert desk.automaton.period and constant.range
+    unit = unit_beside(one, SECOND_UNIT, one.unit, desk)
     number = exact(cell, desk.problems)
-    value = None if number is None else _in_type(number, unit, cell, desk)
-    if number is None or value is None:
+    if unit is None or number is None:
         return None
-    shown = decimal(value, desk.number)
-    if unit.factor != 1 or unit.offset:
-        si = f"{shown} {unit.dimension}".removesuffix(" 1")
-        text = f"`{cell.text} {one.unit.text if one.unit else ''}` is {si}"
-        desk.remark("converted", one.name, text, cell.span)
-    elif number not in (Fraction(shown), Fraction(value)):
-        text = f"`{cell.text}` is rounded to {shown}, its {desk.number}"
+    asked = number * unit.factor / desk.automaton.period
+    near = round(asked)
+    is_whole = abs(asked - near) < NEAR
+    ticks = near if is_whole else math.ceil(asked)
+    kept = ticks * desk.automaton.period
+    if not is_whole:
+        text = f"`{cell.text}` is rounded up to {exact_text(kept)} s, {ticks} ticks"
         desk.remark("rounded", one.name, text, cell.span)
-    limits = parameter.range
-    if limits:
-        low, high = (rounded(limit, desk.number) for limit in limits)
-        if not low <= value <= high:
-            ends = f"{decimal(low, desk.number)} to {decimal(high, desk.number)}"
-            label = f"`{one.name.text}` = {shown} is outside its range, {ends} in SI"
-            desk.problems.error("range", cell.span, label)
-            return None
-    return value
-
-
-def _unit(one: Characteristic, own: Unit, cell: Cell | None, desk: _Desk) -> Unit | None:
-    unit = unit_of(cell, own, desk.problems)
-    if unit and (cell is None or not cell.text.strip()) and not own.dimension.is_number:
-        desk.remark("no unit", one.name, f"has no unit beside it: taken in {unit.text}")
-    return unit
-
-
-def _in_type(number: Fraction, unit: Unit, cell: Cell, desk: _Desk) -> float | None:
-    """Return the value in SI of a number in a unit, None for one that is past the type."""
-    value = rounded(number * unit.factor + unit.offset, desk.number)
-    if abs(value) != float("inf"):
-        return value
-    desk.problems.error("number", cell.span, f"`{cell.text}` is out of the range of {desk.number}")
-    return None
+    low, high = constant.range
+    if not low <= ticks <= high:
+        ends = " to ".join(exact_text(int(end) * desk.automaton.period) for end in (low, high))
+        label = f"`{one.name.text}` = {exact_text(kept)} s is outside its range, {ends} s"
+        desk.problems.error("range", cell.span, label)
+        return None
+    own = desk.automaton.parameters[short(constant.name)].unit
+    return Scalar(f"{exact_text(kept / own.factor)} {own.text}", cell.span)
 
 
 def _whole(cell: Cell, parameter: Parameter, problems: Problems) -> int | None:
@@ -243,52 +206,3 @@ def _word(cell: Cell, parameter: Parameter, problems: Problems) -> int | None:
     label = f"`{cell.text}` is not one of {', '.join(words)}"
     problems.error("choice", cell.span, label, nearest(cell.text, words))
     return None
-
-
-def _table(
-    one: Characteristic, constant: Constant, parameter: Parameter, desk: _Desk
-) -> Node | None:
-    """Return the values of a table at its points, which are compiled in.
-
-    None where it is no such table, which is reported.
-    """
-    assert parameter.table
-    told = len(desk.problems.found)
-    has_points = not one.axes or _have_points(one, parameter, desk)
-    if len(one.values) != len(constant.items) or not has_points:
-        if len(desk.problems.found) == told:
-            label = f"`{one.name.text}` has other points than the table of the spec"
-            hint = "a calibration holds the values at its points: change these in a variant"
-            desk.problems.error("table", one.name.span, label, hint)
-        return None
-    unit = _unit(one, parameter.table.unit, one.unit, desk)
-    found = [_item(one, cell, unit, parameter, desk) for cell in one.values] if unit else []
-    values = [value for value in found if value is not None]
-    if len(values) < len(constant.items):
-        return None
-    return points_of(parameter, values, desk.number, one.values[0].span)
-
-
-def _have_points(one: Characteristic, parameter: Parameter, desk: _Desk) -> bool:
-    """Tell whether the axes of a file are those that are compiled in."""
-    assert parameter.table
-    own = axes_of(parameter.table, desk.number)
-    if [len(axis.points) for axis in one.axes] != [len(axis.points) for axis in own]:
-        return False
-    return all(
-        _has_points(one, axis, ours, declared.unit, desk)
-        for axis, ours, declared in zip(one.axes, own, parameter.table.axes, strict=True)
-    )
-
-
-def _has_points(one: Characteristic, axis: Axis, ours: Axis, own: Unit, desk: _Desk) -> bool:
-    unit = _unit(one, own, axis.unit, desk)
-    return unit is not None and all(
-        _is_value(cell, unit, rounded(Fraction(point.text), desk.number), desk)
-        for cell, point in zip(axis.points, ours.points, strict=True)
-    )
-
-
-def _is_value(cell: Cell, unit: Unit, value: float, desk: _Desk) -> bool:
-    number = exact(cell, desk.problems)
-    return number is not None and _in_type(number, unit, cell, desk) == value

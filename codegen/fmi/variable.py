@@ -35,6 +35,7 @@ LIMITS: Mapping[str, tuple[str, str]] = {
     "bool": ("0.0", "1.0"),
     "int32_t": ("-2147483648.0", "2147483647.0"),
     "uint8_t": ("0.0", "255.0"),
+    "uint16_t": ("0.0", "65535.0"),
 }
 """What a member that may be set can hold, as C."""
 

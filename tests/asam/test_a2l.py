@@ -49,6 +49,18 @@ modes: {run: {}}
 outputs: [T]
 """
 AUTOMATA = ("estimator_simple", "supervisor", "driveline")
+WAITING = """language: 1
+automaton: waiting
+period: 10 ms
+numbers: float32
+parameters: {t_on: {value: 30 ms, tunable: true, range: [20, 500]}}
+inputs: {u: {range: [0, 1]}}
+initial: low
+modes:
+  low: {transitions: {high: {when: u > 0.5, wait: t_on}}}
+  high: {}
+outputs: [mode]
+"""
 
 
 def text_of(used: Program, elf: Path | None = None) -> str:
@@ -133,6 +145,17 @@ def test_curves_and_maps_have_their_axes(tmp_path: Path) -> None:
             for axis in found["maps.most"].axis_descr
         ]
         assert axes == [pytest.approx([293.15, 363.15]), [0.0, 5.0, 9.0]]
+
+
+def test_a_tunable_wait_is_shown_in_ms(tmp_path: Path) -> None:
+    """Raw numbers are ticks of 10 ms; limits are those of what is shown."""
+    with read(text_of(program(WAITING)), tmp_path) as session:
+        found = every(session, "Characteristic")["waiting.t_on"]
+        assert (found.deposit, found.lowerLimit, found.upperLimit) == ("layout.UWORD", 20, 500)
+        method = every(session, "CompuMethod")[found.conversion]
+        assert (method.conversionType, method.unit) == ("LINEAR", "ms")
+        timer = every(session, "Measurement")["waiting.timer.low_high"]
+        assert (timer.conversion, timer.upperLimit) == (found.conversion, 655350)
 
 
 def test_what_would_end_a_text_does_not(tmp_path: Path) -> None:

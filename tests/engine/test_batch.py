@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from language.experiment import Scenario
 from language.signal import Piece
 from modewright.api import load
 
+RULES = Path(__file__).parent.parent / "rules"
 HORIZON = Fraction(3, 20)
 EARLY = Fraction(1, 20)
 MEASURES = tuple(
@@ -98,6 +100,27 @@ def test_what_solved_numbers_and_waits_follow_from_needs_a_program_per_value() -
     result = run_variants(batch)
     stiff = drive({"k_hs": "6000 N*m/rad", "est.t_wait": "2 ms"})
     same(result, 1, simulate(stiff.system, with_step(stiff.scenario, 30, -20)))
+
+
+@pytest.mark.parametrize("waits", [[2e-3, 7.5e-3, 50e-3], [20e-3]])
+def test_a_tunable_wait_is_swept_by_whole_ticks(waits: list[float]) -> None:
+    """Also where it has one value only: the page holds ticks, no seconds."""
+    loaded = load("rig", "run", root=RULES / "a_tunable_wait_is_kept_in_ticks")
+    values = {"a.t_on": np.array(waits)}
+    batch = Batch(loaded.system, loaded.scenario, len(waits), parameters=values, most_events=40)
+    assert set(adjusted(batch).rebuilt) == {"a.t_on"}
+    result = run_variants(batch)
+    for variant, wait in enumerate(waits):
+        again = load(
+            "rig",
+            "run",
+            {"a.t_on": f"{1e3 * wait:g} ms"},
+            RULES / "a_tunable_wait_is_kept_in_ticks",
+        )
+        run = simulate(again.system, again.scenario)
+        times = [float(event.time) for event in run.events]
+        kept = result.event_times[variant]
+        assert kept[np.isfinite(kept)].tolist() == times
 
 
 def test_a_measure_takes_the_rows_of_its_span() -> None:

@@ -129,7 +129,7 @@ def test_stale_solved_numbers_are_told_and_never_taken(capsys: pytest.CaptureFix
 def test_what_a_page_lacks_is_told_and_stays_as_in_the_spec() -> None:
     found = import_calibration(page("kinds_float64.gain,1,1"), "kinds_float64")
     missing = [remark.name for remark in found.remarks if remark.kind == "missing"]
-    names = ("speed", "hot", "share", "whole", "flag", "gear", "line", "area")
+    names = ("speed", "hot", "share", "whole", "flag", "hold", "gear", "line", "area")
     assert missing == [f"kinds_float64.{name}" for name in names]
     assert found.calibration("taken").splitlines()[-2:] == ["parameters:", "  gain: 1"]
 
@@ -145,6 +145,27 @@ def test_names_of_other_functions_are_passed_over_if_that_is_wanted() -> None:
     wrong = page("kinds_float64.gian,1,1", "boost.gain,3,1")
     with pytest.raises(mw.SpecError, match="no tunable parameter or solved number"):
         import_calibration(wrong, "kinds_float64", own_only=True)
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "taken", "told"),
+    [
+        ("0.05", "s", "50 ms", []),
+        ("20.000000000000004", "ms", "20 ms", []),  # a tool has multiplied doubles
+        ("0.0421", "s", "50 ms", ["`0.0421` is rounded up to 0.05 s, 5 ticks"]),
+    ],
+)
+def test_a_tunable_wait_is_a_time_of_whole_ticks(
+    text: str, unit: str, taken: str, told: list[str]
+) -> None:
+    found = import_calibration(page(f"kinds_float64.hold,{text},{unit}"), "kinds_float64")
+    assert found.values == {"hold": taken}
+    assert [remark.text for remark in found.remarks if remark.kind == "rounded"] == told
+
+
+def test_a_tunable_wait_out_of_its_range_is_refused() -> None:
+    with pytest.raises(mw.SpecError, match="is outside its range, 0 to 2 s"):
+        import_calibration(page("kinds_float64.hold,2.001,s"), "kinds_float64")
 
 
 def test_an_empty_table_of_values_is_still_a_calibration() -> None:

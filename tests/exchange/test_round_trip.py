@@ -54,6 +54,7 @@ def reals(low: float, high: float) -> st.SearchStrategy[float]:
     share=reals(-1e30, 1e30),
     whole=st.integers(-9, 900),
     flag=st.booleans(),
+    hold=st.integers(0, 200),
     gear=st.sampled_from(["park", "drive", "back"]),
 )
 def test_a_value_of_each_kind_goes_round(
@@ -66,6 +67,7 @@ def test_a_value_of_each_kind_goes_round(
     share: float,
     whole: int,
     flag: bool,
+    hold: int,
     gear: str,
 ) -> None:
     values = {
@@ -75,6 +77,7 @@ def test_a_value_of_each_kind_goes_round(
         "share": f"{literal(share, number)} percent",
         "whole": str(whole),
         "flag": str(flag).lower(),
+        "hold": f"{10 * hold} ms",
         "gear": gear,
     }
     goes_round(root, f"kinds_{number}", values, form)

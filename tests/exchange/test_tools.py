@@ -36,6 +36,7 @@ def test_a_dcm_file_with_german_comments_and_units_of_its_own(root: Path) -> Non
         "share": "12.5 percent",
         "whole": "7",
         "flag": "false",
+        "hold": "120 ms",
         "gear": "back",
         **TABLES,
     }
@@ -50,7 +51,7 @@ def test_a_dcm_file_with_german_comments_and_units_of_its_own(root: Path) -> Non
 def test_a_dcm_file_with_blocks_of_values_and_places_for_words(root: Path) -> None:
     found = import_calibration(TOOLS / "canape.dcm", "kinds_float64", root)
     assert found.values == {"gain": "0.5", "flag": "true", "gear": "park", **TABLES}
-    assert set(told(found, "missing")) == {"speed", "hot", "share", "whole"}
+    assert set(told(found, "missing")) == {"speed", "hot", "share", "whole", "hold"}
     assert told(found, "no unit") == {"line": "has no unit beside it: taken in N*m"}
 
 
@@ -58,7 +59,7 @@ def test_a_cdfx_file_with_a_document_type_and_shared_axes(root: Path) -> None:
     found = import_calibration(TOOLS / "inca.cdfx", "kinds_float64", root)
     rest = {"gain": "1.25", "hot": "85.5 degC", "flag": "false", "gear": "back"}
     assert found.values == {**rest, **TABLES}
-    assert set(told(found, "missing")) == {"speed", "share", "whole"}
+    assert set(told(found, "missing")) == {"speed", "share", "whole", "hold"}
 
 
 def test_a_csv_file_of_a_spreadsheet(root: Path) -> None:

@@ -23,6 +23,7 @@ parameters:
   share: {{value: 40 percent, tunable: true}}
   whole: {{value: 3, type: int, tunable: true, range: [-9, 900]}}
   flag:  {{value: true, type: bool, tunable: true}}
+  hold:  {{value: 30 ms, tunable: true, range: [0, 2000]}}
   gear:  {{value: drive, type: enum, values: [park, drive, back], tunable: true}}
   line:
     tunable: true
@@ -43,7 +44,7 @@ equations:
   is_fast: w > speed or u > hot
 initial: waiting
 modes:
-  waiting: {{transitions: {{driven: {{when: flag and gear == drive}}}}}}
+  waiting: {{transitions: {{driven: {{when: flag and gear == drive, wait: hold}}}}}}
   driven: {{}}
 outputs: [mode, y_line, y_area, y_rest, is_fast]
 """

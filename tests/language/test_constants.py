@@ -17,7 +17,7 @@ from language.operation import Assign
 from language.parameter import parameter_kinds, parameter_order
 from language.problem import Problems
 from language.program import Program, TransitionInfo
-from language.transition import MAX_TICKS
+from language.wait import MAX_TICKS
 from tests.language.making import automaton, labels, program, refusal, shipped, solved, told, tree
 
 TEXT = """language: 1
@@ -237,7 +237,7 @@ def test_the_longest_wait_fits_its_counter() -> None:
         ("-1 ms", "a wait is not negative"),
         ("3", "this is in `1`, `wait` is in `s`"),
         ("x / 1 m * 1 s", "`x` is not known in `wait`: it is a fixed time"),
-        ("t_c", "`t_c` is tunable: a wait is made of fixed values"),
+        ("2 * t_c", "`t_c` is tunable: a wait is made of fixed values"),
         ("t_d", "`t_d` is derived: a wait is made of fixed values"),
     ],
 )
@@ -245,6 +245,21 @@ def test_what_is_no_fixed_time_is_no_wait(wait: str, label: str) -> None:
     parameters = "  t_c: {value: 1 ms, tunable: true}\n  t_d: {derived: 2 * t_c, unit: s}"
     (problem,) = refusal(lambda: program(clock(parameters, wait=wait)))
     assert problem.label == label
+
+
+def test_a_tunable_wait_is_a_number_of_ticks_on_the_page() -> None:
+    parameters = "  t_c: {value: 30 ms, tunable: true, range: [10, 50.5]}"
+    found = program(clock(parameters, wait="t_c"))
+    (constant,) = (c for c in found.constants if c.kind == "tunable")
+    assert (constant.name, constant.value, constant.type) == ("calibration.t_c", 30, "whole")
+    assert (constant.range, constant.unit) == ((10, 51), "tick")
+    assert waiting(found).tunable == "calibration.t_c" and waiting(found).most == 2**16 - 1
+
+
+def test_a_tunable_wait_of_a_continuous_automaton_is_none() -> None:
+    parameters = "  t_c: {value: 1 ms, tunable: true}"
+    (problem,) = refusal(lambda: program(clock(parameters, wait="t_c", period="")))
+    assert problem.label == "`t_c` is tunable: a wait is made of fixed values"
 
 
 def test_a_wait_may_follow_from_fixed_values() -> None:

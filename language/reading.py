@@ -1,0 +1,39 @@
+"""Reading: the names that the expressions of an automaton read."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from language.declaration import Formula
+from language.model import Automaton, Balance, Transition
+from language.problem import Span
+from language.syntax import names
+
+
+def all_names(automaton: Automaton, with_waits: bool = True) -> Iterator[str]:
+    """Yield the names in all expressions of an automaton, its own ones, no model's.
+
+    `with_waits`: those of `wait` too.
+    """
+    stack: list[Any] = [
+        getattr(automaton, field.name)
+        for field in dataclasses.fields(automaton)
+        if field.name != "model"
+    ]
+    while stack:
+        thing = stack.pop()
+        if isinstance(thing, Formula):
+            yield from thing.reads
+        elif isinstance(thing, Balance):
+            yield from (name.path for side in (thing.left, thing.right) for name in names(side))
+        elif isinstance(thing, Mapping):
+            stack += thing.values()
+        elif isinstance(thing, tuple):
+            stack += thing
+        elif dataclasses.is_dataclass(thing) and not isinstance(thing, Span):
+            fields = {field.name: getattr(thing, field.name) for field in dataclasses.fields(thing)}
+            if isinstance(thing, Transition) and not with_waits:
+                del fields["wait"]
+            stack += fields.values()

@@ -1,0 +1,74 @@
+"""Wait: how long a guard of a sampled automaton must hold, in ticks, fixed or tunable (rule 4).
+
+A tunable wait is kept as a count of ticks: a time in seconds would be rounded to the working type
+and then up to one tick more than was asked for.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from fractions import Fraction
+
+from language.declaration import Formula, Parameter, Range
+from language.model import Automaton, Transition
+from language.once import once
+from language.problem import Problems
+from language.program import MOST_TICKS
+from language.reading import all_names
+from language.syntax import Name
+
+MAX_TICKS = MOST_TICKS - 1
+"""Longest wait: the counters are uint16 and count one further (semantics, rule 4)."""
+
+
+def tunable_wait(automaton: Automaton, wait: Formula | None) -> str | None:
+    """Return the tunable parameter that a wait is, None where it is fixed."""
+    if wait is None or not automaton.period or not isinstance(wait.tree, Name):
+        return None
+    parameter = automaton.parameters.get(wait.tree.path)
+    return parameter.name if parameter and parameter.kind == "tunable" else None
+
+
+@once
+def tunable_waits(automaton: Automaton) -> frozenset[str]:
+    """Return the tunable parameters that are waits."""
+    found = (tunable_wait(automaton, one.wait) for one in _transitions(automaton))
+    return frozenset(name for name in found if name)
+
+
+def ticks_of(automaton: Automaton, time: Fraction) -> int:
+    """Return a time [s] in ticks, rounded up, exactly."""
+    assert automaton.period
+    return math.ceil(time / automaton.period)
+
+
+def range_in_ticks(automaton: Automaton, parameter: Parameter) -> Range:
+    """Return the ticks that a tunable wait may have."""
+    if parameter.range is None:
+        return Fraction(0), Fraction(MAX_TICKS)
+    low, high = (Fraction(ticks_of(automaton, end)) for end in parameter.range)
+    return low, high
+
+
+def check_tunable_waits(automaton: Automaton, problems: Problems) -> None:
+    """Report a tunable wait that something else reads, or that may be too long."""
+    waits = tunable_waits(automaton)
+    if not waits:
+        return
+    read = set(all_names(automaton, with_waits=False))
+    for name in sorted(waits):
+        parameter = automaton.parameters[name]
+        if name in read:
+            label = f"`{name}` is a tunable wait, and read elsewhere too"
+            hint = "it is kept in ticks: take another parameter beside it"
+            problems.error("wait", parameter.span, label, hint)
+        low, high = range_in_ticks(automaton, parameter)
+        if low < 0 or high > MAX_TICKS:
+            label = f"`{name}` is a wait: its range is within 0 to {MAX_TICKS} ticks"
+            problems.error("wait", parameter.span, label)
+
+
+def _transitions(automaton: Automaton) -> Iterator[Transition]:
+    for mode in automaton.all_modes:
+        yield from mode.transitions
