@@ -126,7 +126,7 @@ def _mode_lines(program: Program) -> Iterator[str]:
 
 def _event_lines(program: Program) -> Iterator[str]:
     for t in program.transitions:
-        wait = f" wait {t.wait} s = {t.ticks} ticks" if t.wait else ""
+        wait = f" wait {t.tunable or f'{t.wait} s'} = {t.ticks} ticks" if t.wait else ""
         back = f" rewind {t.rewind} ticks" if t.rewind else ""
         source, target = t.between or (t.source, t.target)
         target = "[]" if target == "" else target
