@@ -126,7 +126,8 @@ def _mode_lines(program: Program) -> Iterator[str]:
 
 def _event_lines(program: Program) -> Iterator[str]:
     for t in program.transitions:
-        wait = f" wait {t.tunable or f'{t.wait} s'} = {t.ticks} ticks" if t.wait else ""
+        waited = t.tunable or (f"{t.wait} s" if t.wait else "")
+        wait = f" wait {waited} = {t.ticks} ticks" if waited else ""
         back = f" rewind {t.rewind} ticks" if t.rewind else ""
         source, target = t.between or (t.source, t.target)
         target = "[]" if target == "" else target
