@@ -17,6 +17,8 @@ TERMS = 19
 """Terms of a Taylor sum of (e^z - 1)/z, |z| <= 1: the rest is below 2^-60, under the rounding."""
 SWEEPS = 50
 """Balancing settles in a few sweeps; the bound only makes its end certain. Any exponents serve."""
+MOST_SCALED = 256
+"""Largest exponent of the scale of a state: beyond it a noise, scaled twice, would overflow."""
 WORTH = 0.95
 """A state is scaled if that shrinks its row plus column by 5 % (Parlett and Reinsch's gamma)."""
 
@@ -124,14 +126,16 @@ def balancing(a: Matrix) -> tuple[int, ...]:
     """Return the exponents e of D = diag(2^e) for which D^-1 A D has rows as large as its columns.
 
     A (n, n), finite. Parlett and Reinsch 1969 (Numer. Math. 13, 293-304), radix 2, no permutation.
-    A state that only acts, or is only acted upon, has no balance: it is scaled until that is < 1.
+    A state that only acts, or is only acted upon, has no balance: it is scaled until that is < 1,
+    by 2^256 at most.
     """
     work = [[abs(x) for x in row] for row in a]
     exponents = [0] * len(a)
     for _ in range(SWEEPS):
         before = tuple(exponents)
         for i in range(len(a)):
-            step = _balancing_step(work, i)
+            wanted = exponents[i] + _balancing_step(work, i)
+            step = max(-MOST_SCALED, min(MOST_SCALED, wanted)) - exponents[i]
             exponents[i] += step
             for j in range(len(a)):
                 if j != i:

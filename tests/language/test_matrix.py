@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 from filterpy.common import van_loan_discretization
-from hypothesis import given, strategies as st
+from hypothesis import example, given, strategies as st
 from numpy.typing import NDArray
 
 from language.matrix import (
@@ -52,6 +52,7 @@ def test_its_integral_is_the_corner_of_the_augmented_exponential(a: Matrix, h: f
 
 
 @given(squares(), st.floats(0.001, 0.1))
+@example(((0.0, 2.2e-311), (1.0, 0.0)), 0.0625)
 def test_the_noise_of_a_period_is_that_of_van_loan(a: Matrix, h: float) -> None:
     n = len(a)
     density = tuple(tuple(float(i == j) * (i + 1) for j in range(n)) for i in range(n))
