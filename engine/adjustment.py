@@ -92,7 +92,7 @@ def _all_tunable(batch: Batch, scenario: Scenario) -> Adjustment | None:
             made.append(programs_of(system, scenario))
     except SpecError:
         return None
-    if any(_is_whole(made[0], name) for name in names):
+    if any(_is_no_real(made[0], name) for name in names):
         return None
     low, high = ({n: digest(_without_values(p)) for n, p in part.items()} for part in made)
     tuned = {name: _tunable_of(name, batch) for name in names}
@@ -216,14 +216,14 @@ def _why_rebuilt(batch: Batch, scenario: Scenario, name: str) -> str | None:
         made = [programs_of(_as_tunable(system, owner, short), scenario)[owner] for system in ends]
     except SpecError as error:
         return f"{error.problems[0].label}: a Program for each value"
-    if _is_whole({owner: made[0]}, name):
+    if _is_no_real({owner: made[0]}, name):
         return f"`{name}` is kept in ticks: a Program for each value"
     if len({digest(_without_values(program)) for program in made}) == 1:
         return None
     return f"`{owner}` has numbers or times that are solved from it: a Program for each value"
 
 
-def _is_whole(programs: Mapping[str, Program], name: str) -> bool:
+def _is_no_real(programs: Mapping[str, Program], name: str) -> bool:
     """Tell whether a tunable is no real in its Program: a wait is kept in ticks."""
     owner, _, own = name.partition(".")
     constants = programs[owner].constants if owner in programs else ()

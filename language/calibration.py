@@ -7,9 +7,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from language.document import Document, Entry, Node, Scalar, Table, require_kind
+from language.points import overlaid
 from language.problem import Problems, Span, nearest
 from language.reader import Reader
-from language.tree import put
+from language.tree import at, entries, put
 from language.values import with_node
 
 CALIBRATION_KEYS = ("language", "calibration", "of", "from", "date", "parameters")
@@ -56,7 +57,9 @@ def calibrated(
     `known` are its parameters by name, those of its model too. Unknown ones are problems.
     """
     for name, value in calibration.values.items():
-        if name not in known:
+        if name not in known and (inner := _inside(tree, name)):
+            tree = put(tree, inner, overlaid(at(tree, inner), value.value))
+        elif name not in known:
             report_unknown(calibration, value, known, problems)
         elif "derived" in known[name].entries:
             label = f"`{name}` is derived: set what it follows from"
@@ -65,6 +68,14 @@ def calibrated(
             made = with_node(known[name], value.value, problems)
             tree = put(tree, ("parameters", name), made)
     return tree
+
+
+def _inside(tree: Table, name: str) -> tuple[str, ...]:
+    """Return the path of a parameter of an instance in an automaton, `k1_t_close`; () for none."""
+    for entry in entries(tree.get("instances")):
+        if name.startswith(f"{entry.key}_"):
+            return "instances", entry.key, "values", name.removeprefix(f"{entry.key}_")
+    return ()
 
 
 def report_unknown(

@@ -53,6 +53,7 @@ def check_automaton(automaton: Automaton, problems: Problems) -> Automaton:
     checked = _declared(automaton, problems)
     problems.stop_if_any()
     check_memory(checked, problems)
+    check_tunable_waits(checked, problems)
     check_reach(checked, problems)
     check_domains(checked, problems)
     problems.stop_if_any()
@@ -63,7 +64,6 @@ def check_automaton(automaton: Automaton, problems: Problems) -> Automaton:
         check_automaton(checked.model, problems)
     problems.stop_if_any()
     check_unused(checked, problems)
-    check_tunable_waits(checked, problems)
     return checked
 
 

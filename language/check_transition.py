@@ -9,7 +9,7 @@ from contextlib import suppress
 from fractions import Fraction
 
 from language.constants import exact_value
-from language.declaration import Formula
+from language.declaration import Formula, Range
 from language.inquiry import Inquiry
 from language.model import Automaton, Mode, Transition
 from language.moment import ELAPSED, Moment
@@ -135,7 +135,7 @@ class _Guards:
         At most, where that is tunable.
         """
         if transition.key not in self.waits:
-            self.waits[transition.key] = _held(self.automaton, transition, 1)
+            self.waits[transition.key] = _longest(self.automaton, transition)
         return self.waits[transition.key]
 
     def _guard(self, transition: Transition) -> Expr | None:
@@ -190,7 +190,7 @@ class _Guards:
         if guard is None:
             return False
         before = {way.key for way in winners(self.automaton, self.mode, transition)}
-        wait = _held(self.automaton, transition, 0)
+        wait = _shortest(self.automaton, transition)
         first = self._first(transition)
         at_once = [way for way in first if way.key in before and not self.held(way)]
         lasted = self._lasted(wait)
@@ -213,7 +213,7 @@ class _Guards:
 
     def _first(self, transition: Transition) -> list[Transition]:
         """Return the transitions that fire first wherever both guards hold from one time on."""
-        wait = _held(self.automaton, transition, 0)
+        wait = _shortest(self.automaton, transition)
         before = {way.key: way for way in winners(self.automaton, self.mode, transition)}
         own = self.mode.transitions
         along = {way.key: way for way in own if comes_along(self.automaton, way, transition)}
@@ -265,16 +265,23 @@ def _wait(automaton: Automaton, transition: Transition) -> Fraction:
     return exact_value(transition.wait, automaton) if transition.wait else Fraction(0)
 
 
-def _held(automaton: Automaton, transition: Transition, end: int) -> Fraction:
-    """Return how long a guard has to hold: whole ticks of a sampled automaton, else [s].
+def _shortest(automaton: Automaton, transition: Transition) -> Fraction:
+    """Return how long a guard has to hold at least: ticks of a sampled automaton, else [s]."""
+    return _held(automaton, transition)[0]
 
-    Of a tunable wait that is an end of its range: 0 the shortest, 1 the longest.
-    """
+
+def _longest(automaton: Automaton, transition: Transition) -> Fraction:
+    """Return the same at most: it differs where the wait is tunable."""
+    return _held(automaton, transition)[1]
+
+
+def _held(automaton: Automaton, transition: Transition) -> Range:
     tunable = tunable_wait(automaton, transition.wait)
     if tunable:
-        return range_in_ticks(automaton, automaton.parameters[tunable])[end]
+        return range_in_ticks(automaton, automaton.parameters[tunable])
     wait = _wait(automaton, transition)
-    return Fraction(ticks_of(automaton, wait)) if automaton.period else wait
+    held = Fraction(ticks_of(automaton, wait)) if automaton.period else wait
+    return held, held
 
 
 def _pairs(mode: Mode) -> Iterator[tuple[Transition, Transition]]:

@@ -46,11 +46,12 @@ class _PageReader(StimulusReader):
     def __init__(self, problems: Problems, system: System) -> None:
         super().__init__(problems)
         self.system = system
+        self.waits = {name: tunable_waits(i.automaton) for name, i in system.instances.items()}
         self.tunable: dict[str, dict[str, Parameter]] = {
             name: {
                 p.name: p
                 for p in instance.automaton.parameters.values()
-                if _may_change(p) and p.name not in tunable_waits(instance.automaton)
+                if _may_change(p) and p.name not in self.waits[name]
             }
             for name, instance in system.instances.items()
         }
@@ -72,6 +73,11 @@ class _PageReader(StimulusReader):
     def _values(self, entry: Entry) -> Mapping[tuple[str, str], Fraction]:
         """A parameter of one instance, or of all that have it as a tunable one."""
         owner, dot, name = entry.key.rpartition(".")
+        held = [o for o, waits in self.waits.items() if name in waits and (not dot or o == owner)]
+        if held:
+            label = f"`{held[0]}.{name}` is a wait: it stays as it is while a system runs"
+            self.problems.error("name", entry.span, label)
+            return {}
         owners = [o for o in self.tunable if name in self.tunable[o] and (not dot or o == owner)]
         if not owners:
             known = [f"{o}.{n}" for o, tunable in self.tunable.items() for n in tunable]

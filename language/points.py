@@ -15,18 +15,18 @@ from language.units import NO_UNIT
 def with_points(parameter: Table, given: Table, problems: Problems) -> Table:
     """Return a parameter with other values at some points of its table; none is new.
 
-    A point is the same however it is written: `0.5 s` is `500 ms`; a bare number has the unit of
-    the other one.
+    A point may be written in another unit than the table's, `500 ms` for `0.5 s`; where it has no
+    unit there it has none here.
     """
     reader = Reader(problems)
     points = reader.table(given, "a table's values", ("points",)).get("points")
     table = parameter.get("table")
     own = table.get("points") if isinstance(table, Table) else None
-    if not isinstance(points, Table):
+    if not isinstance(own, Table):
+        problems.error("form", given.span, "this parameter has no table", "it is a single value")
+    elif not isinstance(points, Table) or not points.entries:
         label = "the values of a table are `{points: {...}}`"
         problems.error("form", given.span, label)
-    elif not isinstance(own, Table):
-        problems.error("form", given.span, "this parameter has no table", "it is a single value")
     else:
         found = _merged(own, points, reader)
         return put(parameter, ("table", "points"), found)
@@ -35,6 +35,7 @@ def with_points(parameter: Table, given: Table, problems: Problems) -> Table:
 
 def _merged(own: Table, given: Table, reader: Reader) -> Table:
     entries = dict(own.entries)
+    first: dict[str, Entry] = {}
     for entry in given:
         key = _point(own, entry, reader)
         if key is None:
@@ -42,6 +43,10 @@ def _merged(own: Table, given: Table, reader: Reader) -> Table:
             label = f"the table has no point `{entry.key}`"
             reader.problems.error("table", entry.span, label, _told(entry.key, own, known))
             continue
+        if key in first:
+            label = f"`{entry.key}` is the point `{first[key].key}` again"
+            reader.problems.error("duplicate", entry.span, label)
+        first.setdefault(key, entry)
         entries[key] = Entry(key, entry.span, _value(entries[key].node, entry, reader))
     return Table(entries, own.span)
 
@@ -76,10 +81,27 @@ def _point(own: Table, entry: Entry, reader: Reader) -> str | None:
 
 def _is_same(given: Quantity, point: Quantity) -> bool:
     (value, unit), (other, known) = given, point
-    if unit is NO_UNIT and known is not NO_UNIT:
-        value = value * known.factor + known.offset
-    elif known is NO_UNIT and unit is not NO_UNIT:
-        other = other * unit.factor + unit.offset
-    elif unit.dimension != known.dimension:
+    if (unit is NO_UNIT) != (known is NO_UNIT) or unit.dimension != known.dimension:
         return False
     return rounded(value) == rounded(other)
+
+
+def overlaid(old: Node | None, new: Node) -> Node:
+    """Return what is given for a parameter over what was before: of a table point by point."""
+    before = old.get("points") if isinstance(old, Table) else None
+    after = new.get("points") if isinstance(new, Table) else None
+    if not (isinstance(old, Table) and isinstance(before, Table) and isinstance(after, Table)):
+        return new
+    return put(old, ("points",), _over(before, after, Reader(Problems())))
+
+
+def _over(before: Table, after: Table, reader: Reader) -> Table:
+    entries = dict(before.entries)
+    for entry in after:
+        key = _point(before, entry, reader) or entry.key
+        old = entries[key].node if key in entries else None
+        node = entry.node
+        if isinstance(old, Table) and isinstance(node, Table):
+            node = _over(old, node, reader)
+        entries[key] = Entry(key, entry.span, node)
+    return Table(entries, before.span)

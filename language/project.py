@@ -6,14 +6,15 @@ import dataclasses
 from collections.abc import Sequence
 
 from language.calibration import Calibration, calibrated, read_calibration, report_unknown
-from language.document import Document, Entry, Items, Scalar, Table
+from language.document import Document, Entry, Items, Node, Scalar, Table
 from language.effect import read_laying
 from language.finding import Project, document_of, read_document, shown
 from language.laying import lay_effect
 from language.overlay import lay, without
+from language.points import overlaid
 from language.problem import Problems, Source, Span, SpecError
 from language.reader import Reader
-from language.tree import entries, put
+from language.tree import at, entries, put
 
 __all__ = [
     "Project",
@@ -171,8 +172,7 @@ def _calibrated_system(
         for name in parameters_of(expanded(document, project).root, project):
             found[name if mine else f"{entry.key}.{name}"] = (entry.key, name)
             if mine and name in calibration.values:
-                value = calibration.values[name].value
-                root = put(root, ("instances", entry.key, "values", name), value)
+                root = _given(root, entry.key, name, calibration.values[name].value)
     if not fits:
         _report_not_of(calibration, names[0], calibration.of.span, problems)
         return root
@@ -180,9 +180,14 @@ def _calibrated_system(
         if key not in found:
             report_unknown(calibration, given, found, problems)
         elif "." in key:
-            owner, name = found[key]
-            root = put(root, ("instances", owner, "values", name), given.value)
+            root = _given(root, *found[key], given.value)
     return root
+
+
+def _given(root: Table, instance: str, name: str, value: Node) -> Table:
+    """Return a system in which an instance has another value."""
+    path = ("instances", instance, "values", name)
+    return put(root, path, overlaid(at(root, path), value))
 
 
 def _report_not_of(calibration: Calibration, name: str, span: Span, problems: Problems) -> None:

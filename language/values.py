@@ -9,6 +9,10 @@ from language.problem import Problems
 
 def with_node(parameter: Table, value: Node, problems: Problems) -> Table:
     """Return a parameter with another value, or with values at points of its table."""
+    if isinstance(value, Scalar) and "table" in parameter.entries:
+        label = "this parameter is a table: its values are `{points: {...}}`"
+        problems.error("form", value.span, label)
+        return parameter
     if isinstance(value, Scalar):
         return with_value(parameter, value)
     if isinstance(value, Table):

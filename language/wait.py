@@ -44,11 +44,12 @@ def ticks_of(automaton: Automaton, time: Fraction) -> int:
 
 
 def range_in_ticks(automaton: Automaton, parameter: Parameter) -> Range:
-    """Return the ticks that a tunable wait may have."""
+    """Return the ticks that a tunable wait may have: those within its range."""
     if parameter.range is None:
         return Fraction(0), Fraction(MAX_TICKS)
-    low, high = (Fraction(ticks_of(automaton, end)) for end in parameter.range)
-    return low, high
+    assert automaton.period
+    low, high = (end / automaton.period for end in parameter.range)
+    return Fraction(math.ceil(low)), Fraction(math.floor(high))
 
 
 def check_tunable_waits(automaton: Automaton, problems: Problems) -> None:
@@ -59,14 +60,23 @@ def check_tunable_waits(automaton: Automaton, problems: Problems) -> None:
     read = set(all_names(automaton, with_waits=False))
     for name in sorted(waits):
         parameter = automaton.parameters[name]
-        if name in read:
+        if automaton.model and name in automaton.model.parameters:
+            label = f"`{name}` is a parameter of the model `{automaton.model.name}`"
+            hint = "a tunable wait is kept in ticks: take a parameter that the model does not have"
+            problems.error("wait", parameter.span, label, hint)
+        elif name in read:
             label = f"`{name}` is a tunable wait, and read elsewhere too"
             hint = "it is kept in ticks: take another parameter beside it"
             problems.error("wait", parameter.span, label, hint)
         low, high = range_in_ticks(automaton, parameter)
-        if low < 0 or high > MAX_TICKS:
+        ticks = ticks_of(automaton, parameter.value or Fraction(0))
+        if (parameter.range and parameter.range[0] < 0) or high > MAX_TICKS:
             label = f"`{name}` is a wait: its range is within 0 to {MAX_TICKS} ticks"
             problems.error("wait", parameter.span, label)
+        elif not low <= ticks <= high:
+            label = f"`{name}` is a wait of {ticks} ticks: within its range are {low} to {high}"
+            hint = "a wait is rounded up to whole ticks"
+            problems.error("wait", parameter.span, label, hint)
 
 
 def _transitions(automaton: Automaton) -> Iterator[Transition]:

@@ -145,9 +145,22 @@ def _characteristic(rows: Sequence[Row], problems: Problems) -> Characteristic:
     elif axes and not _is_grid(rows, axes):
         label = f"the lines of `{first['name'].text}` are no whole table over x and y"
         problems.error("table", rows[-1]["name"].span, label)
+    _require_one_unit(rows, problems)
     unit = first.get("unit")
     values = tuple(row["value"] for row in rows)
     return Characteristic(first["name"], values, unit if unit and unit.text else None, tuple(axes))
+
+
+def _require_one_unit(rows: Sequence[Row], problems: Problems) -> None:
+    first = rows[0]
+    for column in {"unit", "x_unit", "y_unit"} & set(first):
+        others = (row[column] for row in rows if row[column].text != first[column].text)
+        other = next(others, None)
+        if other:
+            label = (
+                f"`{other.text}` is not `{first[column].text}`, as on the first line of this table"
+            )
+            problems.error("form", other.span, label, "a table is in one unit")
 
 
 def _is_grid(rows: Sequence[Row], axes: Sequence[Axis]) -> bool:

@@ -56,7 +56,7 @@ def _characteristic(automaton: Automaton, program: Program, constant: Constant) 
         table = automaton.parameters[short(constant.name)].table
     items = constant.items or (constant.value,)
     if constant.unit == TICKS:
-        return _wait(automaton, program, constant)
+        return _as_time(automaton, program, constant)
     is_text = constant.type == "truth" or bool(constant.values)
     is_told = constant.type == "real" and (
         constant.kind == "tunable" or constant.name.startswith(STAMP)
@@ -71,7 +71,7 @@ def _characteristic(automaton: Automaton, program: Program, constant: Constant) 
     )
 
 
-def _wait(automaton: Automaton, program: Program, constant: Constant) -> Characteristic:
+def _as_time(automaton: Automaton, program: Program, constant: Constant) -> Characteristic:
     """Return a tunable wait, which is kept in ticks, as the time that it is."""
     assert automaton.period
     time = int(constant.value) * automaton.period

@@ -22,7 +22,7 @@ from codegen.exchange.characteristic import (
 from codegen.exchange.desk import Desk, Remark, in_type, real_of, unit_beside
 from codegen.exchange.exact import exact
 from codegen.exchange.page import page_constants, page_name
-from codegen.exchange.points import table_of
+from codegen.exchange.table import table_of
 from language.declaration import Parameter
 from language.document import Node, Scalar
 from language.kind import LARGEST_WHOLE
@@ -34,7 +34,7 @@ from language.written import exact_text, value_in_unit
 
 SECOND_UNIT = parse_unit("s")
 NEAR = Fraction(1, 10**6)
-"""Ticks by which the time of a tool may miss a whole one: it has multiplied doubles."""
+"""Part by which the time of a tool may miss whole ticks: it has multiplied float32."""
 PLACE = re.compile(r"\d{1,4}(\.0*)?", re.ASCII)
 """The number of a word in its list, as tools without words write it: `1`, `1.0000`."""
 
@@ -131,7 +131,7 @@ def _value(one: Characteristic, constant: Constant, desk: Desk) -> Node | None:
     if cell is None:
         return None
     if constant.unit == TICKS:
-        return _wait(one, cell, constant, desk)
+        return _in_ticks(one, cell, constant, desk)
     if parameter.type == "real":
         value = _real(one, cell, parameter, desk)
     elif parameter.type == "int":
@@ -156,7 +156,7 @@ def _real(one: Characteristic, cell: Cell, parameter: Parameter, desk: Desk) -> 
     return real_of(one, cell, unit, parameter, desk) if unit else None
 
 
-def _wait(one: Characteristic, cell: Cell, constant: Constant, desk: Desk) -> Node | None:
+def _in_ticks(one: Characteristic, cell: Cell, constant: Constant, desk: Desk) -> Node | None:
     """Return a tunable wait, a time of whole ticks; what is none is rounded up, and told."""
     assert desk.automaton.period and constant.range
     unit = unit_beside(one, SECOND_UNIT, one.unit, desk)
@@ -165,20 +165,26 @@ def _wait(one: Characteristic, cell: Cell, constant: Constant, desk: Desk) -> No
         return None
     asked = number * unit.factor / desk.automaton.period
     near = round(asked)
-    is_whole = abs(asked - near) < NEAR
+    is_whole = abs(asked - near) <= NEAR * max(near, 1)
     ticks = near if is_whole else math.ceil(asked)
     kept = ticks * desk.automaton.period
     if not is_whole:
         text = f"`{cell.text}` is rounded up to {exact_text(kept)} s, {ticks} ticks"
         desk.remark("rounded", one.name, text, cell.span)
+    elif unit.factor != 1:
+        told = f"`{cell.text} {one.unit.text if one.unit else ''}` is {exact_text(kept)} s"
+        desk.remark("converted", one.name, told, cell.span)
     low, high = constant.range
-    if not low <= ticks <= high:
+    if not low <= ticks <= high or asked < -NEAR:
         ends = " to ".join(exact_text(int(end) * desk.automaton.period) for end in (low, high))
         label = f"`{one.name.text}` = {exact_text(kept)} s is outside its range, {ends} s"
         desk.problems.error("range", cell.span, label)
         return None
     own = desk.automaton.parameters[short(constant.name)].unit
-    return Scalar(f"{exact_text(kept / own.factor)} {own.text}", cell.span)
+    text = exact_text(kept / own.factor)
+    if Fraction(text) != kept / own.factor:  # no decimal: 10 ms in minutes
+        return Scalar(f"{exact_text(kept)} s", cell.span)
+    return Scalar(f"{text} {own.text}", cell.span)
 
 
 def _whole(cell: Cell, parameter: Parameter, problems: Problems) -> int | None:

@@ -19,7 +19,7 @@ from codegen.names import CNames, c_member, c_type
 from codegen.source import stepped
 from language.number import decimal
 from language.operation import Assign, Value
-from language.program import Constant, Program, Variable, short
+from language.program import TICKS, Constant, Program, Variable, short
 from language.text import visible
 
 LOCAL = ("state.", "discrete.", "equation.", "innovation.", "memory.mode", "memory.run_mode")
@@ -92,6 +92,8 @@ def _parameters(program: Program, version: Version) -> Iterator[FmuVariable]:
         made = _variable(program, version, variable, kept, group + member, "parameter")
         made = dataclasses.replace(_bounded(made, program, constant), name=name)
         about = constant.about or constant.key
+        if constant.unit == TICKS and program.period:
+            about += f"; in ticks of {decimal(float(program.period), 'float64')} s"
         if not constant.items:
             start = _told(constant.value, kept, program)
             yield dataclasses.replace(made, start=start, about=visible(about))

@@ -152,6 +152,7 @@ def test_names_of_other_functions_are_passed_over_if_that_is_wanted() -> None:
     [
         ("0.05", "s", "50 ms", []),
         ("20.000000000000004", "ms", "20 ms", []),  # a tool has multiplied doubles
+        ("1.7000000476837158", "s", "1700 ms", []),  # the nearest float32
         ("0.0421", "s", "50 ms", ["`0.0421` is rounded up to 0.05 s, 5 ticks"]),
     ],
 )
@@ -161,6 +162,31 @@ def test_a_tunable_wait_is_a_time_of_whole_ticks(
     found = import_calibration(page(f"kinds_float64.hold,{text},{unit}"), "kinds_float64")
     assert found.values == {"hold": taken}
     assert [remark.text for remark in found.remarks if remark.kind == "rounded"] == told
+
+
+def test_a_negative_wait_is_refused() -> None:
+    with pytest.raises(mw.SpecError, match="is outside its range, 0 to 2 s"):
+        import_calibration(page("kinds_float64.hold,-0.001,s"), "kinds_float64")
+
+
+def test_a_wait_declared_in_minutes_keeps_its_ticks() -> None:
+    text = Path("spec/kinds_float64.yaml").read_text("utf-8")
+    Path("spec/slow.yaml").write_text(
+        text.replace("kinds_float64", "slow").replace(
+            "30 ms, tunable: true, range: [0, 2000]", "1 min, tunable: true, range: [0, 5]"
+        ),
+        "utf-8",
+    )
+    found = import_calibration(page("slow.hold,0.07,s"), "slow")
+    assert found.values == {"hold": "0.07 s"}
+    assert import_calibration(page("slow.hold,120,s"), "slow").values == {"hold": "2 min"}
+
+
+def test_a_table_in_two_units_is_refused() -> None:
+    rows = ("kinds_float64.line,1,N*m,273.15,K", "kinds_float64.line,2,kN*m,313.15,K")
+    Path("two.csv").write_text("name,value,unit,x,x_unit\n" + "\n".join(rows) + "\n", "utf-8")
+    with pytest.raises(mw.SpecError, match="as on the first line of this table"):
+        import_calibration(Path("two.csv"), "kinds_float64")
 
 
 def test_a_tunable_wait_out_of_its_range_is_refused() -> None:

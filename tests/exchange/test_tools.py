@@ -44,6 +44,7 @@ def test_a_dcm_file_with_german_comments_and_units_of_its_own(root: Path) -> Non
         "speed": "`1500.0000000000 rpm` is 157.07963267948966 rad/s",
         "hot": "`85.5 °C` is 358.65 K",
         "share": "`12.5 %` is 0.125",
+        "hold": "`120.0000000000 ms` is 0.12 s",
     }
     assert not found.warnings and not told(found, "missing")
 

@@ -134,7 +134,10 @@ parameters:
     tunable: true
     range: [0, 50]
     table: {over: T, unit: N*m, points: {20 degC: 40, 90 degC: 5}}
-  map: {table: {over: [T, w], points: {20: {0: 1, 9: 2}, 90: {0: 3, 9: 4}}}}
+  map:
+    table:
+      over: [T, w]
+      points: {20 degC: {0 rad/s: 1, 9 rad/s: 2}, 90 degC: {0 rad/s: 3, 9 rad/s: 4}}
 inputs: {T: {unit: degC, range: [-40, 150]}, w: {unit: rad/s, range: [0, 9]}}
 equations: {most: "lookup(lim, T)", share: "one * lookup(map, T, w)"}
 modes: {run: {}}
@@ -162,7 +165,7 @@ def items(project: Project, name: str, parameter: str) -> list[float]:
 
 def test_a_calibration_has_values_at_points_of_a_table(tmp_path: Path) -> None:
     """However a point is written; those that are not named stay."""
-    rows = "{90: {9 rad/s: 8}, 20: {0: -1, 9: -2}}"
+    rows = "{90 degC: {9 rad/s: 8}, 20 degC: {0 rad/s: -1, 9 rad/s: -2}}"
     lim = "{points: {363.15 K: 0.004 kN*m}}"
     project = tabled(tmp_path, f"  lim: {lim}\n  map: {{points: {rows}}}\n")
     assert items(project, "warm", "lim") == [40, 4]
@@ -185,15 +188,54 @@ def test_instances_have_values_at_points_of_their_own(tmp_path: Path) -> None:
     }
 
 
+def test_points_of_several_calibrations_add_up(tmp_path: Path) -> None:
+    """In a system too, and with the values of its instances."""
+    tabled(tmp_path, "  lim: {points: {20 degC: 30}}\n")
+    head = "language: 1\ncalibration: {0}\nof: {1}\nparameters: {{{2}}}\n"
+    again = head.format("again", "limited", "lim: {points: {363.15 K: 7}}")
+    of_rig = head.format("of_rig", "rig", "b.lim: {points: {20 degC: 31}}")
+    warm = "language: 1\nvariant: warm\nextends: limited\ncalibrations: [tables, again]\n"
+    hot = "language: 1\nvariant: hot\nextends: rig\ncalibrations: [tables, again, of_rig]\n"
+    project = project_of(tmp_path, again=again, of_rig=of_rig, warm=warm, hot=hot)
+    assert items(project, "warm", "lim") == [30, 7]
+    hot_rig = read_system(read_document(project.path_of("hot")), project).instances
+    found = [hot_rig[name].automaton.parameters["lim"].table for name in "ab"]
+    assert [[float(v) for v in table.values] for table in found if table] == [[30, 7], [31, 7]]
+
+
+def test_a_calibration_reaches_the_instances_of_an_automaton(tmp_path: Path) -> None:
+    tabled(tmp_path, "  lim: {points: {20 degC: 30}}\n")
+    host = """language: 1
+automaton: host
+period: 10 ms
+numbers: float64
+inputs: {T: {unit: degC, range: [-40, 150]}}
+instances: {k1: {of: limited, inputs: {T: T, w: 1 rad/s}}}
+modes: {run: {}}
+equations: {most: k1.most}
+outputs: [most]
+"""
+    inner = "language: 1\ncalibration: inner\nof: host\n"
+    inner += "parameters: {k1_lim: {points: {90 degC: 9}}}\n"
+    laid = "language: 1\nvariant: laid\nextends: host\ncalibrations: [inner]\n"
+    project = project_of(tmp_path, host=host, inner=inner, laid=laid)
+    assert items(project, "laid", "k1_lim") == [40, 9]
+
+
 @pytest.mark.parametrize(
     ("parameters", "label"),
     [
         ("  lim: {points: {50 degC: 3}}", "the table has no point `50 degC`"),
         ("  lim: {points: {90 rad: 3}}", "the table has no point `90 rad`"),
+        ("  lim: {points: {90: 3}}", "the table has no point `90`"),
+        ("  map: {points: {90 degC: {9: 3}}}", "the table has no point `9`"),
+        ("  lim: {points: {90 degC: 3, 363.15 K: 4}}", "`363.15 K` is the point `90 degC` again"),
+        ("  lim: {points: {}}", "the values of a table are `{points: {...}}`"),
+        ("  lim: 4 N*m", "this parameter is a table: its values are `{points: {...}}`"),
         ("  lim: {points: {90 degC: 3 s}}", "`s` does not fit the unit `N*m`"),
         ("  lim: {points: {90 degC: 51}}", "this value is outside the range"),
         ("  lim: {points: {90 degC: {0: 1}}}", "at `90 degC` the table has a value"),
-        ("  map: {points: {90: 3}}", "at `90` the table has a row of values"),
+        ("  map: {points: {90 degC: 3}}", "at `90 degC` the table has a row of values"),
         ("  lim: {points: 3}", "the values of a table are `{points: {...}}`"),
         ("  lim: {points: {90 degC: 3}, std: 1 N*m}", "a table has `points`, no `std`"),
         ("  one: {points: {90 degC: 3}}", "this parameter has no table"),

@@ -252,8 +252,24 @@ def test_a_tunable_wait_is_a_number_of_ticks_on_the_page() -> None:
     found = program(clock(parameters, wait="t_c"))
     (constant,) = (c for c in found.constants if c.kind == "tunable")
     assert (constant.name, constant.value, constant.type) == ("calibration.t_c", 30, "whole")
-    assert (constant.range, constant.unit) == ((10, 51), "tick")
+    assert (constant.range, constant.unit) == ((10, 50), "tick")
     assert waiting(found).tunable == "calibration.t_c" and waiting(found).most == 2**16 - 1
+
+
+@pytest.mark.parametrize(
+    ("value", "limits", "label"),
+    [
+        ("50.2 ms", "[10, 50.5]", "`t_c` is a wait of 51 ticks: within its range are 10 to 50"),
+        ("0.5 ms", "[0.1, 0.9]", "`t_c` is a wait of 1 ticks: within its range are 1 to 0"),
+        ("0 ms", "[-0.5, 9]", "`t_c` is a wait: its range is within 0 to 65534 ticks"),
+    ],
+)
+def test_a_tunable_wait_has_whole_ticks_within_its_range(
+    value: str, limits: str, label: str
+) -> None:
+    parameters = f"  t_c: {{value: {value}, tunable: true, range: {limits}}}"
+    (problem,) = refusal(lambda: program(clock(parameters, wait="t_c")))
+    assert problem.label == label
 
 
 def test_a_tunable_wait_of_a_continuous_automaton_is_none() -> None:

@@ -1,4 +1,4 @@
-"""Points: the values of a table that a file has, taken where its points are those of the spec."""
+"""Table: the values of a table that a file has, taken where its points are those of the spec."""
 
 from __future__ import annotations
 
