@@ -79,7 +79,8 @@ def test_a_tunable_table_is_an_array_of_calibrations_with_fixed_axes() -> None:
 
 
 def test_a_scenario_does_not_set_a_table_by_one_value() -> None:
-    assert told(lambda: automaton(SPEC, lim="3 kW")) == ["6:8 a table has no `value` beside it"]
+    label = "this parameter is a table: its values are `{points: {...}}`"
+    assert told(lambda: automaton(SPEC, lim="3 kW")) == [f"1:1 {label}"]
 
 
 def test_points_that_are_one_in_float32_are_refused() -> None:
