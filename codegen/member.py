@@ -92,14 +92,9 @@ def _constant(constant: Constant, number: NumberType) -> Field:
     value = literal(constant.value, number)
     if constant.items:
         value = f"{{{', '.join(literal(item, number) for item in constant.items)}}}"
-    kind = _kind(constant, number)
+    kind = c_type(constant, number)
     comment = "; ".join(text for text in (comment, constant.about) if text)
     return Field(kind, c_member(constant.name), safe(comment), value, len(constant.items))
-
-
-def _kind(constant: Constant, number: NumberType) -> str:
-    unit = constant.unit if constant.type == "whole" else ""
-    return c_type(Variable(constant.name, constant.type, unit, values=constant.values), number)
 
 
 def _groups(program: Program) -> list[tuple[str, list[Field]]]:

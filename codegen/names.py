@@ -8,7 +8,7 @@ from functools import cached_property
 
 from language.model import CHART
 from language.number import NumberType
-from language.program import MODE, TICKS, Program, Variable, mode_variable, short
+from language.program import MODE, TICKS, Constant, Program, Variable, mode_variable, short
 
 REAL: Mapping[NumberType, str] = {"float64": "double", "float32": "float"}
 MODES = ("memory.mode", "memory.run_mode")
@@ -94,8 +94,8 @@ def c_member(name: str) -> str:
     return short(name).replace(".", "_")
 
 
-def c_type(variable: Variable, number: NumberType) -> str:
-    """Return the C type of a variable, whose reals are of a number type."""
+def c_type(variable: Variable | Constant, number: NumberType) -> str:
+    """Return the C type of a variable or constant; reals are of a number type."""
     if variable.type == "real":
         return REAL[number]
     if variable.type == "truth":

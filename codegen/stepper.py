@@ -24,7 +24,7 @@ from codegen.rendering import render
 from codegen.source import module_context
 from codegen.usage import locals_of, usages
 from language.printing import digest
-from language.program import Program, Variable
+from language.program import Program
 
 NAME = "stepper"
 KINDS: Mapping[str, Any] = {
@@ -134,7 +134,7 @@ def _files(program: Program) -> tuple[dict[str, str], dict[str, int], dict[str, 
     hidden = {name for names in local.values() for name in names}
     names = {v.name: c_type(v, program.number) for v in program.variables if v.name not in hidden}
     names |= {
-        c.name: c_type(Variable(c.name, c.type, c.unit, values=c.values), program.number)
+        c.name: c_type(c, program.number)
         for c in program.constants
         if c.kind in ("tunable", "derived") and not c.items
     }

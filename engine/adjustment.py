@@ -217,7 +217,7 @@ def _why_rebuilt(batch: Batch, scenario: Scenario, name: str) -> str | None:
     except SpecError as error:
         return f"{error.problems[0].label}: a Program for each value"
     if _is_no_real({owner: made[0]}, name):
-        return f"`{name}` is kept in ticks: a Program for each value"
+        return f"`{name}` is a whole number in C: a Program for each value"
     if len({digest(_without_values(program)) for program in made}) == 1:
         return None
     return f"`{owner}` has numbers or times that are solved from it: a Program for each value"
@@ -240,9 +240,7 @@ def _alone(system: System, owner: str) -> System:
 def _without_values(program: Program) -> Program:
     """Return a Program in which tunables, and what follows from them, have no value."""
     constants = tuple(
-        dataclasses.replace(c, value=0.0)
-        if c.kind in ("tunable", "derived") and c.type == "real"
-        else c
+        dataclasses.replace(c, value=0.0) if c.kind in ("tunable", "derived") else c
         for c in program.constants
     )
     return dataclasses.replace(program, constants=constants)

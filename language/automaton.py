@@ -26,7 +26,7 @@ from language.region import with_regions
 from language.transition_table import with_transition_tables
 from language.truth_table import TruthTableReader
 from language.units import SECOND, fits
-from language.values import with_node
+from language.values import with_given
 from language.variable import VariableReader
 
 COMMON_KEYS = ("language", "automaton", "parameters", "inputs", "states", "discrete", "equations")
@@ -120,7 +120,7 @@ def _set_values(
                 "values", value.span, label, f"set what it follows from, given at {entry.span}"
             )
         else:
-            parameters = _with(parameters, name, with_node(entry.node, value, problems))
+            parameters = _with(parameters, name, with_given(entry.node, value, problems))
     return _with(tree, "parameters", parameters) if values else tree
 
 

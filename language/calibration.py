@@ -10,8 +10,8 @@ from language.document import Document, Entry, Node, Scalar, Table, require_kind
 from language.points import overlaid
 from language.problem import Problems, Span, nearest
 from language.reader import Reader
-from language.tree import at, entries, put
-from language.values import with_node
+from language.tree import at, put
+from language.values import with_given
 
 CALIBRATION_KEYS = ("language", "calibration", "of", "from", "date", "parameters")
 VALUE_KEYS = ("value", "points", "std", "from", "date")
@@ -50,32 +50,38 @@ def read_calibration(document: Document, problems: Problems) -> Calibration:
 
 
 def calibrated(
-    tree: Table, calibration: Calibration, known: Mapping[str, Table], problems: Problems
+    tree: Table,
+    calibration: Calibration,
+    known: Mapping[str, Table],
+    inner: Mapping[str, tuple[str, str]],
+    problems: Problems,
 ) -> Table:
     """Return the tree of an automaton with the values of a calibration.
 
-    `known` are its parameters by name, those of its model too. Unknown ones are problems.
+    `known` are its parameters by name, those of its model too, `inner` those of its instances: the
+    instance and the parameter. Unknown ones are problems.
     """
     for name, value in calibration.values.items():
-        if name not in known and (inner := _inside(tree, name)):
-            tree = put(tree, inner, overlaid(at(tree, inner), value.value))
+        if name in inner:
+            tree = given_to(tree, inner[name], value.value)
         elif name not in known:
-            report_unknown(calibration, value, known, problems)
+            report_unknown(calibration, value, {**known, **inner}, problems)
         elif "derived" in known[name].entries:
             label = f"`{name}` is derived: set what it follows from"
             problems.error("values", value.span, label)
         else:
-            made = with_node(known[name], value.value, problems)
+            made = with_given(known[name], value.value, problems)
             tree = put(tree, ("parameters", name), made)
     return tree
 
 
-def _inside(tree: Table, name: str) -> tuple[str, ...]:
-    """Return the path of a parameter of an instance in an automaton, `k1_t_close`; () for none."""
-    for entry in entries(tree.get("instances")):
-        if name.startswith(f"{entry.key}_"):
-            return "instances", entry.key, "values", name.removeprefix(f"{entry.key}_")
-    return ()
+def given_to(tree: Table, place: tuple[str, str], value: Node) -> Table:
+    """Return the tree of a system or automaton in which an instance has another value.
+
+    `place` is the instance and the parameter.
+    """
+    path = ("instances", place[0], "values", place[1])
+    return put(tree, path, overlaid(at(tree, path), value))
 
 
 def report_unknown(

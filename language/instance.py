@@ -22,7 +22,7 @@ from language.reader import Reader
 from language.requirement import requirements_in
 from language.rewrite import renamed, substituted
 from language.tree import at, put, resourced
-from language.values import with_node
+from language.values import with_given
 
 ALONE = (
     *("model", "regions", "instances", "tables", "faults", "fault_mode"),
@@ -205,7 +205,7 @@ class _InstanceReader(Reader):
                 label = f"`{value.key}` is derived: set what it follows from"
                 self.problems.error("values", value.span, label)
             else:
-                made = with_node(known.node, value.node, self.problems)
+                made = with_given(known.node, value.node, self.problems)
                 body = put(body, ("parameters", value.key), made)
         return body
 

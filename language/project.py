@@ -5,16 +5,21 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 
-from language.calibration import Calibration, calibrated, read_calibration, report_unknown
-from language.document import Document, Entry, Items, Node, Scalar, Table
+from language.calibration import (
+    Calibration,
+    calibrated,
+    given_to,
+    read_calibration,
+    report_unknown,
+)
+from language.document import Document, Entry, Items, Scalar, Table
 from language.effect import read_laying
 from language.finding import Project, document_of, read_document, shown
 from language.laying import lay_effect
 from language.overlay import lay, without
-from language.points import overlaid
 from language.problem import Problems, Source, Span, SpecError
 from language.reader import Reader
-from language.tree import at, entries, put
+from language.tree import entries
 
 __all__ = [
     "Project",
@@ -126,6 +131,18 @@ def parameters_of(tree: Table, project: Project) -> dict[str, Table]:
     return found
 
 
+def inner_of(tree: Table, project: Project) -> dict[str, tuple[str, str]]:
+    """Return instance and parameter of the instances in an automaton's tree, by `k1_t_close`."""
+    found: dict[str, tuple[str, str]] = {}
+    for entry in entries(tree.get("instances")):
+        of = entry.node.get("of") if isinstance(entry.node, Table) else None
+        if isinstance(of, Scalar):
+            root = expanded(project.read(project.path_of(of.text, of.span)), project).root
+            names = parameters_of(root, project)
+            found.update({f"{entry.key}_{name}": (entry.key, name) for name in names})
+    return found
+
+
 def _finished(made: Document, layer: Document, project: Project, problems: Problems) -> Document:
     """Return a document with the effects, then the calibrations, of one of its layers."""
     made = _with_effects(made, layer, project, problems)
@@ -139,7 +156,8 @@ def _finished(made: Document, layer: Document, project: Project, problems: Probl
         calibration = read_calibration(document, problems)
         known = [*lineage(layer, project), made.name, *_models(root, project)]
         if made.kind == "automaton" and calibration.of.text in known:
-            root = calibrated(root, calibration, parameters_of(root, project), problems)
+            own, inner = parameters_of(root, project), inner_of(root, project)
+            root = calibrated(root, calibration, own, inner, problems)
         elif made.kind == "system":
             root = _calibrated_system(root, calibration, known, project, problems)
         else:
@@ -169,10 +187,11 @@ def _calibrated_system(
         document = project.read(project.path_of(of.text, of.span))
         mine = calibration.of.text in lineage(document, project)
         fits = fits or mine
-        for name in parameters_of(expanded(document, project).root, project):
+        tree = expanded(document, project).root
+        for name in (*parameters_of(tree, project), *inner_of(tree, project)):
             found[name if mine else f"{entry.key}.{name}"] = (entry.key, name)
             if mine and name in calibration.values:
-                root = _given(root, entry.key, name, calibration.values[name].value)
+                root = given_to(root, (entry.key, name), calibration.values[name].value)
     if not fits:
         _report_not_of(calibration, names[0], calibration.of.span, problems)
         return root
@@ -180,14 +199,8 @@ def _calibrated_system(
         if key not in found:
             report_unknown(calibration, given, found, problems)
         elif "." in key:
-            root = _given(root, *found[key], given.value)
+            root = given_to(root, found[key], given.value)
     return root
-
-
-def _given(root: Table, instance: str, name: str, value: Node) -> Table:
-    """Return a system in which an instance has another value."""
-    path = ("instances", instance, "values", name)
-    return put(root, path, overlaid(at(root, path), value))
 
 
 def _report_not_of(calibration: Calibration, name: str, span: Span, problems: Problems) -> None:

@@ -7,7 +7,7 @@ from language.points import with_points
 from language.problem import Problems
 
 
-def with_node(parameter: Table, value: Node, problems: Problems) -> Table:
+def with_given(parameter: Table, value: Node, problems: Problems) -> Table:
     """Return a parameter with another value, or with values at points of its table."""
     if isinstance(value, Scalar) and "table" in parameter.entries:
         label = "this parameter is a table: its values are `{points: {...}}`"

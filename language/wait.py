@@ -73,6 +73,9 @@ def check_tunable_waits(automaton: Automaton, problems: Problems) -> None:
         if (parameter.range and parameter.range[0] < 0) or high > MAX_TICKS:
             label = f"`{name}` is a wait: its range is within 0 to {MAX_TICKS} ticks"
             problems.error("wait", parameter.span, label)
+        elif low > high:
+            label = f"`{name}` is a wait: its range has no whole tick of {automaton.period} s"
+            problems.error("wait", parameter.span, label)
         elif not low <= ticks <= high:
             label = f"`{name}` is a wait of {ticks} ticks: within its range are {low} to {high}"
             hint = "a wait is rounded up to whole ticks"

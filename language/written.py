@@ -75,10 +75,16 @@ def calibration_text(name: str, of: str, origin: str, date: str, values: Mapping
 
 
 def exact_text(number: Fraction) -> str:
-    """Return a number that has a finite decimal as the language writes it."""
-    return _literal(
-        Context(prec=MOST_DIGITS).divide(number.numerator, number.denominator).normalize()
-    )
+    """Return a number that has a finite decimal of `MOST_DIGITS` as the language writes it."""
+    return _literal(_to_digits(number, MOST_DIGITS))
+
+
+def exact_in_unit(value: Fraction, unit: Unit) -> str:
+    """Return a value [SI] exactly, in a unit, or in SI where it has no decimal there."""
+    number = (value - unit.offset) / unit.factor
+    if Fraction(_to_digits(number, MOST_DIGITS)) == number:
+        return f"{exact_text(number)} {unit.text}"
+    return f"{exact_text(value)} {unit.dimension}"
 
 
 def _nearest(parameter: Parameter, value: float, number: NumberType) -> tuple[Decimal, Unit]:

@@ -133,8 +133,7 @@ def _measurement(variable: Variable, program: Program, place: CNames) -> Measure
 
 def _derived(constant: Constant, program: Program, place: CNames) -> Measurement:
     path = MEMBER.sub("", place(constant.name))
-    variable = Variable(constant.name, constant.type, constant.unit, values=constant.values)
-    kind = c_type(variable, program.number)
+    kind = c_type(constant, program.number)
     shown = conversion_of(constant, program)
     about = constant.about or constant.key
     return Measurement(
@@ -155,8 +154,7 @@ def _faults(program: Program) -> list[Measurement]:
 
 def _characteristic(constant: Constant, program: Program, place: CNames) -> Characteristic:
     path = MEMBER.sub("", place(constant.name))
-    variable = Variable(constant.name, constant.type, constant.unit, values=constant.values)
-    kind = c_type(variable, program.number)
+    kind = c_type(constant, program.number)
     table = constant.name.partition(".")[2]
     axes = [c for c in program.constants if re.fullmatch(rf"axis\.{re.escape(table)}_\d", c.name)]
     return Characteristic(

@@ -153,7 +153,7 @@ def _characteristic(rows: Sequence[Row], problems: Problems) -> Characteristic:
 
 def _require_one_unit(rows: Sequence[Row], problems: Problems) -> None:
     first = rows[0]
-    for column in {"unit", "x_unit", "y_unit"} & set(first):
+    for column in (column for column in ("unit", "x_unit", "y_unit") if column in first):
         others = (row[column] for row in rows if row[column].text != first[column].text)
         other = next(others, None)
         if other:

@@ -51,12 +51,12 @@ def value_text(value: float, constant: Constant, number: NumberType) -> str:
 
 
 def _characteristic(automaton: Automaton, program: Program, constant: Constant) -> Characteristic:
+    if constant.unit == TICKS:
+        return _as_time(automaton, program, constant)
     table = None
     if constant.kind == "tunable":
         table = automaton.parameters[short(constant.name)].table
     items = constant.items or (constant.value,)
-    if constant.unit == TICKS:
-        return _as_time(automaton, program, constant)
     is_text = constant.type == "truth" or bool(constant.values)
     is_told = constant.type == "real" and (
         constant.kind == "tunable" or constant.name.startswith(STAMP)

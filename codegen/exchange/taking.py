@@ -30,7 +30,7 @@ from language.model import Automaton
 from language.problem import Problems, nearest
 from language.program import TICKS, Constant, Program, short
 from language.units import NO_UNIT, parse_unit
-from language.written import exact_text, value_in_unit
+from language.written import exact_in_unit, exact_text, value_in_unit
 
 SECOND_UNIT = parse_unit("s")
 NEAR = Fraction(1, 10**6)
@@ -177,14 +177,11 @@ def _in_ticks(one: Characteristic, cell: Cell, constant: Constant, desk: Desk) -
     low, high = constant.range
     if not low <= ticks <= high or asked < -NEAR:
         ends = " to ".join(exact_text(int(end) * desk.automaton.period) for end in (low, high))
-        label = f"`{one.name.text}` = {exact_text(kept)} s is outside its range, {ends} s"
+        label = f"`{one.name.text}` = {cell.text} {unit.text} is outside its range, {ends} s"
         desk.problems.error("range", cell.span, label)
         return None
     own = desk.automaton.parameters[short(constant.name)].unit
-    text = exact_text(kept / own.factor)
-    if Fraction(text) != kept / own.factor:  # no decimal: 10 ms in minutes
-        return Scalar(f"{exact_text(kept)} s", cell.span)
-    return Scalar(f"{text} {own.text}", cell.span)
+    return Scalar(exact_in_unit(kept, own), cell.span)
 
 
 def _whole(cell: Cell, parameter: Parameter, problems: Problems) -> int | None:

@@ -20,6 +20,7 @@ from modewright.cli import app
 from modewright.exits import exit_code
 from tests.asam.linked import TARGETS, linked, places, section
 from tests.asam.reading import every, read
+from tests.codegen.waiting import waiting
 from tests.language.making import program
 
 NEEDS_ARM = pytest.mark.skipif(
@@ -49,18 +50,6 @@ modes: {run: {}}
 outputs: [T]
 """
 AUTOMATA = ("estimator_simple", "supervisor", "driveline")
-WAITING = """language: 1
-automaton: waiting
-period: 10 ms
-numbers: float32
-parameters: {t_on: {value: 30 ms, tunable: true, range: [20, 500]}}
-inputs: {u: {range: [0, 1]}}
-initial: low
-modes:
-  low: {transitions: {high: {when: u > 0.5, wait: t_on}}}
-  high: {}
-outputs: [mode]
-"""
 
 
 def text_of(used: Program, elf: Path | None = None) -> str:
@@ -149,7 +138,9 @@ def test_curves_and_maps_have_their_axes(tmp_path: Path) -> None:
 
 def test_a_tunable_wait_is_shown_in_ms(tmp_path: Path) -> None:
     """Raw numbers are ticks of 10 ms; limits are those of what is shown."""
-    with read(text_of(program(WAITING)), tmp_path) as session:
+    with read(
+        text_of(program(waiting("waiting", "10 ms", "float32", "30 ms", "[20, 500]"))), tmp_path
+    ) as session:
         found = every(session, "Characteristic")["waiting.t_on"]
         assert (found.deposit, found.lowerLimit, found.upperLimit) == ("layout.UWORD", 20, 500)
         method = every(session, "CompuMethod")[found.conversion]

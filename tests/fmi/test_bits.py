@@ -19,20 +19,11 @@ from engine.page import calibrate
 from language.program import Program
 from lockstep.compare import Tape
 from modewright.api import program
+from tests.codegen.waiting import waiting
 from tests.fmi.conftest import Ready
 from tests.fmi.importer import Importer, Unpacked, differences, inputs_of, unpacked
 from tests.language.making import program as made
 
-WAITING = """language: 1
-automaton: waiting
-period: 1 ms
-numbers: float64
-parameters: {t_on: {value: 5 ms, tunable: true, range: [0, 50]}}
-inputs: {u: {range: [0, 1]}}
-initial: low
-modes: {low: {transitions: {high: {when: u > 0.5, wait: t_on}}}, high: {}}
-outputs: [mode]
-"""
 TICKS = {"estimator": 2101, "supervisor": 2001, "estimator_float32": 1000, "driveline": 1000}
 """Ticks that are compared, and steps of the continuous one."""
 EVERY = 5
@@ -124,7 +115,7 @@ def test_a_parameter_that_comes_with_its_solved_numbers_is_not_stale(
 def test_a_tunable_wait_is_set_in_ticks(
     version: Version, asked: int | None, enters: int, tmp_path: Path
 ) -> None:
-    text = WAITING.replace("waiting", f"waiting_{version}")
+    text = waiting(f"waiting_{version}", "1 ms", "float64", "5 ms", "[0, 50]")
     importer = Importer(unpacked(fmu(made(text), version), tmp_path / "fmu", version))
     importer.start({"u": 1.0, **({} if asked is None else {"t_on": asked})})
     modes = []

@@ -220,6 +220,18 @@ outputs: [most]
     laid = "language: 1\nvariant: laid\nextends: host\ncalibrations: [inner]\n"
     project = project_of(tmp_path, host=host, inner=inner, laid=laid)
     assert items(project, "laid", "k1_lim") == [40, 9]
+    pair = "language: 1\nsystem: pair\ninputs: {T: {unit: degC}}\ninstances: {h: {of: host}}\n"
+    pair += "connections: {h.T: T}\ncalibrations: [inner]\n"
+    project = project_of(tmp_path, pair=pair)
+    made = read_system(read_document(project.path_of("pair")), project).instances["h"].automaton
+    assert (
+        made.parameters["k1_lim"].table
+        == load_automaton("laid", project).parameters["k1_lim"].table
+    )
+    wrong = inner.replace("k1_lim", "k1_lin")
+    project = project_of(tmp_path, inner=wrong)
+    (line,) = told(lambda: load_automaton("laid", project))
+    assert line.endswith("`host` has no parameter `k1_lin`")
 
 
 @pytest.mark.parametrize(

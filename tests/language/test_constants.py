@@ -260,7 +260,7 @@ def test_a_tunable_wait_is_a_number_of_ticks_on_the_page() -> None:
     ("value", "limits", "label"),
     [
         ("50.2 ms", "[10, 50.5]", "`t_c` is a wait of 51 ticks: within its range are 10 to 50"),
-        ("0.5 ms", "[0.1, 0.9]", "`t_c` is a wait of 1 ticks: within its range are 1 to 0"),
+        ("0.5 ms", "[0.1, 0.9]", "`t_c` is a wait: its range has no whole tick of 1/1000 s"),
         ("0 ms", "[-0.5, 9]", "`t_c` is a wait: its range is within 0 to 65534 ticks"),
     ],
 )
