@@ -13,7 +13,7 @@ from codegen.unassigned import unassigned
 from codegen.usage import Usage
 from language.operation import Loop, Run
 from language.program import Program, Variable
-from language.traversal import reads, walk
+from language.traversal import reached, reads, walk
 
 STEP = "step"
 MOST_ON_STACK = 128
@@ -59,21 +59,28 @@ def scratch_of(
 
 
 def _only(program: Program, shared: frozenset[str], used: Mapping[str, Usage]) -> str:
-    """Return the one block that `step` runs once and that has all of the values; else `step`."""
-    step = program.blocks[STEP]
-    is_plain = not shared & reads([step]) and not any(isinstance(op, Loop) for op in walk(step))
-    runs = [op.block for op in walk(step) if isinstance(op, Run)]
-    callers = [name for name in runs if "work" in used[name].needs]
-    return callers[0] if is_plain and len(callers) == 1 else STEP
+    """Return the innermost block that `step` runs, once, and that has all of the values."""
+    name = STEP
+    while True:
+        block = program.blocks[name]
+        is_plain = not shared & reads([block]) and not any(
+            isinstance(op, Loop) for op in walk(block)
+        )
+        runs = [op.block for op in walk(block) if isinstance(op, Run)]
+        callers = [called for called in runs if "work" in used[called].needs]
+        if not is_plain or len(callers) != 1:
+            return name
+        name = callers[0]
 
 
-def with_own(used: Mapping[str, Usage], scratch: Scratch) -> dict[str, Usage]:
+def with_own(program: Program, used: Mapping[str, Usage], scratch: Scratch) -> dict[str, Usage]:
     """Return what blocks need from outside, where one has the values of a step itself: of all else
     the instance, if they are a part of that.
     """
     mine = frozenset({"self"} if scratch.is_in_instance else ())
     found = dict(used)
-    for name in {scratch.block, STEP}:
+    above = {name for name in program.blocks if scratch.block in reached(name, program.blocks)}
+    for name in above:
         one = used[name]
         found[name] = Usage((one.needs - {"work"}) | mine, (one.writes - {"work"}) | mine)
     return found

@@ -7,7 +7,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from codegen.expression import SUFFIX, literal
-from codegen.gate import gated
+from codegen.gate import APART, gated
+from codegen.leap import THROUGH, leaping
 from codegen.mathematics import math_files
 from codegen.member import CONSTANTS, PAGE, Page, field_of, members
 from codegen.names import (
@@ -25,7 +26,7 @@ from codegen.names import (
 from codegen.rendering import render, version
 from codegen.scratch import STEP, Scratch, scratch_of, with_own
 from codegen.statement import INDENT, WIDTH, Writer
-from codegen.usage import Usage, locals_of, usages
+from codegen.usage import Usage, locals_of, turning, usages
 from language.functions import FUNCTIONS_OF
 from language.invariant import GROUP, INVARIANTS
 from language.operation import Run
@@ -38,6 +39,8 @@ from language.traversal import reads, walk
 from language.wiring import finished
 
 ENTRIES = ("init", "derive", "step")
+RARE = (APART, THROUGH)
+"""Blocks that are kept out of the way of what a step does nearly always."""
 INLINE = ("min", "max", "clip", "sign", "pow2", "whole", "within", "lookup", "lookup2")
 
 
@@ -50,7 +53,7 @@ def c_files(program: Program, by_amount: bool = True) -> dict[str, str]:
     if "step" not in program.blocks:
         raise ValueError(f"inputs of {program.name} vary inside a step: it has no C")
     context = {
-        **module_context(gated(stepped(program), by_amount), PAGE),
+        **module_context(leaping(gated(stepped(program), by_amount)), PAGE),
         "digest": digest(program),
     }
     files = {
@@ -76,15 +79,15 @@ def module_context(program: Program, page: Page = CONSTANTS) -> dict[str, Any]:
     """Return what the templates of a Program's files read."""
     number = program.number
     local = locals_of(program)
-    used = usages(program, local, page.holds)
+    used, turned = usages(program, local, page.holds), turning(program)
     kinds = {variable.name: c_type(variable, program.number) for variable in program.variables}
     called = {name.removeprefix("call ") for name in reads(program.blocks.values()) if " " in name}
     shared = _work(program, local)
     scratch = scratch_of(program, shared, used, page.holds_solved)
     if scratch and scratch.block != STEP:
-        used = with_own(used, scratch)
+        used = with_own(program, used, scratch)
     blocks = [
-        _block(program, name, local[name], used, kinds, page, scratch)
+        _block(program, name, local[name], turned[name], used, kinds, page, scratch)
         for name in _callees_first(program)
     ]
     return {
@@ -95,6 +98,7 @@ def module_context(program: Program, page: Page = CONSTANTS) -> dict[str, Any]:
         "work_type": _work_type(program, page, scratch),
         "blocks": [block for block in blocks if block["name"] not in ENTRIES],
         "entries": {block["name"]: block for block in blocks if block["name"] in ENTRIES},
+        "has_rare": any(block["is_rare"] for block in blocks),
         "has_stamps": "compare_stamps" in program.blocks,
         "uses_math": bool(called & {*FUNCTIONS_OF[number], *INLINE}),
         "uses_libm": bool(called & {"abs", "sqrt", "floor"}),
@@ -176,13 +180,15 @@ def _block(
     program: Program,
     name: str,
     local: frozenset[str],
+    turned: frozenset[str],
     used: Mapping[str, Usage],
     kinds: Mapping[str, str],
     page: Page,
     scratch: Scratch | None,
 ) -> dict[str, Any]:
     place = CNames(program, local, SOLVED_ON_PAGE if page.holds_solved else SOLVED_APART)
-    writer = Writer(program, used, local, place, kinds)
+    writer = Writer(program, used, local - turned, place, kinds)
+    declared = [f"{INDENT}{kinds[n]} {c_member(n)};" for n in sorted(turned)]
     types = {
         "self": f"{program.name}_Self",
         "cal": f"{program.name}_Cal",
@@ -198,8 +204,12 @@ def _block(
     return {
         "name": name,
         "parameters": _listed(f"static inline void {name}(", parameters),
+        "is_rare": name.startswith(RARE),
         "needs": usage.needs,
-        "lines": [_in_derive(name, line) for line in writer.lines(program.blocks[name])],
+        "lines": [
+            *(declared and [*declared, ""]),
+            *(_in_derive(name, line) for line in writer.lines(program.blocks[name])),
+        ],
     }
 
 

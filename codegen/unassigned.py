@@ -25,7 +25,7 @@ from language.operation import (
 from language.program import Program
 from language.substitution import own_expressions, subexpressions
 
-WORK = "work."
+WORK, MODE = "work.", "memory.mode"
 Set = frozenset[str]
 
 
@@ -43,6 +43,7 @@ class _Way:
         self.program = program
         self.shared = shared
         self.sizes = {v.name: v.size for v in program.variables if v.size}
+        self.modes = {mode.number for mode in program.modes}
         self.known: dict[tuple[str, Set, frozenset[tuple[str, int]]], Set] = {}
         self.turn: dict[str, int] = {}
         self.found: set[str] = set()
@@ -66,9 +67,11 @@ class _Way:
                 return self.run(then, done) & self.run(other, done)
             case Choose(selector, cases):
                 self._read(Ref(selector), done)
-                for _, case in cases:
-                    self.run(case, done)  # none of them may be taken
-                return done
+                ends = [self.run(case, done) for _, case in cases]
+                every = self.modes if selector == MODE else set()
+                if every and {number for number, _ in cases} >= every:
+                    return frozenset.intersection(*ends)
+                return done  # none of them may be taken
             case Loop(count, index, body) if count:
                 return self._loop(count, index, body, done | {index})
             case Run(name):

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
+from codegen.unassigned import unassigned
 from language.operation import (
     Assign,
     Block,
@@ -15,7 +16,8 @@ from language.operation import (
     Run,
 )
 from language.program import Program
-from language.traversal import block_reads, block_writes, walk
+from language.stepping import BETWEEN
+from language.traversal import block_reads, block_writes, reached, walk
 
 GROUP_OF = {
     "input": "in",
@@ -78,7 +80,8 @@ def usages(
 
 
 def locals_of(program: Program) -> dict[str, frozenset[str]]:
-    """Return, per block, the work variables that live inside it: set once, then read there.
+    """Return, per block, the work variables that live inside it: set once, then read there, or
+    `turning`.
 
     A variable that some block reads without having set it is shared by the blocks.
     """
@@ -87,11 +90,33 @@ def locals_of(program: Program) -> dict[str, frozenset[str]]:
     for name, block in program.blocks.items():
         used = {n for n in (*block_reads(block), *block_writes(block)) if n.startswith("work.")}
         shared |= used - once[name]
-    found = {}
+    found, turned = {}, turning(program)
     for name, block in program.blocks.items():
         loops = {op.index for op in walk(block) if isinstance(op, Loop)}
-        found[name] = frozenset((once[name] - shared) | loops)
+        found[name] = frozenset((once[name] - shared) | loops | turned[name])
     return found
+
+
+def turning(program: Program) -> dict[str, frozenset[str]]:
+    """Return, per block, the work variables that live inside it, and that its loops set.
+
+    Every block that has one sets it before it reads it, and runs none that has it too.
+    """
+    loops = [op for block in program.blocks.values() for op in walk(block) if isinstance(op, Loop)]
+    known = {n for op in loops for n in block_writes(op.body) if n.startswith("work.")}
+    known -= {*BETWEEN, *(op.index for op in loops), *(v.name for v in program.variables if v.size)}
+    if not known:
+        return dict.fromkeys(program.blocks, frozenset())
+    has = {
+        name: (known & set(block_reads(block)), known & set(block_writes(block)))
+        for name, block in program.blocks.items()
+    }
+    for name, (read, written) in has.items():
+        known -= read ^ written
+        below = reached(name, program.blocks) - {name}
+        known -= read & {n for other in below for names in has[other] for n in names}
+        known -= unassigned(program, name, frozenset(read))
+    return {name: frozenset(read & known) for name, (read, _) in has.items()}
 
 
 def _set_once(block: Block) -> set[str]:

@@ -66,6 +66,7 @@ from language.stepping import (
     ended,
     is_over,
     of_mode,
+    step_block,
     stepping_blocks,
     stepping_variables,
     waits_of,
@@ -124,6 +125,7 @@ def continuous_program(
         **invariant_block(automaton, known),
         **parts_block(field, known, waits, histories),
     }
+    blocks["step"] = step_block(field, bool(histories), blocks)
     problems.stop_if_any()
     variables = [*_variables(automaton, field), *stepping_variables(field, waits)]
     variables += motion_variables(field, method)

@@ -15,12 +15,24 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Literal
 
-from language.common import common_once
+from language.common import CHEAP, common_once
 from language.evaluate import Scalar, evaluate
 from language.formula_name import formula_name, formula_text
 from language.lower import is_whole
 from language.number import NumberType
-from language.operation import Assign, Binary, Block, Call, Expr, Ref, Unary, Value
+from language.operation import (
+    Assign,
+    Binary,
+    Block,
+    Branch,
+    Call,
+    Compare,
+    Expr,
+    Op,
+    Ref,
+    Unary,
+    Value,
+)
 from language.printing import expr_text
 from language.program import Constant, Program, Variable
 from language.substitution import parts, with_expressions, with_parts
@@ -61,9 +73,35 @@ def inputs_once(program: Program) -> Program:
 
     blocks = _changed(program, is_latched, change)
     ops = [Assign(name, expr, formula_text(expr)) for name, expr in found.made.items()]
-    blocks[LATCH] = (*blocks[LATCH], *ops)
+    looks, once = _if_changed(program, ops)
+    blocks[LATCH] = (*looks, *blocks[LATCH], *once)
     variables = [Variable(op.target, "real", about=op.key) for op in ops]
+    variables += [Variable(op.target, "truth") for op in looks]
     return _with(program, blocks=blocks, variables=(*program.variables, *variables))
+
+
+def _if_changed(program: Program, ops: list[Assign]) -> tuple[list[Assign], list[Op]]:
+    """Return what looks whether inputs changed, before they are latched, and what follows from it.
+
+    A function of inputs is computed anew if one of them is another number than before.
+    """
+    whole = {v.name: v.type == "whole" for v in program.variables if v.name.startswith(FROZEN)}
+    looks: dict[str, Assign] = {}
+    found: list[Op] = []
+    for op in ops:
+        read = dict.fromkeys(expr_names(op.value))
+        if not any(name.startswith("call ") and name[5:] not in CHEAP for name in read):
+            found.append(op)
+            continue
+        is_due: Expr = Unary("not", Ref("memory.started"))
+        for before in (name for name in read if name in whole):
+            name = before.removeprefix(FROZEN)
+            now = Ref(f"input.{name}", whole[before])
+            is_other = Compare("!=", now, Ref(before, whole[before]))
+            looks[name] = Assign(f"work.changed_{name}", is_other)
+            is_due = Binary("or", is_due, Ref(f"work.changed_{name}"))
+        found.append(Branch(is_due, (op,)))
+    return list(looks.values()), found
 
 
 def parameters_once(program: Program) -> Program:

@@ -29,7 +29,7 @@ from language.operation import (
     subtract,
     whole,
 )
-from language.traversal import block_names, expr_names, walk
+from language.traversal import expr_names, reached, reads
 
 MOST_WRITTEN_OUT = 8
 """Terms of a polynomial that is written out; a longer one is a loop."""
@@ -82,12 +82,7 @@ def look_block(field: Field, mode: Mode, terms: int, flows: Mapping[str, Block])
 
 def _read(name: str, flows: Mapping[str, Block]) -> set[str]:
     """Return all that a block reads or writes, with the blocks that it runs."""
-    found, stack = set[str](), [name]
-    while stack:
-        block = flows[stack.pop()]
-        found |= set(block_names(block))
-        stack += [op.block for op in walk(block) if isinstance(op, Run)]
-    return found
+    return reads(flows[run] for run in reached(name, flows))
 
 
 def _guards(block: Block) -> Iterator[Assign]:

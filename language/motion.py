@@ -132,10 +132,21 @@ def _locate(field: Field, mode: Mode, crossed: Expr, halvings: int, merge: Expr)
         Assign("work.high", Ref("work.h")),
         Assign(inside, Value(False)),
         Loop(halvings, "work.halving", body),
-        Branch(Ref(inside), (Assign("work.s", high), *_kept(field))),
+        *_at_high(field, mode, Ref(inside)),
         *_merged(field, mode, merge),
         Assign("work.elapsed", Call("min", (high, Ref("work.h")))),
     )
+
+
+def _at_high(field: Field, mode: Mode, inside: Expr) -> Block:
+    """Take the point at the upper end where that lies inside, and read the guards there if more
+    than one may change.
+    """
+    high = Ref("work.high")
+    kept = (Assign("work.s", high), *_kept(field))
+    if len(slots(mode)) < 2:
+        return (Branch(inside, kept),)
+    return (Branch(inside, (*kept, Run(f"guards_{mode.name}")), _look(mode, high)),)
 
 
 def _look(mode: Mode, s: Expr) -> Block:
@@ -150,7 +161,9 @@ def _kept(field: Field) -> Block:
 
 
 def _merged(field: Field, mode: Mode, merge: Expr) -> Block:
-    """Where another guard changes within `merge` after the first, take both as one instant."""
+    """Where another guard changes within `merge` after the first, take both as one instant; what
+    they are at the first is known.
+    """
     watched = slots(mode)
     if len(watched) < 2:
         return ()
@@ -162,7 +175,6 @@ def _merged(field: Field, mode: Mode, merge: Expr) -> Block:
     high = Ref("work.high")
     accepted: Block = (Assign("work.high", Ref("work.s")), *_kept(field))
     return (
-        *_look(mode, high),
         *first,
         *_look(mode, add(high, merge)),
         Branch(another, accepted),

@@ -63,7 +63,7 @@ from language.rewind import REWIND_LIMIT, advance_blocks, rewind_blocks
 from language.run import EVENT_LIMIT, run_motion, start_regions
 from language.sampled_variable import sampled_variables
 from language.stamp import STALE_CALIBRATION, STAMPS, stamps_block, stamps_of
-from language.tick import by_mode, tick_block
+from language.tick import by_mode, silence, tick_block
 from language.transition import enter_run, sampled_commit, sampled_jump, transition_infos
 from language.wiring import (
     assembled,
@@ -254,6 +254,7 @@ class _Sampled:
         starts = [o.start for name, o in self.observers.items() if name == initial.name and o.start]
         starts += [observer.start for observer in self.observers.values() if observer.start]
         ops += starts[0] if starts else ()
+        ops += silence(self.observers, initial.name)
         if initial.name in self.observers:
             ops.append(Run(f"correct_{initial.name}"))
         return tuple(ops)
@@ -277,9 +278,9 @@ class _Sampled:
 
     def _step(self) -> Block:
         carried = {mode.name: self._carried(mode) for mode in self.automaton.modes.values()}
-        found = (name for o in self.observers.values() for name in o.info.measures)
+        silent = {name: silence(self.observers, name) for name in self.automaton.modes}
         keeps = bool(self._keep())
-        return tick_block(self.automaton, carried, dict.fromkeys(found), keeps, self._starts())
+        return tick_block(self.automaton, carried, silent, keeps, self._starts())
 
     def _starts(self) -> bool:
         """Tell whether the first tick does more than `init` has done, or later ones advance."""

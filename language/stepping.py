@@ -42,6 +42,7 @@ from language.operation import (
     subtract,
 )
 from language.program import Alarm, TransitionInfo, Variable
+from language.traversal import reached, reads
 from language.wiring import any_fired, none_fired
 
 EVENTS_PER_STEP = 100
@@ -132,7 +133,6 @@ def stepping_blocks(field: Field, waits: Waits, ages: tuple[str, ...]) -> dict[s
         "load": _each_wait(field, tuple(w for w in waits if w.is_restarted), _load),
         "settle": _settle(field),
         "segment": _segment(field),
-        "step": _step(field, bool(ages)),
     }
 
 
@@ -237,16 +237,18 @@ def _segment(field: Field) -> Block:
     )
 
 
-def _step(field: Field, has_record: bool) -> Block:
+def step_block(field: Field, has_record: bool, blocks: Mapping[str, Block]) -> Block:
+    """Return the block of one major step; `blocks` are those that it runs."""
     left, event = Ref("work.left"), Ref("work.event")
     is_left = Compare(">", left, real(0.0))
     segments = Loop(EVENTS_PER_STEP + 1, "work.piece", (Branch(is_left, (Run("segment"),)),))
     flow: Block = (
         *((Run("record"),) if has_record else ()),
         Assign(left.name, real(field.automaton.step)),
+        Assign(event.name, Value(False)),
         segments,
         Branch(is_left, (FaultBit(ZENO),)),
-        Assign(event.name, _is_due(field, event)),
+        *_due(field, event, blocks),
         Run("latch"),
     )
     enter: Block = (Run("latch"), Run("start"), Assign(event.name, Value(True)))
@@ -257,14 +259,19 @@ def _step(field: Field, has_record: bool) -> Block:
     )
 
 
-def _is_due(field: Field, event: Ref) -> Expr:
-    """Whether guards are read again: something happened at the end of the step, or an input did."""
+def _due(field: Field, event: Ref, blocks: Mapping[str, Block]) -> Block:
+    """Guards are read again if something happened at the end of the step, or if an input that is
+    read there is another one.
+    """
     due: Expr = event
+    read = reads(blocks[name] for name in reached("settle", blocks))
     for name, thing in field.automaton.inputs.items():
+        if f"before.{name}" not in read:
+            continue
         is_whole = thing.type in WHOLE_TYPES
         now, before = Ref(f"input.{name}", is_whole), Ref(f"before.{name}", is_whole)
         due = Binary("or", due, Compare("!=", now, before))
-    return due
+    return () if due == event else (Assign(event.name, due),)
 
 
 def _each_wait(field: Field, waits: Waits, block: Callable[[Wait], Block]) -> tuple[Choose, ...]:

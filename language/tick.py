@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 
 from language.decision import decided_equations
+from language.kalman import Kalman
 from language.limit import HAPPENED, PENDING, latch
 from language.model import Automaton, Region
 from language.operation import Assign, Block, Branch, Choose, FaultBit, Op, Ref, Run, Value, real
@@ -15,15 +16,13 @@ from language.wiring import any_fired, none_fired
 def tick_block(
     automaton: Automaton,
     carried: Mapping[str, Block],
-    measured: Iterable[str],
+    silent: Mapping[str, Block],
     keeps: bool,
     starts: bool,
 ) -> Block:
-    """Return `step`: `carried` is the advance of each mode of the chart, `keeps` whether delays do.
-
-    `starts` tells whether the first tick is another one than those after it.
-
-    The innovations of the inputs `measured` are 0 unless this tick corrects with them.
+    """Return `step`: `carried` is the advance of each mode of the chart, `silent` what is set
+    before it: innovations that it does not set are 0. `keeps` tells whether delays do, `starts`
+    whether the first tick is another one than those after it.
     """
     ops: list[Op] = none_fired(automaton)
     ops += [
@@ -31,13 +30,23 @@ def tick_block(
     ]
     if latch(automaton):
         ops.append(Run("latch"))
-    ops += [Assign(f"innovation.{name}", real(0.0)) for name in measured]
     if starts:
-        ops.append(Branch(Ref("memory.started"), _advance(automaton, carried), (Run("start"),)))
+        ops.append(
+            Branch(Ref("memory.started"), _advance(automaton, carried, silent), (Run("start"),))
+        )
     ops += _jump(automaton)
     if keeps:
         ops.append(Run("keep"))
     return (*ops, *_update(automaton), Run("remember"))
+
+
+def silence(observers: Mapping[str, Kalman], mode: str) -> Block:
+    """Return what sets the innovations to 0 that a mode does not set whenever it corrects."""
+    found = dict.fromkeys(name for one in observers.values() for name in one.info.measures)
+    correct = observers[mode].correct if mode in observers else ()
+    sure = {op.target for op in correct if isinstance(op, Assign)}
+    names = (f"innovation.{name}" for name in found)
+    return tuple(Assign(name, real(0.0)) for name in names if name not in sure)
 
 
 def by_mode(region: Region, verb: str) -> Choose:
@@ -48,9 +57,11 @@ def by_mode(region: Region, verb: str) -> Choose:
     return Choose(mode_variable("memory.mode", region.name), cases)
 
 
-def _advance(automaton: Automaton, carried: Mapping[str, Block]) -> Block:
-    modes = automaton.modes.values()
-    cases = tuple((mode.number, carried[mode.name]) for mode in modes if carried[mode.name])
+def _advance(
+    automaton: Automaton, carried: Mapping[str, Block], silent: Mapping[str, Block]
+) -> Block:
+    done = {m.number: (*silent[m.name], *carried[m.name]) for m in automaton.modes.values()}
+    cases = tuple((number, block) for number, block in done.items() if block)
     return (Choose("memory.mode", cases),) if cases else ()
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 
 from language.operation import (
     Assign,
@@ -19,6 +19,7 @@ from language.operation import (
     Loop,
     Op,
     Ref,
+    Run,
     Select,
     Store,
     Unary,
@@ -114,6 +115,17 @@ def parts(expr: Expr) -> Iterator[Expr]:
 def reads(blocks: Iterable[Block]) -> set[str]:
     """Return every name that some blocks read or write."""
     return {name for block in blocks for name in block_names(block)}
+
+
+def reached(name: str, blocks: Mapping[str, Block]) -> set[str]:
+    """Return a block's name and those of all that it runs."""
+    found, stack = set[str](), [name]
+    while stack:
+        one = stack.pop()
+        if one not in found:
+            found.add(one)
+            stack += [op.block for op in walk(blocks[one]) if isinstance(op, Run)]
+    return found
 
 
 def with_value(block: Block, name: str, number: int) -> Block:

@@ -1,0 +1,205 @@
+"""Leap: a step in which nothing happens, as one block of C; bits stay.
+
+In nearly all steps of a continuous automaton no guard changes, nor in nearly all ticks that run
+one. `leap_<mode>` is what is done then, followed with all that is known of such a step: its length,
+its mode, that it is one piece. Each value has a name of its own, so that a compiler keeps it in a
+register, and what the equations were when the step before ended is not computed again. Where a
+guard changed, the step is gone through from where it began.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+
+from codegen.way import LEFT, MODE, NotPlain, Way
+from language.operation import Assign, Block, Branch, Choose, Expr, Loop, Op, Ref, Run, Unary, Value
+from language.program import ModeInfo, Program, Variable
+from language.substitution import own_expressions, with_expressions, with_parts
+from language.traversal import block_writes, expr_names, reads
+from language.wiring import finished
+
+ENTRIES = ("init", "derive", "step")
+LEAP, DONE, RECORD, STARTED = "leap", "memory.is_done", "record", "memory.started"
+RUN_MODE, THROUGH = "memory.run_mode", "through_events"
+UNDONE = (Assign(DONE, Value(False)),)
+
+
+def leaping(program: Program) -> Program:
+    """Return a Program that takes a whole step at once where nothing happens in it: its own one if
+    it is continuous, else that of a model that it runs.
+
+    Modes that wait take the general path always; modes without a guard never do. A run in float64,
+    which is software on an ECU that has float32 in hardware, stays as it is: its values would be
+    on the stack.
+    """
+    if program.period is None:
+        return _stepping(program)
+    return _running(program) if program.number == "float32" else program
+
+
+def _stepping(program: Program) -> Program:
+    match program.blocks["step"]:
+        case (Branch(started, flow, enter), *rest):
+            pass
+        case _:
+            return program
+    first = tuple(op for op in flow if op == Run(RECORD))
+    flow = tuple(op for op in flow if op != Run(RECORD))
+    ways = dict(_ways(program, flow))
+    once = (*first, Run(LEAP))
+    if _are_sure(ways, program.modes):
+        step: Block = (Branch(started, once, (*enter, *rest)),)
+    else:
+        step = (*UNDONE, Branch(started, once), *_else(THROUGH))
+    whole = (Branch(started, flow, enter), *rest)
+    return _with_leaps(program, LEAP, MODE, ways, {"step": step, THROUGH: whole})
+
+
+def _running(program: Program) -> Program:
+    """Return a Program whose runs of a model take a whole tick at once where nothing happens."""
+    made = program
+    for name, block in program.blocks.items():
+        if _is_through(block):
+            mode = name.removeprefix("run_")
+            ways = dict(_run_ways(program, block, program.blocks.get(f"equations_{mode}", ())))
+            leap, through = f"{LEAP}_{mode}", f"{THROUGH}_{mode}"
+            once: Block = (Run(leap),)
+            if not _are_sure(ways, program.run_modes):
+                once = (*UNDONE, *once, *_else(through))
+            made = _with_leaps(made, leap, RUN_MODE, ways, {name: once, through: block})
+    return made
+
+
+def _else(through: str) -> Block:
+    return (Branch(Unary("not", Ref(DONE)), (Run(through),)),)
+
+
+def _are_sure(ways: Mapping[int, Way], modes: Sequence[ModeInfo]) -> bool:
+    """Tell whether no mode has a guard."""
+    return all(mode.number in ways and ways[mode.number].is_sure for mode in modes)
+
+
+def _is_through(block: Block) -> bool:
+    """Tell whether a block goes through a tick from event to event."""
+    match block:
+        case (Assign(target), Loop(), *_):
+            return target == LEFT
+    return False
+
+
+def _run_ways(program: Program, flow: Block, equations: Block) -> Iterator[tuple[int, Way]]:
+    """Yield the way through a tick without a crossing of each mode of the model.
+
+    What updates does not count yet when equations are made: then these are computed again.
+    """
+    updates = [block for name, block in program.blocks.items() if name.startswith("update")]
+    is_fixed = not any(name.startswith("state.") for b in updates for name in block_writes(b))
+    for mode in program.run_modes:
+        way = Way(program, {RUN_MODE: Value(mode.number)})
+        try:
+            way.keep(equations if is_fixed else (), ("state.", "constant."))
+            way.follow(flow)
+        except NotPlain:
+            continue
+        yield mode.number, way
+
+
+def _ways(program: Program, flow: Block) -> Iterator[tuple[int, Way]]:
+    """Yield the way through a step without a crossing of each mode that has one."""
+    for mode in program.modes:
+        way = Way(program, {MODE: Value(mode.number), STARTED: Value(True)})
+        equations = program.blocks.get(f"equations_{mode.name}", ())
+        try:
+            way.keep(equations, ("state.", "constant.", "before."))
+            way.follow(flow)
+            way.end()
+        except NotPlain:
+            continue
+        yield mode.number, way
+
+
+def _with_leaps(
+    program: Program, leap: str, mode: str, ways: Mapping[int, Way], changed: Mapping[str, Block]
+) -> Program:
+    """Return a Program with a block `leap` by the mode that a variable tells, and changed blocks.
+
+    The same Program where no mode has a way, or where a block is called like that already.
+    """
+    modes = program.modes if mode == MODE else program.run_modes
+    titles = {info.number: f"{leap}_{info.name}" for info in modes}
+    if not ways or {leap, *titles.values()} & set(program.blocks):
+        return program
+    tells = DONE in reads(changed.values())
+    done = {number: _needed(_block(way, tells)) for number, way in ways.items()}
+    blocks = {titles[number]: _named(done[number], way) for number, way in ways.items()}
+    cases = tuple((number, (Run(titles[number]),)) for number in ways)
+    made: dict[str, Variable] = {}
+    used = reads(blocks.values())
+    for way in ways.values():
+        names = ((old, name) for old, name in _names(way) if name in used)
+        made |= {name: dataclasses.replace(way.made[old], name=name) for old, name in names}
+    made[DONE] = Variable(DONE, "truth", about="nothing happened in this step")
+    variables = (
+        *(v for v in program.variables if v.name not in made),
+        *made.values(),
+    )
+    blocks = {**program.blocks, **blocks, leap: (Choose(mode, cases),), **changed}
+    return finished(dataclasses.replace(program, blocks=blocks, variables=variables), ENTRIES)
+
+
+def _block(way: Way, tells: bool) -> Block:
+    """Return what is done on a way: what comes after the guards if none of them changed; the end
+    `tells` that it is done.
+    """
+    last = (*way.ops, Assign(DONE, Value(True))) if tells else tuple(way.ops)
+    return (*way.first, *last) if way.is_sure else (*way.first, Branch(way.quiet, last))
+
+
+def _names(way: Way) -> Iterator[tuple[str, str]]:
+    """Yield the name of each value and what it is called: numbered if there are several."""
+    counts = Counter(variable.name for variable in way.made.values())
+    for name, variable in way.made.items():
+        yield name, name if counts[variable.name] > 1 else f"{variable.name}_now"
+
+
+def _named(block: Block, way: Way) -> Block:
+    """Return a block whose values are called by their names."""
+    names = dict(_names(way))
+
+    def called(expr: Expr) -> Expr:
+        if isinstance(expr, Ref):
+            return dataclasses.replace(expr, name=names.get(expr.name, expr.name))
+        return with_parts(expr, called)
+
+    def setting(ops: Block) -> Iterator[Op]:
+        for op in ops:
+            match op:
+                case Assign(target):
+                    yield dataclasses.replace(op, target=names.get(target, target))
+                case Branch(condition, then, other):
+                    yield Branch(condition, tuple(setting(then)), tuple(setting(other)))
+                case _:
+                    yield op
+
+    return with_expressions(tuple(setting(block)), called)
+
+
+def _needed(block: Block) -> Block:
+    """Leave out the values of a step that nothing reads."""
+    return tuple(reversed(list(_kept(block, set()))))
+
+
+def _kept(block: Block, read: set[str]) -> Iterator[Op]:
+    """Yield, from the last to the first, the operations of a block whose values are read."""
+    for op in reversed(block):
+        kept = op
+        if isinstance(op, Branch):
+            arms = [tuple(reversed(list(_kept(arm, read)))) for arm in (op.then, op.other)]
+            kept = Branch(op.condition, *arms)
+        elif isinstance(op, Assign) and op.target.startswith("work.") and op.target not in read:
+            continue
+        for expr in own_expressions(op):
+            read.update(expr_names(expr))
+        yield kept

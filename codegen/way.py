@@ -1,0 +1,230 @@
+"""Way: one way through the blocks of a Program, with what is known on it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Hashable
+
+from codegen.statement import opposite
+from language.evaluate import evaluate
+from language.operation import (
+    Assign,
+    Binary,
+    Block,
+    Branch,
+    Call,
+    Choose,
+    Compare,
+    Expr,
+    FaultBit,
+    Loop,
+    Op,
+    Ref,
+    Run,
+    Select,
+    Unary,
+    Value,
+)
+from language.program import Program, Variable
+from language.substitution import parts, with_expressions, with_parts
+from language.traversal import block_reads, block_writes, expr_names
+
+LEFT, CROSSED, MODE = "work.left", "work.crossed", "memory.mode"
+WORK, EQUATION = "work.", "equation."
+
+
+class NotPlain(Exception):
+    """What happens hangs on more than the guards of the mode."""
+
+
+class Way:
+    """A way without a crossing: `known` are the values of variables, `ops` what is done on it.
+
+    What comes before the guards is in `first`; `quiet` is whether none of these changed. In `made`
+    are the variables of its own: each is one value of a variable of the Program.
+    """
+
+    def __init__(self, program: Program, known: dict[str, Expr]) -> None:
+        self.program = program
+        self.known = known
+        self.made: dict[str, Variable] = {}
+        self.quiet: Expr = Value(True)
+        self.first: list[Op] = []
+        self.ops = self.first
+        self._of = {variable.name: variable for variable in program.variables}
+        self._versions: Counter[str] = Counter()
+        self._numbers: dict[Hashable, int] = {}
+        self._number_of: dict[str, int | None] = {}
+        self._named: dict[int, str] = {}
+
+    @property
+    def is_sure(self) -> bool:
+        """Tell whether there are no guards."""
+        return self.quiet == Value(True)
+
+    def keep(self, equations: Block, stays: tuple[str, ...]) -> None:
+        """Keep what equations were when the step before ended, if all that they read `stays` until
+        this one begins: a page may turn between them.
+        """
+        kept = set[str]()
+        for op in equations:
+            if isinstance(op, Assign):
+                value = self._plainly(op.value)
+                if all(n in kept or n.startswith((*stays, "call ")) for n in expr_names(value)):
+                    kept.add(op.target)
+                    self._number_of[op.target] = number = self._number(value)
+                    if number is not None and not op.target.startswith(WORK):
+                        self._named.setdefault(number, op.target)
+
+    def follow(self, block: Block) -> None:
+        """Follow the operations of a block. Raises NotPlain."""
+        for op in block:
+            match op:
+                case Assign(target, value, key):
+                    self._assign(target, self._read(value), key)
+                case Branch(condition, then, other):
+                    self._branch(self._read(condition), then, other)
+                case Choose(selector, cases):
+                    number = self._read(Ref(selector))
+                    if not isinstance(number, Value):
+                        raise NotPlain
+                    self.follow(dict(cases).get(int(number.value), ()))
+                case Loop(count, _, body):
+                    self._loop(count, body)
+                case Run(name):
+                    self.follow(self.program.blocks[name])
+                case _:
+                    raise NotPlain
+
+    def end(self) -> None:
+        """Follow the end of a step: equations, unless what happened settles first."""
+        event, begin = self._read(Ref("work.event")), len(self.ops)
+        try:
+            self.follow(self.program.blocks["equations"])
+        except NotPlain:
+            self.ops[begin:] = [Run("equations")]
+        if event != Value(False):
+            now = tuple(self.ops[begin:])
+            self.ops[begin:] = [Branch(event, (Run("settle"), Run("equations")), now)]
+
+    def _assign(self, target: str, value: Expr, key: str) -> None:
+        if target == CROSSED:
+            self.quiet = Value(True) if value == Value(False) else opposite(value)
+            value = Value(False)
+            self.ops = []
+        number = self._number(value)
+        if number in self._named and not isinstance(value, Value | Ref):
+            value = Ref(self._named[number])
+        self._versions[target] += 1
+        if target.startswith(WORK) and not isinstance(value, Value | Ref):
+            name = f"{target}_{self._versions[target]}"
+            self.made[name] = self._of[target]
+            self.ops.append(Assign(name, value, key))
+            self._name(name, number)
+            value = Ref(name)
+        elif not target.startswith(WORK):
+            if value != Ref(target):
+                self.ops.append(Assign(target, value, key))
+            self._forget(target)
+            self._name(target, number)
+        if isinstance(value, Value | Ref):
+            self.known[target] = value
+
+    def _branch(self, condition: Expr, then: Block, other: Block) -> None:
+        """Follow the branch that is taken; where that is not known both have to do the same, or set
+        what stays when the step ends.
+        """
+        if isinstance(condition, Value):
+            return self.follow(then if condition.value else other)
+        if _sets_lasting(then) and _sets_lasting(other):
+            arms = (with_expressions(arm, self._read) for arm in (then, other))
+            self.ops.append(Branch(condition, *arms))
+            for name in block_writes((*then, *other)):
+                self._forget(name)
+            return None
+        before, ops, count = dict(self.known), self.ops, len(self.ops)
+        self.follow(then)
+        one, self.known = self.known, before
+        self.follow(other)
+        if self.known != one or self.ops is not ops or len(ops) != count:
+            raise NotPlain
+
+    def _loop(self, count: int, body: Block) -> None:
+        """Follow each turn of a loop until one does nothing, and so all after it."""
+        for _ in range(count):
+            before, done = dict(self.known), len(self.ops)
+            self.follow(body)
+            if self.known == before and len(self.ops) == done:
+                return
+        raise NotPlain
+
+    def _read(self, expr: Expr) -> Expr:
+        """Return an expression of what is known. Raises NotPlain for a value that is not."""
+        if isinstance(expr, Ref):
+            if expr.name not in self.known and expr.name.startswith(WORK):
+                raise NotPlain
+            return self.known.get(expr.name, expr)
+        return _simple(with_parts(expr, self._read), self.program)
+
+    def _plainly(self, expr: Expr) -> Expr:
+        """Return an expression with the numbers that are known."""
+        if isinstance(expr, Ref):
+            known = self.known.get(expr.name)
+            return known if isinstance(known, Value) else expr
+        return _simple(with_parts(expr, self._plainly), self.program)
+
+    def _forget(self, name: str) -> None:
+        """A variable is another value from here."""
+        self._versions[name] += 1
+        self._number_of.pop(name, None)
+        self._named = {number: held for number, held in self._named.items() if held != name}
+        self.known = {n: held for n, held in self.known.items() if n != name and held != Ref(name)}
+
+    def _name(self, name: str, number: int | None) -> None:
+        self._number_of[name] = number
+        if number is not None:
+            self._named.setdefault(number, name)
+
+    def _number(self, value: Expr) -> int | None:
+        """Return the number of a value; equal operations on equal numbers have equal ones."""
+        key: Hashable = None
+        match value:
+            case Value(known):
+                key = repr(known)
+            case Ref(name) if name in self._number_of:
+                return self._number_of[name]
+            case Ref(name):
+                key = name, self._versions[name]
+            case Binary(operator, left, right) | Compare(operator, left, right):
+                key = operator, self._number(left), self._number(right)
+            case Unary(operator, operand):
+                key = operator, self._number(operand)
+            case Call(function, arguments):
+                key = function, *(self._number(argument) for argument in arguments)
+        if key is None or (isinstance(key, tuple) and None in key):
+            return None
+        return self._numbers.setdefault(key, len(self._numbers))
+
+
+def _sets_lasting(block: Block) -> bool:
+    """Tell whether all that a block does is to set what stays when the step ends, from other
+    values.
+    """
+    writes = set(block_writes(block))
+    is_plain = all(isinstance(op, Assign | FaultBit) for op in block)
+    return is_plain and not any(n.startswith(WORK) or n in set(block_reads(block)) for n in writes)
+
+
+def _simple(expr: Expr, program: Program) -> Expr:
+    """Return an expression whose parts are simple as a simple one."""
+    match expr:
+        case Select(Value(condition), then, other):
+            return then if condition else other
+        case Binary("and", Value(known), rest) | Binary("and", rest, Value(known)):
+            return rest if known else Value(False)
+        case Binary("or", Value(known), rest) | Binary("or", rest, Value(known)):
+            return Value(True) if known else rest
+    inner = parts(expr)
+    if inner and all(isinstance(part, Value) for part in inner):
+        return Value(evaluate(expr, {}, program.number))
+    return expr

@@ -1,0 +1,183 @@
+"""Leap: a step in which nothing happens is one block of C, and has the bits of the engine."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import re
+
+import pytest
+
+from codegen.leap import leaping
+from codegen.source import c_files, stepped
+from engine.interpreter import Interpreter
+from language.number import NUMBERS, NumberType
+from language.operation import Branch
+from language.program import Program
+from language.traversal import reads, walk
+from lockstep.compare import Tape, compare
+from modewright.api import program as shipped
+from tests.language.making import program
+from tests.lockstep.heater import column
+from tests.lockstep.programs import taped
+
+CART = """language: 1
+automaton: cart
+step: 10 ms
+method: {method}
+numbers: {number}
+parameters:
+  m: {{value: 2 kg}}
+  g: {{value: 9.8 m/s^2}}
+  d: {{value: 3 N*s/m, tunable: true, range: [1, 5]}}
+  wall: {{value: 1 m}}
+inputs: {{F: {{unit: N}}, slope: {{unit: rad}}, limit: {{unit: m/s}}}}
+states: {{x: {{unit: m, initial: 0 m}}, v: {{unit: m/s, initial: 0 m/s}}}}
+equations:
+  pull: F - m * g * sin(slope)
+  drag: d * v
+  gap: wall - x
+flow: {{x: der(x) = v, v: m * der(v) = pull - drag}}
+initial: free
+modes:
+  free: {{transitions: {{held: {{when: {when}{wait}}}}}}}
+  held: {{flow: {{x: der(x) = -0.5 * v}}, transitions: {{free: {{when: gap > 0.5 m}}}}}}
+outputs: [x, v, pull, drag, gap, mode]
+"""
+
+
+def cart(number: NumberType = "float64", method: str = "rk4", **more: str) -> Program:
+    given = {"when": "gap <= 0 m", "wait": ""} | more
+    return program(CART.format(number=number, method=method, **given))
+
+
+def inputs(count: int = 400) -> list[dict[str, float | bool]]:
+    """A force that turns slowly, and a slope that jumps, with zeros of both signs."""
+    slopes = [0.0, 0.0, -0.0, 0.05, 0.05, -0.0, -0.02]
+    return [
+        {
+            "input.F": 20.0 * math.sin(k / 40.0),
+            "input.slope": slopes[k // 9 % len(slopes)],
+            "input.limit": 0.1 if k % 50 < 25 else 9.0,
+        }
+        for k in range(count)
+    ]
+
+
+def leaps(made: Program) -> set[str]:
+    return {name for name in leaping(stepped(made)).blocks if name.startswith("leap_")}
+
+
+@pytest.mark.parametrize("number", NUMBERS)
+@pytest.mark.parametrize("method", ["euler", "midpoint", "rk4"])
+def test_a_leap_has_the_bits_of_the_engine(number: NumberType, method: str) -> None:
+    made = cart(number, method)
+    assert leaps(made) == {"leap_free", "leap_held"}
+    tape = taped(made, inputs())
+    assert compare(tape).is_equal
+    assert len(set(column(tape, "memory.mode"))) == 2
+
+
+@pytest.mark.parametrize(
+    ("when", "event"),
+    [("gap <= 0 m", set()), ("gap <= 0 m and v < limit", {"limit"})],
+)
+def test_only_inputs_that_guards_read_are_looked_at(when: str, event: set[str]) -> None:
+    made = cart(when=when)
+    tape = taped(made, inputs())
+    assert compare(tape).is_equal
+    assert len(set(column(tape, "memory.mode"))) == 2
+    text = c_files(made)["cart.c"]
+    assert set(re.findall(r"event_now = in->(\w+) != self", text)) == event
+    assert set(re.findall(r"changed_\w+_now = in->(\w+) != self", text)) == {"F", "slope"}
+
+
+def test_a_mode_that_waits_takes_the_general_path() -> None:
+    made = cart(wait=", wait: 35 ms")
+    assert leaps(made) == {"leap_held"}
+    assert compare(taped(made, inputs())).is_equal
+
+
+def test_an_automaton_without_guards_has_no_general_path() -> None:
+    text = CART.format(number="float64", method="rk4", when="", wait="")
+    made = program(text[: text.index("initial: free")] + "outputs: [x, v, pull]\n")
+    blocks = leaping(stepped(made)).blocks
+    assert not {"segment", "limit"} & set(blocks)
+    assert compare(taped(made, inputs())).is_equal
+
+
+def test_what_a_page_may_have_turned_is_computed_again() -> None:
+    """`drag` reads a tunable parameter, `gap` and `pull` do not."""
+    block = leaping(stepped(cart())).blocks["leap_free"]
+    before = block[:-1]
+    assert isinstance(block[-1], Branch)
+    read = {name for name in reads([before]) if name.startswith("equation.")}
+    assert "equation.drag" not in read and not read & {"equation.gap"}
+    text = c_files(cart())["cart.c"]
+    leap = text[text.index("void leap_free(") :].partition("\n}\n")[0]
+    assert "cal->d * self->state.v" in leap
+
+
+def test_a_page_that_turns_between_two_leaps_counts_at_once() -> None:
+    made = cart()
+    tape = Tape(made, made.name)
+    stepper = Interpreter(made)
+    for number, tick in enumerate(inputs(80)):
+        if number == 40:
+            stepper.set("calibration.d", 5.0)
+            stepper.run("derive")
+        for name, value in tick.items():
+            stepper.set(name, value)
+        stepper.run("step")
+        tape.record(stepper)
+    verdict = compare(tape)
+    assert verdict.is_equal, str(verdict.first)
+
+
+def test_a_tick_that_runs_a_model_leaps_in_float32_alone() -> None:
+    blocks = leaping(stepped(shipped("estimator_float32"))).blocks
+    assert {name for name in blocks if name.startswith("leap_gap_")} == {
+        "leap_gap_drive_contact",
+        "leap_gap_no_contact",
+        "leap_gap_coast_contact",
+    }
+    double = stepped(shipped("estimator"))
+    assert leaping(double) == double
+
+
+def test_a_name_is_not_given_twice() -> None:
+    """Of modes `gap` and `gap_no_contact` that both run: what would be called the same stays."""
+    made = stepped(shipped("estimator_float32"))
+    taken = dataclasses.replace(made, blocks={**made.blocks, "leap_gap_no_contact": ()})
+    assert leaping(taken) == taken
+
+
+def test_what_happens_rarely_is_a_function_of_its_own() -> None:
+    text = c_files(shipped("estimator_float32"))["estimator_float32.c"]
+    assert "static RARELY void through_events_gap(" in text
+    assert "static RARELY void latch_apart(" in text
+    assert "RARELY" not in c_files(shipped("contactor"))["contactor.c"]
+
+
+def test_what_loops_alone_set_is_a_local_of_its_block() -> None:
+    text = c_files(shipped("estimator_float32"))["estimator_float32.c"]
+    locate = text[text.index("void locate_no_contact(") :].partition("\n}\n")[0]
+    assert "    float high;\n    bool is_inside;\n    float low;\n" in locate
+    assert "work->high" not in text
+
+
+def test_a_sampled_automaton_without_a_run_stays_as_it_is() -> None:
+    made = program(
+        "language: 1\nautomaton: lamp\nperiod: 1 s\nnumbers: float64\ninputs: {lit: {type: bool}}\n"
+        "initial: dark\nmodes: {dark: {transitions: {bright: {when: lit}}}, bright: {}}\n"
+        "outputs: [mode]\n"
+    )
+    assert leaping(stepped(made)) == stepped(made)
+
+
+def test_what_nobody_reads_is_not_computed() -> None:
+    for name, block in leaping(stepped(cart())).blocks.items():
+        if name.startswith("leap_"):
+            targets = [op.target for op in walk(block) if hasattr(op, "target")]
+            made = {target for target in targets if target.startswith("work.")} - {"work.is_done"}
+            assert made <= reads([block]) and len(made) > 10
