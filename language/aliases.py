@@ -54,6 +54,11 @@ FUNCTIONS: Mapping[str, str] = {
     "hasChanged": "`changed(x)`: what is inside is another value than a tick before",
     "crossing": "`rising(g)` or `falling(g)`: where a condition turns",
     "edge": "`rising(g)` or `falling(g)`: where a condition turns",
+    "ln": "`log(x)` is the natural logarithm",
+    "log10": "`log(x) / log(10)`",
+    "log2": "`log(x) / log(2)`",
+    **dict.fromkeys(("pow", "power"), "`x^2` for a whole power, else `exp(2.5 * log(x))`"),
+    "atan": "`atan2(y, x)`: of a number x it is `atan2(x, 1)`",
     "send": "events are raised by a transition: `raise: name`",
 }
 """Functions, each with what is written here."""

@@ -116,6 +116,8 @@ class Along:
                 return ZERO
             case "sqrt":
                 return divide(change, multiply(real(2.0), whole))
+            case "log":
+                return divide(change, first)
             case "sin":
                 return _times(Call("cos", (first,)), change)
             case "cos":

@@ -1,4 +1,4 @@
-"""Check of domains: a divisor that may be 0, a square root of what may be below 0.
+"""Check of domains: a divisor that may be 0, a square root or logarithm of what may be below 0.
 
 Intervals decide most; where they cannot, the solver is asked, with the conditions around the place.
 """
@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import suppress
+from typing import Literal
 
 from language.balance import coefficient_of
 from language.inquiry import Inquiry
@@ -25,7 +26,10 @@ from language.truth import decisions
 HELP = {
     "divisor": "exclude 0 by an enclosing `if`, or by `max(..., limit)`",
     "root": "`sqrt(max(..., 0))`, or exclude it by an enclosing `if`",
+    "log": "`log(max(..., 0.001))`, or exclude it by an enclosing `if`",
 }
+OUTSIDE: Mapping[str, Literal["==", "<", "<="]] = {"divisor": "==", "root": "<", "log": "<="}
+"""How what is outside of each domain compares with 0."""
 
 
 def check_domains(automaton: Automaton, problems: Problems) -> None:
@@ -134,6 +138,8 @@ class _ModeDomains:
         label = f"this divisor may be 0: it lies from {span}"
         if what == "root":
             label = f"this may be below 0, which has no square root: it lies from {span}"
+        if what == "log":
+            label = f"this may be 0 or below, which has no logarithm: it lies from {span}"
         self.problems.error("domain", tree.span, label, HELP[what])
 
     def _is_excluded(self, what: str, tree: Tree) -> bool:
@@ -143,7 +149,7 @@ class _ModeDomains:
             around = [(moment.expression(part), holds) for part, holds in self.ranging.path]
             conditions = [part if holds else Unary("not", part) for part, holds in around]
             value = moment.expression(tree)
-            conditions.append(Compare("==" if what == "divisor" else "<", value, real(0)))
+            conditions.append(Compare(OUTSIDE[what], value, real(0)))
             inquiry = Inquiry(self.automaton)
             return inquiry.never(inquiry.question(moment.story, conditions))
         return False

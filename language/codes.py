@@ -54,7 +54,10 @@ CODES: Mapping[str, tuple[str, str]] = {
     "value": ("MW309", "A value is not finite, or not one of its type of number."),
     "range": ("MW310", "A range is empty, or something lies outside of it."),
     "overflow": ("MW311", "A whole number may leave its type."),
-    "domain": ("MW312", "A divisor may be 0, or a square root be one of what is below 0."),
+    "domain": (
+        "MW312",
+        "A divisor may be 0, or a root or logarithm be one of what is below 0.",
+    ),
     "constant": ("MW313", "What has to be constant reads something that changes."),
     "loop": ("MW314", "Values follow from each other in a circle."),
     "balance": ("MW315", "A balance is not linear in the derivative of its state."),

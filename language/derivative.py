@@ -152,6 +152,7 @@ OUTER: Mapping[str, Callable[[Tree], Tree]] = {
     "sin": lambda u: _call("cos", u),
     "cos": lambda u: negative(_call("sin", u)),
     "exp": _exp,
+    "log": lambda u: over(number(1, u.span), u),
     "tanh": _bell,
     "sqrt": _root,
     "tan": lambda u: plus(number(1, u.span), power(_call("tan", u), 2)),

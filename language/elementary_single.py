@@ -8,6 +8,8 @@ in ULP of the exact result, were measured at every float32 of the domain (tests/
 from __future__ import annotations
 
 from language.elementary import Body, Circle, Lambert, X, horner, nearest, quartered, within
+from language.logarithm import SERIES_SINGLE, Binades
+from language.number import LARGEST
 from language.operation import (
     Call,
     Compare,
@@ -156,3 +158,7 @@ ARC = ArcNumbers(
     largest=(2.0 - 2.0**-23) * 2.0**127,
 )
 """As in tangent.py; (atan r / r - 1) / r^2, degree 4 in r^2, error of atan r / r 2^-29.4."""
+BINADES = Binades(
+    -126, (64, 32, 16, 8, 4, 2, 1), LARGEST["float32"], 1.4142135381698608, SERIES_SINGLE, LN_2
+)
+"""Of log in float32."""

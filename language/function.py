@@ -22,7 +22,7 @@ SAME = {"abs": 1, "min": 2, "max": 2, "clip": 3}
 """Functions whose arguments and value have one dimension, with their number of arguments."""
 MOST_LAYERS = 4
 """Functions of whole numbers inside each other: each holds copies of what is inside."""
-NUMBERS = {"exp": 1, "tanh": 1, "floor": 1, "sign": 1}
+NUMBERS = {"exp": 1, "log": 1, "tanh": 1, "floor": 1, "sign": 1}
 ANGLES = {"sin": 1, "cos": 1, "tan": 1}
 ARGUMENTS = {**SAME, **NUMBERS, **ANGLES, "sqrt": 1, "atan2": 2}
 KNOWN = (*ARGUMENTS, *MEMORY, "lookup", "in", "der")

@@ -6,11 +6,12 @@ from collections.abc import Mapping
 
 from language import elementary_single as of_single
 from language.elementary import cosine, exponential, hyperbolic_tangent, sine
+from language.logarithm import logarithm
 from language.number import NumberType
 from language.program import Function
 from language.tangent import angle_of, tangent
 
-MADE = (sine(), cosine(), exponential(), hyperbolic_tangent(), tangent(), angle_of())
+MADE = (sine(), cosine(), exponential(), hyperbolic_tangent(), tangent(), angle_of(), logarithm())
 MADE_SINGLE = (
     sine(of_single.CIRCLE),
     cosine(of_single.CIRCLE),
@@ -18,6 +19,7 @@ MADE_SINGLE = (
     hyperbolic_tangent(of_single.LAMBERT),
     tangent(of_single.CIRCLE),
     angle_of(of_single.ARC),
+    logarithm(of_single.BINADES),
 )
 FUNCTIONS: Mapping[str, Function] = {function.name: function for function in MADE}
 """In float64; a function that calls another one (tanh calls exp) comes after it."""

@@ -7,6 +7,7 @@ problem: bounds are then only used where a function or an `if` gives them.
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
@@ -178,6 +179,8 @@ class Ranging:
         parts = [self.of(part, limits) for part in tree.arguments]
         if self.report and name == "sqrt" and parts[0].low < 0.0:
             self.report("root", tree.arguments[0], parts[0])
+        if self.report and name == "log" and parts[0].low <= 0.0:
+            self.report("log", tree.arguments[0], parts[0])
         return _function(name, parts)
 
     def _limited(self, condition: Tree, holds: bool, limits: Limits) -> Limits:
@@ -273,6 +276,8 @@ def _function(name: str, parts: list[Interval]) -> Interval:
             return Interval(math.sqrt(max(first.low, 0.0)), math.sqrt(max(first.high, 0.0)), known)
         case "exp":
             return Interval(_exponential(first.low), _exponential(first.high), known)
+        case "log":
+            return Interval(_logarithm(first.low), _logarithm(first.high), known)
         case "sin" | "cos" | "tanh" | "sign":
             return Interval(-1.0, 1.0, True)
         case "atan2":
@@ -283,6 +288,10 @@ def _function(name: str, parts: list[Interval]) -> Interval:
             return first
         case _:
             return ANYTHING
+
+
+def _logarithm(value: float) -> float:
+    return math.log(min(max(value, sys.float_info.min), sys.float_info.max))
 
 
 def _exponential(value: float) -> float:

@@ -330,6 +330,42 @@ float ha_atan2f(float rise, float run)
     return y;
 }
 
+/* natural logarithm; 2^-126 <= x, clamped; error < 0.9 ULP */
+float ha_logf(float x)
+{
+    float bounded;
+    if (x > 3.4028235e+38F) {
+        bounded = 3.4028235e+38F;
+    } else if (x < 1.1754944e-38F) {
+        bounded = 1.1754944e-38F;
+    } else {
+        bounded = x;
+    }
+    const float k_0 = (bounded >= 1.0F) ? 0.0F : (-126.0F);
+    const float m_0 = (bounded >= 1.0F) ? bounded : (bounded * 8.507059e+37F);
+    const float k_64 = (m_0 < 1.8446744e+19F) ? k_0 : (k_0 + 64.0F);
+    const float m_64 = (m_0 < 1.8446744e+19F) ? m_0 : (m_0 * 5.421011e-20F);
+    const float k_32 = (m_64 < 4294967300.0F) ? k_64 : (k_64 + 32.0F);
+    const float m_32 = (m_64 < 4294967300.0F) ? m_64 : (m_64 * 2.3283064e-10F);
+    const float k_16 = (m_32 < 65536.0F) ? k_32 : (k_32 + 16.0F);
+    const float m_16 = (m_32 < 65536.0F) ? m_32 : (m_32 * 1.5258789e-05F);
+    const float k_8 = (m_16 < 256.0F) ? k_16 : (k_16 + 8.0F);
+    const float m_8 = (m_16 < 256.0F) ? m_16 : (m_16 * 0.00390625F);
+    const float k_4 = (m_8 < 16.0F) ? k_8 : (k_8 + 4.0F);
+    const float m_4 = (m_8 < 16.0F) ? m_8 : (m_8 * 0.0625F);
+    const float k_2 = (m_4 < 4.0F) ? k_4 : (k_4 + 2.0F);
+    const float m_2 = (m_4 < 4.0F) ? m_4 : (m_4 * 0.25F);
+    const float k_1 = (m_2 < 2.0F) ? k_2 : (k_2 + 1.0F);
+    const float m_1 = (m_2 < 2.0F) ? m_2 : (m_2 * 0.5F);
+    const float k = (m_1 <= 1.4142135F) ? k_1 : (k_1 + 1.0F);
+    const float f = ((m_1 <= 1.4142135F) ? m_1 : (0.5F * m_1)) - 1.0F;
+    const float s = f / (2.0F + f);
+    const float square = s * s;
+    const float series = square * (0.66666776F + (square * (0.3997759F + (square * 0.29870573F))));
+    const float half = 0.5F * f * f;
+    return (k * 0.69314575F) - (half - ((s * (half + series)) + (k * 1.4286068e-06F)) - f);
+}
+
 /* The interval of an axis that x is in, and the part of it before x: 0 or 1 outside */
 static int32_t cell(const float *axis, int32_t size, float x, float *part)
 {

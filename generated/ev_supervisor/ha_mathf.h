@@ -15,6 +15,7 @@ float ha_expf(float x); /* e^x; -87 <= x <= 88, clamped; error < 0.95 ULP */
 float ha_tanhf(float x); /* hyperbolic tangent; every x; error < 1.4 ULP */
 float ha_tanf(float x); /* tangent; |x| <= 1000 rad, clamped; error < 2.4 ULP */
 float ha_atan2f(float rise, float run); /* angle of (run, rise), in (-pi, pi] rad; error < 1.5 ULP */
+float ha_logf(float x); /* natural logarithm; 2^-126 <= x, clamped; error < 0.9 ULP */
 float ha_pow2f(float k); /* 2^k for a whole k from -126 to 127, else k */
 
 /* Tables: linear between points, held outside, NaN at NaN */

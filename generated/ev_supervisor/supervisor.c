@@ -26,6 +26,13 @@ static const struct {
 /* Points of the axes of tables, SI */
 static const float axis_lim_1[3] = {333.15F, 363.15F, 393.15F}; /* K; supervisor parameters.lim.table.over temp */
 
+/* Kept out of the way of what a step does nearly always */
+#if defined(__GNUC__)
+#define RARELY __attribute__((noinline))
+#else
+#define RARELY
+#endif
+
 const char supervisor_Version[] = supervisor_DIGEST;
 
 supervisor_CALIBRATION const volatile supervisor_Cal supervisor_default_cal = {
@@ -34,7 +41,7 @@ supervisor_CALIBRATION const volatile supervisor_Cal supervisor_default_cal = {
     .v_creep = 1.6666666F,
 };
 
-static inline void latch_apart(supervisor_Self *self, const supervisor_In *in)
+static RARELY void latch_apart(supervisor_Self *self, const supervisor_In *in)
 {
     if (in->key <= supervisor_key_crank) {
         self->latched.key = in->key; /* inputs.key */

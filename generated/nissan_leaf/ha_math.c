@@ -349,6 +349,52 @@ double ha_atan2(double rise, double run)
     return y;
 }
 
+/* natural logarithm; 2^-1022 <= x, clamped; error < 0.9 ULP */
+double ha_log(double x)
+{
+    double bounded;
+    if (x > 1.7976931348623157e+308) {
+        bounded = 1.7976931348623157e+308;
+    } else if (x < 2.2250738585072014e-308) {
+        bounded = 2.2250738585072014e-308;
+    } else {
+        bounded = x;
+    }
+    const double k_0 = (bounded >= 1.0) ? 0.0 : (-1022.0);
+    const double m_0 = (bounded >= 1.0) ? bounded : (bounded * 4.49423283715579e+307);
+    const double k_512 = (m_0 < 1.3407807929942597e+154) ? k_0 : (k_0 + 512.0);
+    const double m_512 = (m_0 < 1.3407807929942597e+154) ? m_0 : (m_0 * 7.458340731200207e-155);
+    const double k_256 = (m_512 < 1.157920892373162e+77) ? k_512 : (k_512 + 256.0);
+    const double m_256 = (m_512 < 1.157920892373162e+77) ? m_512 : (m_512 * 8.636168555094445e-78);
+    const double k_128 = (m_256 < 3.402823669209385e+38) ? k_256 : (k_256 + 128.0);
+    const double m_128 = (m_256 < 3.402823669209385e+38) ? m_256 : (m_256 * 2.938735877055719e-39);
+    const double k_64 = (m_128 < 1.8446744073709552e+19) ? k_128 : (k_128 + 64.0);
+    const double m_64 = (m_128 < 1.8446744073709552e+19) ? m_128 : (m_128 * 5.421010862427522e-20);
+    const double k_32 = (m_64 < 4294967296.0) ? k_64 : (k_64 + 32.0);
+    const double m_32 = (m_64 < 4294967296.0) ? m_64 : (m_64 * 2.3283064365386963e-10);
+    const double k_16 = (m_32 < 65536.0) ? k_32 : (k_32 + 16.0);
+    const double m_16 = (m_32 < 65536.0) ? m_32 : (m_32 * 1.52587890625e-05);
+    const double k_8 = (m_16 < 256.0) ? k_16 : (k_16 + 8.0);
+    const double m_8 = (m_16 < 256.0) ? m_16 : (m_16 * 0.00390625);
+    const double k_4 = (m_8 < 16.0) ? k_8 : (k_8 + 4.0);
+    const double m_4 = (m_8 < 16.0) ? m_8 : (m_8 * 0.0625);
+    const double k_2 = (m_4 < 4.0) ? k_4 : (k_4 + 2.0);
+    const double m_2 = (m_4 < 4.0) ? m_4 : (m_4 * 0.25);
+    const double k_1 = (m_2 < 2.0) ? k_2 : (k_2 + 1.0);
+    const double m_1 = (m_2 < 2.0) ? m_2 : (m_2 * 0.5);
+    const double k = (m_1 <= 1.4142135623730951) ? k_1 : (k_1 + 1.0);
+    const double f = ((m_1 <= 1.4142135623730951) ? m_1 : (0.5 * m_1)) - 1.0;
+    const double s = f / (2.0 + f);
+    const double square = s * s;
+    const double series = square * (0.6666666666666736 + (square * (0.39999999999405483
+        + (square * (0.28571428744061894 + (square * (0.22222198426151224
+        + (square * (0.18183571057432849 + (square * (0.15313895728652202
+        + (square * 0.1479736350587642))))))))))));
+    const double half = 0.5 * f * f;
+    return (k * 0.6931471805598903) - (half - ((s * (half + series)) + (k * 5.497923018708371e-14))
+        - f);
+}
+
 /* The interval of an axis that x is in, and the part of it before x: 0 or 1 outside */
 static int32_t cell(const double *axis, int32_t size, double x, double *part)
 {

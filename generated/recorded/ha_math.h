@@ -15,6 +15,7 @@ double ha_exp(double x); /* e^x; -708 <= x <= 709, clamped; error < 0.95 ULP */
 double ha_tanh(double x); /* hyperbolic tangent; every x; error < 1.4 ULP */
 double ha_tan(double x); /* tangent; |x| <= 1e5 rad, clamped; error < 2.4 ULP */
 double ha_atan2(double rise, double run); /* angle of (run, rise), in (-pi, pi] rad; error < 1.5 ULP */
+double ha_log(double x); /* natural logarithm; 2^-1022 <= x, clamped; error < 0.9 ULP */
 double ha_pow2(double k); /* 2^k for a whole k from -1022 to 1023, else k */
 
 /* Tables: linear between points, held outside, NaN at NaN */

@@ -31,6 +31,7 @@ equations:
   c: cos(u * 1 rad)
   e: exp(u)
   t: tanh(u)
+  log_u: log(u)
   size: abs(u)
   root: sqrt(u)
   least: min(u, v)
@@ -44,10 +45,11 @@ equations:
   over: lookup(plane, u, v)
 modes: {only: {}}
 outputs:
-  [s, c, e, t, size, root, least, most, limited, direction, whole, slope, heading, along, over]
+  [s, c, e, t, log_u, size, root, least, most, limited, direction, whole, slope, heading, along,
+    over]
 """
 SIGNALS = {"sin": "s", "cos": "c", "exp": "e", "tanh": "t", "abs": "size", "sqrt": "root"}
-SIGNALS |= {"floor": "whole", "tan": "slope"}
+SIGNALS |= {"floor": "whole", "tan": "slope", "log": "log_u"}
 
 
 def specials() -> list[float]:

@@ -45,6 +45,7 @@ def checked(text: str) -> tuple[Kind | None, list[str]]:
         ("sign(v)", "1"),
         ("tanh(c)", "1"),
         ("exp(x / (v * t))", "1"),
+        ("log(x / (v * t))", "1"),
         ("if flag then x else v * t", "m"),
         ("if flag then 0 else x", "m"),
         ("3", "1"),

@@ -1,9 +1,10 @@
-"""sin, cos, tan, exp, tanh: stated errors against mpmath at 60 digits, symmetry, special values."""
+"""sin, cos, tan, exp, log, tanh: errors against mpmath at 60 digits, symmetry, special values."""
 
 from __future__ import annotations
 
 import math
 import random
+import sys
 from collections.abc import Iterator
 
 import mpmath
@@ -18,6 +19,7 @@ BOUNDS = {
     **dict.fromkeys(("sin", "cos", "tan"), (-1e5, 1e5)),
     "exp": (-708.0, 709.0),
     "tanh": (-20.0, 20.0),
+    "log": (sys.float_info.min, sys.float_info.max),
 }
 ONE = [name for name, function in FUNCTIONS.items() if len(function.parameters) == 1]
 WORST_ANGLE = 45.553093477052
@@ -34,6 +36,10 @@ def anywhere(name: str, draw: random.Random) -> float:
     """Return an argument: anywhere in the domain, of any magnitude, or where errors are large."""
     low, high = BOUNDS[name]
     choice = draw.randrange(4)
+    if name == "log":
+        power = draw.uniform(-1022.0, 1023.9) if choice else draw.uniform(-0.6, 0.6)
+        near = around(math.ldexp(1.0, draw.randrange(-1021, 1024)), 3)
+        return math.exp2(power) if choice < 3 else draw.choice(near)
     if choice == 0:
         return draw.uniform(low, high)
     if choice == 1:
@@ -122,6 +128,17 @@ def test_exact_values() -> None:
         assert PYTHON["tanh"](x) == 1.0
         assert PYTHON["tanh"](-x) == -1.0
     assert PYTHON["tanh"](19.06) < 1.0
+    assert bits(PYTHON["log"](1.0)) == bits(0.0)
+    for x in (0.0, -1.0, -math.inf, 5e-324):
+        assert PYTHON["log"](x) == PYTHON["log"](sys.float_info.min)
+    assert PYTHON["log"](math.inf) == PYTHON["log"](sys.float_info.max)
+
+
+def test_log_grows_with_its_argument() -> None:
+    draw = random.Random("log grows")
+    for x in (anywhere("log", draw) for _ in range(2000)):
+        values = [PYTHON["log"](y) for y in sorted(y for y in around(x, 2) if y > 0.0)]
+        assert values == sorted(values)
 
 
 def test_monotone_near_the_clamps() -> None:

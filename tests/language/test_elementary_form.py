@@ -9,7 +9,7 @@ from fractions import Fraction
 import mpmath
 import pytest
 
-from language import elementary, tangent
+from language import elementary, logarithm, tangent
 from language.functions import FUNCTIONS
 from language.operation import (
     Assign,
@@ -123,6 +123,17 @@ def test_lambert_coefficients() -> None:
     z = x * x
     fraction = polynomial(elementary.LAMBERT_ABOVE, z) / polynomial(elementary.LAMBERT_BELOW, z)
     assert abs(1 - z * fraction - mpmath.tanh(x) / x) < mpmath.mpf(2) ** -56.9
+
+
+@pytest.mark.parametrize(
+    ("series", "bits"), [(logarithm.SERIES, 59.4), (logarithm.SERIES_SINGLE, 30.2)]
+)
+def test_logarithm_series_error(series: tuple[float, ...], bits: float) -> None:
+    for i in range(1, 401):
+        s = (3 - 2 * mpmath.sqrt(2)) * i / 400
+        exact = mpmath.log((1 + s) / (1 - s))
+        wrong = 2 * s + s * s * s * polynomial(series, s * s) - exact
+        assert abs(wrong / exact) < mpmath.mpf(2) ** -bits
 
 
 def test_arc_tangent_series_error() -> None:

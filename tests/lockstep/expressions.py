@@ -48,7 +48,7 @@ REALS = (
     *("leaf", "+", "+", "-", "-", "*", "*", "/", "/", "negative", "select", "select"),
     *("sum of product", "sum of product", "sum of product"),
     *("abs", "sqrt", "min", "max", "clip", "sign", "sin", "cos", "exp", "tanh", "pow2", "count"),
-    *("floor", "tan", "atan2", "rounded"),
+    *("floor", "tan", "atan2", "rounded", "log"),
 )
 TRUTHS = ("leaf", "compare", "compare", "compare", "whole", "same", "not", "and", "or", "select")
 RELATIONS = ("<", "<=", ">", ">=", "==", "!=")

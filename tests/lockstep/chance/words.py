@@ -82,7 +82,7 @@ _FORMS: tuple[Callable[[Part], str], ...] = (
     *(lambda p: f"sqrt(abs({p()}))", lambda p: f"sqrt(max({p()}, 0))"),
     *(lambda p: f"sin(({p()}) * 1 rad)", lambda p: f"cos(({p()}) * 1 rad)"),
     *(lambda p: f"tan(({p()}) * 1 rad)", lambda p: f"atan2({p()}, {p()}) / 1 rad"),
-    *(lambda p: f"exp(-abs({p()}))", lambda p: f"exp(clip({p()}, -30, 4))"),
+    *(lambda p: f"exp(-log(abs({p()}) + 1))", lambda p: f"exp(clip({p()}, -30, 4))"),
     *(lambda p: f"tanh({p()})", lambda p: "@", lambda p: "@"),
     *(lambda p: f"({p()})^2", lambda p: f"clip({p()}, -9, 9)^3", lambda p: f"(abs({p()}) + 1)^-2"),
 )
