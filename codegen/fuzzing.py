@@ -65,6 +65,22 @@ def fuzzed(
         return _run(app, runs, ticks * len(table), seed)
 
 
+def records_of(
+    program: Program, ranges: Mapping[str, Range], runs: int, ticks: int = 24, seed: int = 1
+) -> list[list[bytes]]:
+    """Return the sequences that libFuzzer tried as records of inputs, one for each tick.
+
+    The page is the default one. Raises ToolMissing, BuildError.
+    """
+    table = words(program, ranges)
+    record = struct.Struct(f"<{len(table) + 1}d")
+    tried = dict(fuzzed(program, ranges, runs, ticks, seed).tried)
+    return [
+        [record.pack(*values, 0.0) for values in values_of(program, table, sequence)]
+        for sequence in tried
+    ]
+
+
 def words(program: Program, ranges: Mapping[str, Range]) -> list[Words]:
     """Return what the bytes 0 to 255 mean for each input that a tick is fed."""
     return [_words(v, program, ranges.get(short(v.name))) for v in fed(program)]

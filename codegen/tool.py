@@ -22,6 +22,8 @@ PACKAGES: Mapping[str, str] = {
     ARM_COMPILER: "gcc-arm-none-eabi libnewlib-arm-none-eabi",
     ARM_SIZE: "binutils-arm-none-eabi",
     EMULATOR: "qemu-system-arm",
+    "llvm-profdata-19": "llvm-19",
+    "llvm-cov-19": "llvm-19",
     "cppcheck": "cppcheck",
     "frama-c": "frama-c-base",
 }

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
         import_calibration,
         resolve_calibration,
     )
-    from modewright.code import a2l, dbc, fmu, fuzz, generate, metrics, prove
+    from modewright.code import a2l, dbc, fmu, fuzz, generate, mcdc, metrics, prove
     from modewright.diagnoses import diagnose, fit, save_diagnosis
     from modewright.diagram import Diagram, graph
     from modewright.recordings import CheckedRecordings, check_recordings
@@ -68,6 +68,7 @@ __all__ = [
     "import_calibration",
     "load",
     "lockstep",
+    "mcdc",
     "metrics",
     "plot",
     "prove",
@@ -108,6 +109,7 @@ PLACES = {
     "fmu": "modewright.code",
     "fuzz": "modewright.code",
     "generate": "modewright.code",
+    "mcdc": "modewright.code",
     "metrics": "modewright.code",
     "prove": "modewright.code",
     "compare": "modewright.runs",

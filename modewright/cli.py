@@ -33,6 +33,7 @@ from modewright.commands.generate import generate
 from modewright.commands.graph import graph
 from modewright.commands.lockstep import lockstep
 from modewright.commands.lsp import lsp
+from modewright.commands.mcdc import mcdc
 from modewright.commands.metrics import metrics
 from modewright.commands.new import new
 from modewright.commands.plot import plot
@@ -55,8 +56,8 @@ YOUNG_OBJECTS = 100_000
 """New objects after which garbage is looked for: trees of expressions have no circles."""
 COMMANDS = (
     new, check, test, trace, diagnose, fit, effects, simulate, sweep, lockstep, replay, plot,
-    compare, graph, generate, a2l, dbc, fmu, metrics, prove, fuzz, explain, diff, format, schema,
-    lsp, demo, doctor,
+    compare, graph, generate, a2l, dbc, fmu, metrics, prove, fuzz, mcdc, explain, diff, format,
+    schema, lsp, demo, doctor,
 )  # fmt: skip
 
 

@@ -11,7 +11,9 @@ from codegen.can_database import FIRST, dbc as dbc_of
 from codegen.cmake import cmake_file
 from codegen.fmi.archive import fmu as fmu_of
 from codegen.fmi.variable import Version
+from codegen.fuzzing import records_of
 from codegen.instructions import Instructions, instructions as counted
+from codegen.mcdc import Covered, mcdc as covered
 from codegen.metrics import Metrics, metrics as measured
 from codegen.proofs.all import CHECKS, proofs
 from codegen.proofs.proof import Proof
@@ -20,14 +22,16 @@ from language.limit import require_ranges
 from language.load import automaton_of, program_of
 from language.model import Automaton
 from language.number import NumberType
+from language.printing import digest
 from language.program import Program
 from language.project import Project
 from language.system import in_numbers
-from lockstep.compare import MOST_COUNTED
+from lockstep.compare import MOST_COUNTED, Tape
 from lockstep.fuzzing import RUNS, SEED, TICKS, Fuzzed, fuzz as fuzzed
 from lockstep.taping import taped
 from modewright.api import load
 from modewright.documents import Values, calibrated_document, scalars
+from modewright.tests import load_tests, tests_of
 
 
 def generate(
@@ -134,6 +138,39 @@ def fuzz(
     if not automaton.is_sampled:
         raise ValueError(f"{automaton.name} is continuous: sequences are those of sampled automata")
     return fuzzed(program, _ranges(automaton), runs, ticks, seed)
+
+
+def mcdc(
+    reference: str,
+    runs: int = 0,
+    values: Values | None = None,
+    root: Path | None = None,
+    calibrations: Sequence[str] = (),
+    numbers: NumberType | None = None,
+) -> Covered:
+    """Tell which conditions of the C of an automaton are shown to matter by the tests of the
+    project, and by `runs` sequences of libFuzzer.
+
+    Raises SpecError; ValueError where there is nothing to run it on; ToolMissing, BuildError.
+    """
+    automaton, program = _made(reference, values, root, calibrations, numbers)
+    sequences = [tape.inputs for tape in _tested(program, root, numbers)]
+    if runs and not automaton.is_sampled:
+        raise ValueError(f"{automaton.name} is continuous: sequences are those of sampled automata")
+    if runs:
+        sequences += records_of(program, _ranges(automaton), runs)
+    if not sequences:
+        raise ValueError(f"no test of the project runs {automaton.name}: give it `--runs`")
+    return covered(program, sequences)
+
+
+def _tested(program: Program, root: Path | None, numbers: NumberType | None) -> Iterator[Tape]:
+    """Yield what each test of a project does with a Program."""
+    for test in load_tests(tests_of(root), root):
+        run = in_numbers(test.system, numbers) if numbers else test.system
+        if any(one.automaton.name == program.name for one in run.instances.values()):
+            tapes = taped(run, test.scenario)[1].values()
+            yield from (tape for tape in tapes if digest(tape.program) == digest(program))
 
 
 def metrics(

@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from codegen.mcdc import Covered
 from codegen.proofs.proof import Proof
 from engine.difference import ModeSequence, RunDifference
 from engine.trajectory import Event, Trajectory
@@ -130,6 +131,31 @@ def fuzzed_json(found: Fuzzed) -> dict[str, Any]:
     first = vars(found.first) if found.first else None
     lists = {"modes": list(found.modes), "findings": list(found.findings)}
     return {**vars(found), **lists, "first": first, "clean": found.is_clean}
+
+
+def print_mcdc(console: Console, found: Covered) -> None:
+    """Print what was shown of generated C, and each decision of which something was not."""
+    for decision in found.missed:
+        place, marks = f"{found.file}:{decision.line}", _marks(decision.shown)
+        text = f"{place}: {marks} {decision.text}"
+        console.print(text, soft_wrap=True, highlight=False, markup=False)
+    text = (
+        f"{found.file}: {found.shown} of {found.conditions} conditions shown to matter (MC/DC), "
+        f"by {found.sequences} sequences, {found.steps} steps"
+    )
+    console.print(text, soft_wrap=True, highlight=False)
+
+
+def _marks(shown: Sequence[bool]) -> str:
+    """Return a mark for each condition: `+` if it was shown, else `-`."""
+    return "".join("+" if each else "-" for each in shown)
+
+
+def mcdc_json(found: Covered) -> dict[str, Any]:
+    """Return what a machine wants of MC/DC."""
+    decisions = [{**vars(each), "shown": list(each.shown)} for each in found.decisions]
+    counts = {"conditions": found.conditions, "shown": found.shown}
+    return {**vars(found), **counts, "decisions": decisions}
 
 
 def trajectory_json(trajectory: Trajectory) -> dict[str, Any]:

@@ -1,0 +1,124 @@
+"""MC/DC: which conditions of generated C were shown to matter, as clang counts them.
+
+A condition of a decision is shown where two runs of it are known that differ in that condition, as
+far as it was evaluated, and in the outcome (masking MC/DC, FAA CAST-10 2002; clang's
+-fcoverage-mcdc). A decision of one condition is shown where it was true once and false once.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from codegen.build import FLAGS, SECONDS, BuildError
+from codegen.harness import write_harness
+from codegen.machine import HOST
+from codegen.tool import output_of
+from language.program import Program
+
+COMPILER, MERGER, EXPORTER = "clang-19", "llvm-profdata-19", "llvm-cov-19"
+COVERED = ("-fprofile-instr-generate", "-fcoverage-mapping", "-fcoverage-mcdc")
+APP, POOL, MERGED = "app", "counts_%1m.profraw", "counts.profdata"
+CASE = re.compile(r"case\b|default\b")
+
+
+@dataclass(frozen=True)
+class Decision:
+    """A decision of the C: its line, its text, and of each condition whether it was shown."""
+
+    line: int
+    text: str
+    shown: tuple[bool, ...]
+
+
+@dataclass(frozen=True)
+class Covered:
+    """What `sequences` of inputs have shown of the C of a Program, over so many `steps`."""
+
+    file: str
+    sequences: int
+    steps: int
+    decisions: tuple[Decision, ...]
+
+    @property
+    def conditions(self) -> int:
+        """How many conditions there are."""
+        return sum(len(decision.shown) for decision in self.decisions)
+
+    @property
+    def shown(self) -> int:
+        """How many of them were shown to matter."""
+        return sum(sum(decision.shown) for decision in self.decisions)
+
+    @property
+    def missed(self) -> tuple[Decision, ...]:
+        """The decisions of which a condition was not shown."""
+        return tuple(decision for decision in self.decisions if not all(decision.shown))
+
+
+def mcdc(program: Program, sequences: Sequence[Sequence[bytes]]) -> Covered:
+    """Run the C of a Program on sequences of input records and tell what they show of it.
+
+    Records are those of a `Tape`. Raises ToolMissing, BuildError.
+    """
+    file = f"{program.name}.c"
+    with tempfile.TemporaryDirectory(prefix="modewright-") as name:
+        folder = Path(name)
+        sources = [str(path) for path in write_harness(program, folder)]
+        flags = [*(flag for flag in FLAGS if flag != "-O2"), "-O1", *COVERED]
+        output_of([COMPILER, *flags, *sources, "-o", APP, *HOST.link(folder)], folder)
+        for sequence in sequences:
+            _run(folder, b"".join(sequence))
+        pools = sorted(path.name for path in folder.glob("counts_*.profraw"))
+        output_of([MERGER, "merge", "-sparse", *pools, "-o", MERGED], folder)
+        command = [EXPORTER, "export", APP, f"-instr-profile={MERGED}", str(folder / file)]
+        found = json.loads(output_of(command, folder))
+        text = (folder / file).read_text().split("\n")
+    (counted,) = found["data"][0]["files"]
+    steps = sum(map(len, sequences))
+    return Covered(file, len(sequences), steps, tuple(_decisions(counted, text)))
+
+
+def _run(folder: Path, records: bytes) -> None:
+    """Run the harness on records; what it counts is added to what is there (`%1m`)."""
+    counting = os.environ | {"LLVM_PROFILE_FILE": str(folder / POOL)}
+    try:
+        done = subprocess.run(
+            [str(folder / APP)], input=records, capture_output=True, env=counting, timeout=SECONDS
+        )
+    except subprocess.TimeoutExpired:
+        raise BuildError(f"the compiled program was not done after {SECONDS} s") from None
+    if done.returncode:
+        raise BuildError(f"the compiled program ended with {done.returncode}")
+
+
+def _decisions(counted: dict[str, Any], text: Sequence[str]) -> Iterator[Decision]:
+    """Yield decisions in the order of the file: several conditions, then one alone."""
+    found = []
+    spans = []
+    for record in counted["mcdc_records"]:
+        begin, end = tuple(record[:2]), tuple(record[2:4])
+        spans.append((begin, end))
+        found.append((begin, end, tuple(record[-1])))
+    for branch in counted["branches"]:
+        begin, end, (true, false) = tuple(branch[:2]), tuple(branch[2:4]), branch[4:6]
+        is_inside = any(first <= begin and end <= last for first, last in spans)
+        if not is_inside and not CASE.match(_text(text, begin, end)):
+            found.append((begin, end, (bool(true and false),)))
+    for begin, end, shown in sorted(found):
+        yield Decision(begin[0], _text(text, begin, end), shown)
+
+
+def _text(lines: Sequence[str], begin: Sequence[int], end: Sequence[int]) -> str:
+    """Return the text from one place to another, lines and columns counted from 1."""
+    inside = list(lines[begin[0] - 1 : end[0]])
+    inside[-1] = inside[-1][: end[1] - 1]
+    inside[0] = inside[0][begin[1] - 1 :]
+    return " ".join(" ".join(inside).split())

@@ -1,0 +1,39 @@
+"""Command mcdc: which conditions of generated C the tests of a project show to matter."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from modewright.commands.options import Calibrations, Json, Numbers, Sets, values_of
+from modewright.console import console, working
+
+
+def mcdc(
+    automaton: Annotated[str, typer.Argument(help="an automaton: its name or file")],
+    runs: Annotated[
+        int, typer.Option(min=0, help="sequences that libFuzzer adds to those of the tests")
+    ] = 0,
+    numbers: Numbers = None,
+    sets: Sets = None,
+    calibrations: Calibrations = None,
+    as_json: Json = False,
+) -> None:
+    """Measure MC/DC of the C of an automaton on the tests of the project, by clang.
+
+    \b
+    modewright mcdc supervisor
+    modewright mcdc estimator --runs 2000 --json
+    """
+    from modewright import code, show
+
+    with working(f"running the C of {automaton} on the tests"):
+        try:
+            found = code.mcdc(automaton, runs, values_of(sets), None, calibrations or (), numbers)
+        except ValueError as error:
+            raise typer.BadParameter(str(error), param_hint="AUTOMATON") from None
+    if as_json:
+        show.print_json(show.mcdc_json(found))
+    else:
+        show.print_mcdc(console(), found)
