@@ -7,35 +7,51 @@ far as it was evaluated, and in the outcome (masking MC/DC, FAA CAST-10 2002; cl
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import os
 import re
+import struct
 import subprocess
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from codegen.build import FLAGS, SECONDS, BuildError
-from codegen.harness import write_harness
+from codegen.harness import fed, tunable, write_harness
 from codegen.machine import HOST
+from codegen.proofs.infeasible import never, places_of
+from codegen.proofs.symbolic import Range
+from codegen.source import c_program
 from codegen.tool import output_of
 from language.program import Program
 
 COMPILER, MERGER, EXPORTER = "clang-19", "llvm-profdata-19", "llvm-cov-19"
 COVERED = ("-fprofile-instr-generate", "-fcoverage-mapping", "-fcoverage-mcdc")
 APP, POOL, MERGED = "app", "counts_%1m.profraw", "counts.profdata"
+FUNCTION = re.compile(r"(?:static (?:inline|RARELY) )?void (\w+)\(")
 CASE = re.compile(r"case\b|default\b")
 
 
 @dataclass(frozen=True)
 class Decision:
-    """A decision of the C: its line, its text, and of each condition whether it was shown."""
+    """A decision of the C: the block and line in which it is, its text, of each condition whether
+    it was `shown`, and the one outcome that it can `never` have, where that is proven.
+    """
 
+    block: str
     line: int
     text: str
     shown: tuple[bool, ...]
+    never: tuple[bool | None, ...]
+
+    @property
+    def open(self) -> int:
+        """How many conditions are neither shown nor proven to be infeasible."""
+        pairs = zip(self.shown, self.never, strict=True)
+        return sum(not shown and outcome is None for shown, outcome in pairs)
 
 
 @dataclass(frozen=True)
@@ -58,9 +74,50 @@ class Covered:
         return sum(sum(decision.shown) for decision in self.decisions)
 
     @property
+    def open(self) -> int:
+        """How many of them are neither shown nor proven to be infeasible."""
+        return sum(decision.open for decision in self.decisions)
+
+    @property
     def missed(self) -> tuple[Decision, ...]:
         """The decisions of which a condition was not shown."""
         return tuple(decision for decision in self.decisions if not all(decision.shown))
+
+
+def with_proofs(found: Covered, program: Program, ranges: Mapping[str, Range]) -> Covered:
+    """Return what was covered with a proof of what no input can show of a sampled Program.
+
+    `ranges` are those of its variables between two steps, as far as they stay in them.
+    """
+    made = c_program(program)
+    places: dict[tuple[str, str], list[tuple[int, ...]]] = {}
+    for place in places_of(made):
+        places.setdefault((place.block, place.text), []).append(place.conditions)
+    numbers = []
+    for decision in found.decisions:
+        known = places.get((decision.block, decision.text), [])
+        fits = bool(known) and len(known[0]) == len(decision.shown)
+        numbers.append(known.pop(0) if fits else (0,) * len(decision.shown))
+    pairs = list(zip(found.decisions, numbers, strict=True))
+    wanted = [n for d, of in pairs for n, shown in zip(of, d.shown, strict=True) if not shown and n]
+    proven = never(made, ranges, wanted)
+    decisions = [
+        dataclasses.replace(d, never=tuple(proven.get(number) for number in of)) for d, of in pairs
+    ]
+    return dataclasses.replace(found, decisions=tuple(decisions))
+
+
+def turned(program: Program, sequence: Sequence[bytes]) -> list[bytes]:
+    """Return a sequence with another page from its second record on: each tunable parameter at the
+    end of its range that it is not at.
+    """
+    page = []
+    for constant in tunable(program):
+        low, high = constant.range or (constant.value, constant.value)
+        page.append(float(high if constant.value == low else low))
+    head = struct.Struct(f"<{len(fed(program)) + 1}d")
+    values = head.unpack_from(sequence[1])
+    return [sequence[0], head.pack(*values[:-1], 1.0) + struct.pack(f"<{len(page)}d", *page)]
 
 
 def mcdc(program: Program, sequences: Sequence[Sequence[bytes]]) -> Covered:
@@ -83,7 +140,7 @@ def mcdc(program: Program, sequences: Sequence[Sequence[bytes]]) -> Covered:
         text = (folder / file).read_text().split("\n")
     (counted,) = found["data"][0]["files"]
     steps = sum(map(len, sequences))
-    return Covered(file, len(sequences), steps, tuple(_decisions(counted, text)))
+    return Covered(file, len(sequences), steps, tuple(_decisions(program.name, counted, text)))
 
 
 def _run(folder: Path, records: bytes) -> None:
@@ -99,7 +156,7 @@ def _run(folder: Path, records: bytes) -> None:
         raise BuildError(f"the compiled program ended with {done.returncode}")
 
 
-def _decisions(counted: dict[str, Any], text: Sequence[str]) -> Iterator[Decision]:
+def _decisions(name: str, counted: dict[str, Any], text: Sequence[str]) -> Iterator[Decision]:
     """Yield decisions in the order of the file: several conditions, then one alone."""
     found = []
     spans = []
@@ -113,7 +170,14 @@ def _decisions(counted: dict[str, Any], text: Sequence[str]) -> Iterator[Decisio
         if not is_inside and not CASE.match(_text(text, begin, end)):
             found.append((begin, end, (bool(true and false),)))
     for begin, end, shown in sorted(found):
-        yield Decision(begin[0], _text(text, begin, end), shown)
+        block = _block(name, text[: begin[0]])
+        yield Decision(block, begin[0], _text(text, begin, end), shown, (None,) * len(shown))
+
+
+def _block(name: str, lines: Sequence[str]) -> str:
+    """Return the block whose function begins last in some lines."""
+    begun = next(found[1] for line in reversed(lines) if (found := FUNCTION.match(line)))
+    return begun.removeprefix(f"{name}_").lower() if begun.startswith(f"{name}_") else begun
 
 
 def _text(lines: Sequence[str], begin: Sequence[int], end: Sequence[int]) -> str:

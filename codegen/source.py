@@ -53,7 +53,7 @@ def c_files(program: Program, by_amount: bool = True) -> dict[str, str]:
     if "step" not in program.blocks:
         raise ValueError(f"inputs of {program.name} vary inside a step: it has no C")
     context = {
-        **module_context(leaping(gated(stepped(program), by_amount)), PAGE),
+        **module_context(c_program(program, by_amount), PAGE),
         "digest": digest(program),
     }
     files = {
@@ -64,6 +64,11 @@ def c_files(program: Program, by_amount: bool = True) -> dict[str, str]:
     if context["uses_math"]:
         files.update(math_files(program.number))
     return files
+
+
+def c_program(program: Program, by_amount: bool = True) -> Program:
+    """Return the Program that C is printed of: the same bits, in the way that suits C."""
+    return leaping(gated(stepped(program), by_amount))
 
 
 def stepped(program: Program) -> Program:

@@ -13,17 +13,18 @@ from codegen.fmi.archive import fmu as fmu_of
 from codegen.fmi.variable import Version
 from codegen.fuzzing import records_of
 from codegen.instructions import Instructions, instructions as counted
-from codegen.mcdc import Covered, mcdc as covered
+from codegen.mcdc import Covered, mcdc as covered, turned, with_proofs
 from codegen.metrics import Metrics, metrics as measured
 from codegen.proofs.all import CHECKS, proofs
 from codegen.proofs.proof import Proof
 from codegen.source import c_files
+from language.declaration import Input, State
 from language.limit import require_ranges
 from language.load import automaton_of, program_of
 from language.model import Automaton
 from language.number import NumberType
 from language.printing import digest
-from language.program import Program
+from language.program import Program, short
 from language.project import Project
 from language.system import in_numbers
 from lockstep.compare import MOST_COUNTED, Tape
@@ -32,6 +33,8 @@ from lockstep.taping import taped
 from modewright.api import load
 from modewright.documents import Values, calibrated_document, scalars
 from modewright.tests import load_tests, tests_of
+
+HELD = ("latched.", "state.", "discrete.")
 
 
 def generate(
@@ -147,9 +150,11 @@ def mcdc(
     root: Path | None = None,
     calibrations: Sequence[str] = (),
     numbers: NumberType | None = None,
+    *,
+    is_proven: bool = True,
 ) -> Covered:
     """Tell which conditions of the C of an automaton are shown to matter by the tests of the
-    project, and by `runs` sequences of libFuzzer.
+    project, and by `runs` sequences of libFuzzer; and, if that `is_proven`, which cannot be.
 
     Raises SpecError; ValueError where there is nothing to run it on; ToolMissing, BuildError.
     """
@@ -161,7 +166,25 @@ def mcdc(
         sequences += records_of(program, _ranges(automaton), runs)
     if not sequences:
         raise ValueError(f"no test of the project runs {automaton.name}: give it `--runs`")
-    return covered(program, sequences)
+    if "compare_stamps" in program.blocks:
+        sequences += [turned(program, one) for one in sequences if len(one) > 1][:1]
+    found = covered(program, sequences)
+    if not (is_proven and automaton.is_sampled):
+        return found
+    return with_proofs(found, program, _held(automaton, program))
+
+
+def _held(automaton: Automaton, program: Program) -> dict[str, tuple[float, float]]:
+    """Return the ranges [SI] in which a sampled automaton holds its reals, by variable."""
+    things: dict[str, Input | State] = {**automaton.inputs, **automaton.carried}
+    ends = {name: one.range for name, one in things.items() if one.range}
+    return {
+        variable.name: (float(ends[short(variable.name)][0]), float(ends[short(variable.name)][1]))
+        for variable in program.variables
+        if variable.type == "real"
+        and variable.name.startswith(HELD)
+        and short(variable.name) in ends
+    }
 
 
 def _tested(program: Program, root: Path | None, numbers: NumberType | None) -> Iterator[Tape]:

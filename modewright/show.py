@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from codegen.mcdc import Covered
+from codegen.mcdc import Covered, Decision
 from codegen.proofs.proof import Proof
 from engine.difference import ModeSequence, RunDifference
 from engine.trajectory import Event, Trajectory
@@ -136,25 +136,32 @@ def fuzzed_json(found: Fuzzed) -> dict[str, Any]:
 def print_mcdc(console: Console, found: Covered) -> None:
     """Print what was shown of generated C, and each decision of which something was not."""
     for decision in found.missed:
-        place, marks = f"{found.file}:{decision.line}", _marks(decision.shown)
-        text = f"{place}: {marks} {decision.text}"
+        text = f"{found.file}:{decision.line}: {_marks(decision)} {decision.text}"
         console.print(text, soft_wrap=True, highlight=False, markup=False)
     text = (
-        f"{found.file}: {found.shown} of {found.conditions} conditions shown to matter (MC/DC), "
-        f"by {found.sequences} sequences, {found.steps} steps"
+        f"{found.file}: of {found.conditions} conditions {found.shown} are shown to matter (MC/DC) "
+        f"by {found.sequences} sequences, {found.steps} steps; "
+        f"{found.conditions - found.shown - found.open} are proven infeasible, {found.open} open"
     )
     console.print(text, soft_wrap=True, highlight=False)
 
 
-def _marks(shown: Sequence[bool]) -> str:
-    """Return a mark for each condition: `+` if it was shown, else `-`."""
-    return "".join("+" if each else "-" for each in shown)
+def _marks(decision: Decision) -> str:
+    """Return a mark for each condition: `+` if it was shown, `T` or `F` if it is always true or
+    false, else `-`.
+    """
+    never = {None: "-", True: "F", False: "T"}
+    pairs = zip(decision.shown, decision.never, strict=True)
+    return "".join("+" if shown else never[outcome] for shown, outcome in pairs)
 
 
 def mcdc_json(found: Covered) -> dict[str, Any]:
     """Return what a machine wants of MC/DC."""
-    decisions = [{**vars(each), "shown": list(each.shown)} for each in found.decisions]
-    counts = {"conditions": found.conditions, "shown": found.shown}
+    decisions = [
+        {**vars(each), "shown": list(each.shown), "never": list(each.never)}
+        for each in found.decisions
+    ]
+    counts = {"conditions": found.conditions, "shown": found.shown, "open": found.open}
     return {**vars(found), **counts, "decisions": decisions}
 
 

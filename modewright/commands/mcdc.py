@@ -15,6 +15,9 @@ def mcdc(
     runs: Annotated[
         int, typer.Option(min=0, help="sequences that libFuzzer adds to those of the tests")
     ] = 0,
+    proofs: Annotated[
+        bool, typer.Option(help="look for proofs that no input can show what was not shown")
+    ] = True,
     numbers: Numbers = None,
     sets: Sets = None,
     calibrations: Calibrations = None,
@@ -24,13 +27,22 @@ def mcdc(
 
     \b
     modewright mcdc supervisor
-    modewright mcdc estimator --runs 2000 --json
+    modewright mcdc estimator_simple --runs 4000
+    modewright mcdc estimator --no-proofs --json
     """
     from modewright import code, show
 
     with working(f"running the C of {automaton} on the tests"):
         try:
-            found = code.mcdc(automaton, runs, values_of(sets), None, calibrations or (), numbers)
+            found = code.mcdc(
+                automaton,
+                runs,
+                values_of(sets),
+                None,
+                calibrations or (),
+                numbers,
+                is_proven=proofs,
+            )
         except ValueError as error:
             raise typer.BadParameter(str(error), param_hint="AUTOMATON") from None
     if as_json:

@@ -84,7 +84,7 @@ def test_a_decision_of_one_condition_has_to_be_true_and_false() -> None:
 def test_the_command_tells_what_was_not_shown() -> None:
     text = CliRunner().invoke(app, ["mcdc", "contactor", "--runs", "60"]).output
     first, last = text.split("\n")[0], text.strip().split("\n")[-1]
-    assert last.startswith("contactor.c: ") and "conditions shown to matter (MC/DC)" in last
+    assert last.startswith("contactor.c: ") and "are shown to matter (MC/DC)" in last
     assert first.startswith("contactor.c:")
     made = CliRunner().invoke(app, ["mcdc", "contactor", "--runs", "60", "--json"]).output
     found = json.loads(made)
@@ -92,8 +92,11 @@ def test_the_command_tells_what_was_not_shown() -> None:
 
 
 def test_tests_of_the_project_are_the_sequences() -> None:
-    found = code.mcdc("estimator")
-    assert found.sequences == 3 and 0 < found.shown < found.conditions
+    found = code.mcdc("estimator", is_proven=False)
+    assert found.sequences == 3 + 1  # and one with another page
+    assert 0 < found.shown == found.conditions - found.open < found.conditions
+    (stamp,) = (d for d in found.decisions if "stamp_J_em" in d.text)
+    assert stamp.shown == (True,)
 
 
 def test_nothing_to_run_it_on_is_told() -> None:

@@ -1,0 +1,102 @@
+"""Infeasible: what is proven never to happen never happens, and what may happen is not proven."""
+
+from __future__ import annotations
+
+import dataclasses
+import shutil
+from pathlib import Path
+
+import pytest
+
+from codegen.mcdc import EXPORTER, mcdc, with_proofs
+from codegen.proofs.infeasible import never, places_of
+from codegen.source import c_program
+from language.program import Program
+from modewright import code
+from tests.language.making import program
+from tests.lockstep.chance.kinds import chance
+from tests.lockstep.chance.running import taped
+from tests.lockstep.chance.spec import program as program_of
+
+needs_llvm = pytest.mark.skipif(
+    not shutil.which(EXPORTER), reason="no llvm-cov-19: make system-packages"
+)
+VALVE = """language: 1
+automaton: valve
+period: 10 ms
+numbers: {number}
+parameters: {{top: {{value: 4, tunable: true, range: [1, 9]}}, two: {{value: 2}}}}
+inputs: {{u: {{unit: "1", range: [-8, 8]}}, go: {{type: bool}}}}
+states: {{level: {{unit: "1", initial: 0, range: [0, 5]}}}}
+initial: shut
+modes:
+  shut: {{transitions: {{open: {{when: go, wait: 30 ms}}}}}}
+  open:
+    update: {{level: "clip(level + u, 0, 4)"}}
+    transitions:
+      shut: {{when: level > 5 or not go}}
+      spilled: {{when: "u > 100", priority: 2}}
+  spilled: {{transitions: {{shut: {{when: abs(u) < top}}}}}}
+outputs: [level, mode]
+"""
+SEEDS = (14, 19)
+"""Of small specs."""
+HELD = {"latched.u": (-8.0, 8.0), "state.level": (0.0, 5.0)}
+
+
+def proven(made: Program, ranges: dict[str, tuple[float, float]] = HELD) -> dict[str, str]:
+    """Return of each decision of which something is proven its text and `T`, `F` or `.`."""
+    used = c_program(made)
+    places = list(places_of(used))
+    found = never(used, ranges, [number for place in places for number in place.conditions])
+    marks = {None: ".", True: "F", False: "T"}
+    texts = {p.text: "".join(marks[found.get(n)] for n in p.conditions) for p in places}
+    return {text: marks for text, marks in texts.items() if set(marks) != {"."}}
+
+
+@pytest.mark.parametrize("number", ["float64", "float32"])
+def test_what_cannot_be_is_proven_and_nothing_else(number: str) -> None:
+    suffix = "" if number == "float64" else "F"
+    found = proven(program(VALVE.format(number=number)))
+    assert found.pop("self->timer.shut_open < 4U") == "T"
+    assert found.pop(f"(self->state.level > 5.0{suffix}) || (!in->go)") == "F."
+    assert found.pop(f"self->latched.u > 100.0{suffix}") == "F"
+    assert all(marks == "T" and "_level, 0" in text for text, marks in found.items()), found
+
+
+def test_a_range_that_does_not_stay_proves_nothing() -> None:
+    made = program(VALVE.format(number="float64"))
+    for wrong in ({"state.level": (0.0, 3.0)}, {"state.level": (1.0, 5.0)}, {}):
+        assert proven(made, wrong)["self->latched.u > 100.0"] == "F"  # it is held when it is read
+        assert not any(text.startswith("(self->state.level > 5.0)") for text in proven(made, wrong))
+
+
+def test_a_nan_is_in_no_range() -> None:
+    """What is neither below 0 nor above is a number that is none: without a range it may be."""
+    text = VALVE.format(number="float64").replace("level > 5 or not go", "level < 0 or level >= 0")
+    guard = "(self->state.level < 0.0) || (self->state.level >= 0.0)"
+    assert proven(program(text))[guard] == "FT"
+    free = text.replace(", range: [0, 5]", "").replace("clip(level + u, 0, 4)", "level + u")
+    assert guard not in proven(program(free), {"latched.u": (-8.0, 8.0)})
+
+
+@needs_llvm
+@pytest.mark.parametrize("seed", SEEDS)
+def test_what_was_seen_is_never_proven_not_to_be(seed: int, tmp_path: Path) -> None:
+    """A random spec on random inputs: of a condition that was true and false nothing is proven."""
+    spec = chance(seed)
+    made = program_of(spec, "float64", tmp_path)
+    found = mcdc(made, [taped(spec, made, 200).inputs])
+    hidden = [dataclasses.replace(d, shown=(False,) * len(d.shown)) for d in found.decisions]
+    said = with_proofs(dataclasses.replace(found, decisions=tuple(hidden)), made, {})
+    assert 0 < said.open < said.conditions
+    for seen, claim in zip(found.decisions, said.decisions, strict=True):
+        pairs = zip(seen.shown, claim.never, strict=True)
+        assert not any(shown and outcome is not None for shown, outcome in pairs), claim
+
+
+@needs_llvm
+@pytest.mark.parametrize("name", ["contactor", "estimator_simple"])
+def test_each_condition_is_shown_or_proven(name: str) -> None:
+    found = code.mcdc(name, 1500)
+    assert found.open == 0 < found.shown < found.conditions
