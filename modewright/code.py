@@ -165,7 +165,8 @@ def mcdc(
     if runs:
         sequences += records_of(program, _ranges(automaton), runs)
     if not sequences:
-        raise ValueError(f"no test of the project runs {automaton.name}: give it `--runs`")
+        hint = ": give it `--runs`" if automaton.is_sampled else ""
+        raise ValueError(f"no test of the project runs {automaton.name} as it is{hint}")
     if "compare_stamps" in program.blocks:
         sequences += [turned(program, one) for one in sequences if len(one) > 1][:1]
     found = covered(program, sequences)

@@ -100,7 +100,7 @@ def test_tests_of_the_project_are_the_sequences() -> None:
 
 
 def test_nothing_to_run_it_on_is_told() -> None:
-    with pytest.raises(ValueError, match="no test of the project runs contactor"):
+    with pytest.raises(ValueError, match="no test of the project runs contactor as it is: give it"):
         code.mcdc("contactor")
     with pytest.raises(ValueError, match="is continuous"):
         code.mcdc("driveline", 10)
