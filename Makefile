@@ -38,7 +38,7 @@ $(STAMP): pyproject.toml uv.lock tools/set_up.py
 
 # A compiler for the target and its C library, its emulator, a second compiler and its coverage,
 # rules of MISRA C, value analysis, what builds an FMU from its sources.
-SYSTEM_PACKAGES := gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm clang-19 llvm-19 libclang-rt-19-dev cppcheck frama-c-base cmake
+SYSTEM_PACKAGES := gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm clang-19 llvm-19 libclang-rt-19-dev cppcheck frama-c-base why3 z3 cmake
 SUDO := $(if $(filter 0,$(shell id -u)),,sudo)
 
 system-packages: ## install what the target needs (Debian, Ubuntu), if it is not there

@@ -26,6 +26,8 @@ PACKAGES: Mapping[str, str] = {
     "llvm-cov-19": "llvm-19",
     "cppcheck": "cppcheck",
     "frama-c": "frama-c-base",
+    "why3": "why3",
+    "z3": "z3",
 }
 """Their Debian packages."""
 
@@ -38,14 +40,16 @@ def needed(tool: str) -> str:
     return tool
 
 
-def told(command: Sequence[str], folder: Path) -> subprocess.CompletedProcess[str]:
-    """Run a tool in a folder. Raises ToolMissing, BuildError."""
+def told(
+    command: Sequence[str], folder: Path, more: Mapping[str, str] | None = None
+) -> subprocess.CompletedProcess[str]:
+    """Run a tool in a folder, with `more` in its environment. Raises ToolMissing, BuildError."""
     tool, *words = command
     try:
         return subprocess.run(
             [needed(tool), *words],
             cwd=folder,
-            env=os.environ | {"PWD": str(folder)},
+            env={**os.environ, "PWD": str(folder), **(more or {})},
             capture_output=True,
             text=True,
             timeout=SECONDS,

@@ -6,6 +6,7 @@ import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
+from codegen.proofs.contract import contract
 from codegen.proofs.misra import misra
 from codegen.proofs.proof import Proof
 from codegen.proofs.sanitised import sanitised
@@ -15,14 +16,14 @@ from codegen.proofs.values import values
 from codegen.source import c_files
 from language.program import Program
 
-CHECKS = ("warnings", "misra", "stack", "sanitizers", "values")
+CHECKS = ("warnings", "misra", "stack", "sanitizers", "values", "contract")
 
 
 def proofs(program: Program, checks: Sequence[str] = CHECKS) -> Iterator[Proof]:
     """Yield what each check says. Raises ToolMissing, BuildError."""
     with tempfile.TemporaryDirectory(prefix="modewright-") as name:
         folder = Path(name)
-        for inner in ("sanitizers", "values"):
+        for inner in ("sanitizers", "values", "contract"):
             (folder / inner).mkdir()
         files = c_files(program)
         for file, text in files.items():
@@ -34,6 +35,7 @@ def proofs(program: Program, checks: Sequence[str] = CHECKS) -> Iterator[Proof]:
             "stack": lambda: [stack(folder, sources, f"{program.name}_Step")],
             "sanitizers": lambda: [sanitised(program, folder / "sanitizers")],
             "values": lambda: [values(program, folder / "values")],
+            "contract": lambda: [contract(program, folder / "contract")],
         }
         for check in checks:
             yield from made[check]()

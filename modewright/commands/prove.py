@@ -12,7 +12,8 @@ from modewright.exits import PROBLEMS
 
 Automaton = Annotated[str, typer.Argument(help="an automaton: its name or file")]
 Only = Annotated[
-    str | None, typer.Option(help="some of warnings,misra,stack,sanitizers,values; default all")
+    str | None,
+    typer.Option(help="some of warnings,misra,stack,sanitizers,values,contract; all by default"),
 ]
 
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from pathlib import Path
 
 import pytest
 
+from codegen.proofs.contract import contract
 from codegen.proofs.misra import misra
 from codegen.proofs.proof import Proof
 from codegen.proofs.sanitised import sanitised
@@ -64,6 +66,32 @@ def test_no_step_of_them_leaves_the_numbers(name: str) -> None:
     (found,) = prove(name, checks=("values",))
     assert found.findings == ()
     assert "statements reached" in found.about
+
+
+def test_what_guards_may_do_is_proven_of_each_mode() -> None:
+    (found,) = prove("contactor", checks=("contract",))
+    assert found.findings == ()
+    assert re.fullmatch(r"(\d+) of \1 goals; 2 modes", found.about)
+    (chart,) = prove("supervisor", checks=("contract",))
+    assert chart.holds and chart.about.startswith("not asked")
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "goal"),
+    [
+        ("self->fired = 1U;", "self->fired = 2U;", "jump_open_ensures"),
+        ("self->fired = 2U;", "self->fired = 2U;\n        self->faults = 1U;", "jump_shut_assigns"),
+    ],
+)
+def test_a_mode_that_breaks_its_contract_is_found(
+    right: str, wrong: str, goal: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = c_files(program("contactor"), by_amount=False)
+    assert made["contactor.c"].count(right) == 1
+    broken = {**made, "contactor.c": made["contactor.c"].replace(right, wrong)}
+    monkeypatch.setattr("codegen.proofs.contract.c_files", lambda program, by_amount: broken)
+    found = contract(program("contactor"), tmp_path)
+    assert any(goal in finding for finding in found.findings), found
 
 
 def test_each_tool_finds_a_mistake(tmp_path: Path) -> None:
