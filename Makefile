@@ -36,7 +36,7 @@ setup: $(STAMP) ## build .venv with everything, this project included
 $(STAMP): pyproject.toml uv.lock tools/set_up.py
 	@$(find_python); exec $$python tools/set_up.py
 
-# A compiler for the target and its C library, its emulator, a second compiler and its coverage,
+# A compiler for the target and its C library, its emulator, a second one and what counts with it,
 # rules of MISRA C, value analysis, what builds an FMU from its sources.
 SYSTEM_PACKAGES := gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm clang-19 llvm-19 libclang-rt-19-dev cppcheck frama-c-base why3 z3 cmake
 SUDO := $(if $(filter 0,$(shell id -u)),,sudo)

@@ -6,7 +6,7 @@ import os
 import shlex
 import shutil
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from language.missing import ToolMissing as ToolMissing
@@ -86,10 +86,15 @@ def linked(command: Sequence[str], target: Path) -> None:
         raise BuildError(_first_error(done.stderr) or f"the compiler ended with {done.returncode}")
 
 
-def run_executable(target: Path, records: bytes) -> bytes:
-    """Run a harness on input records and return its output records. Raises BuildError."""
+def run_executable(target: Path, records: bytes, more: Mapping[str, str] | None = None) -> bytes:
+    """Run a harness on input records, with `more` in its environment, and return its output
+    records. Raises BuildError.
+    """
+    environment = {**os.environ, **(more or {})}
     try:
-        done = subprocess.run([str(target)], input=records, capture_output=True, timeout=SECONDS)
+        done = subprocess.run(
+            [str(target)], input=records, capture_output=True, env=environment, timeout=SECONDS
+        )
     except subprocess.TimeoutExpired:
         raise BuildError(f"the compiled program was not done after {SECONDS} s") from None
     if done.returncode != 0:

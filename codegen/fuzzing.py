@@ -66,7 +66,7 @@ def fuzzed(
 
 
 def records_of(
-    program: Program, ranges: Mapping[str, Range], runs: int, ticks: int = 24, seed: int = 1
+    program: Program, ranges: Mapping[str, Range], runs: int, ticks: int, seed: int
 ) -> list[list[bytes]]:
     """Return the sequences that libFuzzer tried as records of inputs, one for each tick.
 

@@ -13,16 +13,17 @@ import dataclasses
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 
-from codegen.way import LEFT, MODE, NotPlain, Way
+from codegen.way import LEFT, NotPlain, Way
 from language.operation import Assign, Block, Branch, Choose, Expr, Loop, Op, Ref, Run, Unary, Value
-from language.program import ModeInfo, Program, Variable
+from language.program import MODE, ModeInfo, Program, Variable
+from language.run import MODE as RUN_MODE
 from language.substitution import own_expressions, with_expressions, with_parts
 from language.traversal import block_writes, expr_names, reads
 from language.wiring import finished
 
 ENTRIES = ("init", "derive", "step")
 LEAP, DONE, RECORD, STARTED = "leap", "memory.is_done", "record", "memory.started"
-RUN_MODE, THROUGH = "memory.run_mode", "through_events"
+THROUGH = "through_events"
 UNDONE = (Assign(DONE, Value(False)),)
 
 

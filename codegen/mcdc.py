@@ -1,7 +1,7 @@
 """MC/DC: which conditions of generated C were shown to matter, as clang counts them.
 
 A condition of a decision is shown where two runs of it are known that differ in that condition, as
-far as it was evaluated, and in the outcome (masking MC/DC, FAA CAST-10 2002; clang's
+far as it was evaluated, and in the outcome (masking MC/DC, FAA CAST-6 2001; clang's
 -fcoverage-mcdc). A decision of one condition is shown where it was true once and false once.
 """
 
@@ -9,21 +9,20 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import os
 import re
 import struct
-import subprocess
 import tempfile
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from codegen.build import FLAGS, SECONDS, BuildError
+from codegen.build import FLAGS, run_executable
 from codegen.harness import fed, tunable, write_harness
 from codegen.machine import HOST
 from codegen.proofs.infeasible import never, places_of
-from codegen.proofs.symbolic import Range
+from codegen.proofs.terms import Range
 from codegen.source import c_program
 from codegen.tool import output_of
 from language.program import Program
@@ -32,6 +31,8 @@ COMPILER, MERGER, EXPORTER = "clang-19", "llvm-profdata-19", "llvm-cov-19"
 COVERED = ("-fprofile-instr-generate", "-fcoverage-mapping", "-fcoverage-mcdc")
 APP, POOL, MERGED = "app", "counts_%1m.profraw", "counts.profdata"
 FUNCTION = re.compile(r"(?:static (?:inline|RARELY) )?void (\w+)\(")
+Key = tuple[str, str]
+"""The block and the text of a decision."""
 CASE = re.compile(r"case\b|default\b")
 
 
@@ -90,21 +91,33 @@ def with_proofs(found: Covered, program: Program, ranges: Mapping[str, Range]) -
     `ranges` are those of its variables between two steps, as far as they stay in them.
     """
     made = c_program(program)
-    places: dict[tuple[str, str], list[tuple[int, ...]]] = {}
+    places: dict[Key, list[tuple[int, ...]]] = {}
     for place in places_of(made):
         places.setdefault((place.block, place.text), []).append(place.conditions)
-    numbers = []
-    for decision in found.decisions:
-        known = places.get((decision.block, decision.text), [])
-        fits = bool(known) and len(known[0]) == len(decision.shown)
-        numbers.append(known.pop(0) if fits else (0,) * len(decision.shown))
-    pairs = list(zip(found.decisions, numbers, strict=True))
-    wanted = [n for d, of in pairs for n, shown in zip(of, d.shown, strict=True) if not shown and n]
+    missed = {(decision.block, decision.text) for decision in found.missed}
+    wanted = [n for key, all_of in places.items() if key in missed for of in all_of for n in of]
     proven = never(made, ranges, wanted)
-    decisions = [
-        dataclasses.replace(d, never=tuple(proven.get(number) for number in of)) for d, of in pairs
-    ]
+    counts = Counter((decision.block, decision.text) for decision in found.decisions)
+    decisions = []
+    for decision in found.decisions:
+        key = decision.block, decision.text
+        all_of = places.get(key, [])
+        claimed = _claimed(all_of, proven, decision) if len(all_of) >= counts[key] else ()
+        decisions.append(dataclasses.replace(decision, never=claimed or decision.never))
     return dataclasses.replace(found, decisions=tuple(decisions))
+
+
+def _claimed(
+    places: Sequence[tuple[int, ...]], proven: Mapping[int, bool], decision: Decision
+) -> tuple[bool | None, ...]:
+    """Return what is proven of each condition at all places of a block where it may stand: several
+    have the same text.
+    """
+    found: list[bool | None] = []
+    for position, shown in enumerate(decision.shown):
+        outcomes = {proven.get(of[position]) for of in places if len(of) == len(decision.shown)}
+        found.append(outcomes.pop() if len(outcomes) == 1 and not shown else None)
+    return tuple(found)
 
 
 def turned(program: Program, sequence: Sequence[bytes]) -> list[bytes]:
@@ -131,8 +144,9 @@ def mcdc(program: Program, sequences: Sequence[Sequence[bytes]]) -> Covered:
         sources = [str(path) for path in write_harness(program, folder)]
         flags = [*(flag for flag in FLAGS if flag != "-O2"), "-O1", *COVERED]
         output_of([COMPILER, *flags, *sources, "-o", APP, *HOST.link(folder)], folder)
+        counting = {"LLVM_PROFILE_FILE": str(folder / POOL)}  # a run adds to what is there
         for sequence in sequences:
-            _run(folder, b"".join(sequence))
+            run_executable(folder / APP, b"".join(sequence), counting)
         pools = sorted(path.name for path in folder.glob("counts_*.profraw"))
         output_of([MERGER, "merge", "-sparse", *pools, "-o", MERGED], folder)
         command = [EXPORTER, "export", APP, f"-instr-profile={MERGED}", str(folder / file)]
@@ -141,19 +155,6 @@ def mcdc(program: Program, sequences: Sequence[Sequence[bytes]]) -> Covered:
     (counted,) = found["data"][0]["files"]
     steps = sum(map(len, sequences))
     return Covered(file, len(sequences), steps, tuple(_decisions(program.name, counted, text)))
-
-
-def _run(folder: Path, records: bytes) -> None:
-    """Run the harness on records; what it counts is added to what is there (`%1m`)."""
-    counting = os.environ | {"LLVM_PROFILE_FILE": str(folder / POOL)}
-    try:
-        done = subprocess.run(
-            [str(folder / APP)], input=records, capture_output=True, env=counting, timeout=SECONDS
-        )
-    except subprocess.TimeoutExpired:
-        raise BuildError(f"the compiled program was not done after {SECONDS} s") from None
-    if done.returncode:
-        raise BuildError(f"the compiled program ended with {done.returncode}")
 
 
 def _decisions(name: str, counted: dict[str, Any], text: Sequence[str]) -> Iterator[Decision]:

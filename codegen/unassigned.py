@@ -22,10 +22,10 @@ from language.operation import (
     Store,
     Value,
 )
-from language.program import Program
+from language.program import MODE, Program
 from language.substitution import own_expressions, subexpressions
 
-WORK, MODE = "work.", "memory.mode"
+WORK = "work."
 Set = frozenset[str]
 
 

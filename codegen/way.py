@@ -29,8 +29,7 @@ from language.program import Program, Variable
 from language.substitution import parts, with_expressions, with_parts
 from language.traversal import block_reads, block_writes, expr_names
 
-LEFT, CROSSED, MODE = "work.left", "work.crossed", "memory.mode"
-WORK, EQUATION = "work.", "equation."
+WORK, LEFT, CROSSED = "work.", "work.left", "work.crossed"
 
 
 class NotPlain(Exception):
@@ -186,7 +185,9 @@ class Way:
             self._named.setdefault(number, name)
 
     def _number(self, value: Expr) -> int | None:
-        """Return the number of a value; equal operations on equal numbers have equal ones."""
+        """Return the number of a value; equal operations on equal numbers have equal ones, as in
+        language/common.py, and a name has that of its value.
+        """
         key: Hashable = None
         match value:
             case Value(known):

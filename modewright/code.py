@@ -24,7 +24,7 @@ from language.load import automaton_of, program_of
 from language.model import Automaton
 from language.number import NumberType
 from language.printing import digest
-from language.program import Program, short
+from language.program import Program
 from language.project import Project
 from language.system import in_numbers
 from lockstep.compare import MOST_COUNTED, Tape
@@ -163,7 +163,7 @@ def mcdc(
     if runs and not automaton.is_sampled:
         raise ValueError(f"{automaton.name} is continuous: sequences are those of sampled automata")
     if runs:
-        sequences += records_of(program, _ranges(automaton), runs)
+        sequences += records_of(program, _ranges(automaton), runs, TICKS, SEED)
     if not sequences:
         hint = ": give it `--runs`" if automaton.is_sampled else ""
         raise ValueError(f"no test of the project runs {automaton.name} as it is{hint}")
@@ -178,14 +178,13 @@ def mcdc(
 def _held(automaton: Automaton, program: Program) -> dict[str, tuple[float, float]]:
     """Return the ranges [SI] in which a sampled automaton holds its reals, by variable."""
     things: dict[str, Input | State] = {**automaton.inputs, **automaton.carried}
-    ends = {name: one.range for name, one in things.items() if one.range}
-    return {
-        variable.name: (float(ends[short(variable.name)][0]), float(ends[short(variable.name)][1]))
-        for variable in program.variables
-        if variable.type == "real"
-        and variable.name.startswith(HELD)
-        and short(variable.name) in ends
-    }
+    reals = {v.name for v in program.variables if v.type == "real"}
+    found = {}
+    for name, one in things.items():
+        for group in HELD:
+            if one.range and group + name in reals:
+                found[group + name] = (float(one.range[0]), float(one.range[1]))
+    return found
 
 
 def _tested(program: Program, root: Path | None, numbers: NumberType | None) -> Iterator[Tape]:

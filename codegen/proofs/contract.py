@@ -3,7 +3,8 @@
 `jump_<mode>` of a sampled automaton: nothing fires and the mode stays, or one of its transitions
 fires and the mode is that transition's target; one that waits fires in the tick in which its
 counter is full, and a full counter fires or starts anew; no counter passes its end; nothing else
-is written than what its actions set; no access, shift or sum is undefined.
+is written than what its actions set; no access, shift or sum is undefined. Taken for granted:
+functions of ha_math write nothing. Ranges are two comparisons here, as in `values.py`.
 """
 
 from __future__ import annotations
@@ -50,7 +51,8 @@ def contract(program: Program, folder: Path) -> Proof:
     files = c_files(program, by_amount=False)
     tool = f"Frama-C {version_of('frama-c', folder)} WP"
     if program.period is None or program.regions or not modes:
-        return Proof("contract", tool, "not asked: one region of a sampled automaton has contracts")
+        about = "one region of a sampled automaton has contracts"
+        return Proof("contract", tool, about, is_asked=False)
     text, file = files[f"{program.name}.c"], f"{program.name}.c"
     for mode in modes:
         text = _Mode(program, made, mode).annotated(text)

@@ -1,9 +1,9 @@
 """Infeasible: conditions of the C of a sampled Program that no input makes true, or false: proofs.
 
 One step is followed from any values that an invariant allows, with any inputs and any page
-(`symbolic.py`). The invariant is what is left of a proposal once all is out that does not hold at
-the start or does not stay (Houdini, Flanagan and Leino 2001): ranges of variables, ends of
-counters, numbers of modes.
+(`symbolic.py`, `terms.py`). The invariant is what is left of a proposal once all is out that does
+not hold at the start or does not stay (Houdini, Flanagan and Leino 2001): ranges of variables, ends
+of counters, numbers of modes.
 """
 
 from __future__ import annotations
@@ -11,12 +11,13 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 
-from codegen.expression import c_expression
+from codegen.expression import LOGIC, c_expression
 from codegen.names import SOLVED_ON_PAGE, CNames
-from codegen.proofs.symbolic import Fact, Range, World
+from codegen.proofs.symbolic import Fact, World
+from codegen.proofs.terms import Range
 from codegen.statement import opposite
 from codegen.usage import locals_of
-from language.operation import Binary, Branch, Count, Expr, Op, Select, Unary
+from language.operation import Assign, Binary, Branch, Count, Expr, Op, Select, Unary
 from language.program import Program
 from language.substitution import own_expressions, subexpressions
 from language.traversal import walk
@@ -37,7 +38,7 @@ def places_of(program: Program) -> Iterator[Place]:
     for name, block in program.blocks.items():
         place = CNames(program, local[name], SOLVED_ON_PAGE)
         for op in walk(block):
-            tests = [(part.condition, part.condition) for part in _choices(op)]
+            tests = [(test, test) for test in _inside(op)]
             if isinstance(op, Branch):
                 tests.append((op.condition, op.condition))
             if isinstance(op, Count):
@@ -67,9 +68,12 @@ def never(
     return found
 
 
-def _choices(op: Op) -> Iterator[Select]:
+def _inside(op: Op) -> Iterator[Expr]:
+    """Yield the decisions inside an operation: of choices, and of what is assigned as a truth."""
     for expr in own_expressions(op):
-        yield from (part for part in subexpressions(expr) if isinstance(part, Select))
+        yield from (part.condition for part in subexpressions(expr) if isinstance(part, Select))
+    if isinstance(op, Assign) and isinstance(op.value, Binary) and op.value.operator in LOGIC:
+        yield op.value
 
 
 def _conditions(expr: Expr) -> Iterator[Expr]:

@@ -12,13 +12,14 @@ from codegen.tool import told
 class Proof:
     """What a `tool` says of the C of a Program: `findings`, none where the proof holds.
 
-    `about` tells what was looked at, and how much of it.
+    `about` tells what was looked at, and how much of it. One that is not asked says nothing.
     """
 
     check: str
     tool: str
     about: str
     findings: tuple[str, ...] = ()
+    is_asked: bool = True
 
     @property
     def holds(self) -> bool:

@@ -30,7 +30,7 @@ def fuzz(
     modewright fuzz estimator
     modewright fuzz supervisor --runs 200000 --json
     """
-    from modewright import code, show
+    from modewright import code, show, show_code
 
     with working(f"trying {runs} sequences on {automaton}"):
         try:
@@ -40,8 +40,8 @@ def fuzz(
         except ValueError as error:
             raise typer.BadParameter(str(error), param_hint="AUTOMATON") from None
     if as_json:
-        show.print_json(show.fuzzed_json(found))
+        show.print_json(show_code.fuzzed_json(found))
     else:
-        show.print_fuzzed(console(), found)
+        show_code.print_fuzzed(console(), found)
     if not found.is_clean:
         raise typer.Exit(PROBLEMS)

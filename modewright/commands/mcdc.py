@@ -30,7 +30,7 @@ def mcdc(
     modewright mcdc estimator_simple --runs 4000
     modewright mcdc estimator --no-proofs --json
     """
-    from modewright import code, show
+    from modewright import code, show, show_code
 
     with working(f"running the C of {automaton} on the tests"):
         try:
@@ -46,6 +46,6 @@ def mcdc(
         except ValueError as error:
             raise typer.BadParameter(str(error), param_hint="AUTOMATON") from None
     if as_json:
-        show.print_json(show.mcdc_json(found))
+        show.print_json(show_code.mcdc_json(found))
     else:
-        show.print_mcdc(console(), found)
+        show_code.print_mcdc(console(), found)

@@ -31,7 +31,7 @@ def prove(
     modewright prove supervisor --only misra,stack --json
     """
     from codegen.proofs.all import CHECKS
-    from modewright import code, show
+    from modewright import code, show, show_code
 
     checks = tuple(only.split(",")) if only else CHECKS
     unknown = sorted(set(checks) - set(CHECKS))
@@ -44,8 +44,10 @@ def prove(
         )
         found = list(made)
     if as_json:
-        show.print_json({"automaton": automaton, "proofs": [show.proof_json(p) for p in found]})
+        show.print_json(
+            {"automaton": automaton, "proofs": [show_code.proof_json(p) for p in found]}
+        )
     else:
-        show.print_proofs(console(), found)
+        show_code.print_proofs(console(), found)
     if not all(proof.holds for proof in found):
         raise typer.Exit(PROBLEMS)

@@ -107,12 +107,12 @@ def test_an_automaton_without_guards_has_no_general_path() -> None:
 
 
 def test_what_a_page_may_have_turned_is_computed_again() -> None:
-    """`drag` reads a tunable parameter, `gap` and `pull` do not."""
+    """`drag` reads a tunable parameter."""
     block = leaping(stepped(cart())).blocks["leap_free"]
     before = block[:-1]
     assert isinstance(block[-1], Branch)
     read = {name for name in reads([before]) if name.startswith("equation.")}
-    assert "equation.drag" not in read and not read & {"equation.gap"}
+    assert "equation.drag" not in read
     text = c_files(cart())["cart.c"]
     leap = text[text.index("void leap_free(") :].partition("\n}\n")[0]
     assert "cal->d * self->state.v" in leap

@@ -36,7 +36,7 @@ def proved(name: str, check: str) -> Figure:
         "tools": [proof.tool for proof in found],
         "of": [proof.about for proof in found],
         "findings": [finding for proof in found for finding in proof.findings],
-        "met": all(proof.holds for proof in found),
+        "met": all(proof.holds and proof.is_asked for proof in found),
     }
 
 
