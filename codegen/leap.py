@@ -13,7 +13,7 @@ import dataclasses
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 
-from codegen.way import LEFT, NotPlain, Way
+from codegen.way import LEFT, PLACE, NotPlain, Way
 from language.operation import Assign, Block, Branch, Choose, Expr, Loop, Op, Ref, Run, Unary, Value
 from language.program import MODE, ModeInfo, Program, Variable
 from language.run import MODE as RUN_MODE
@@ -24,6 +24,7 @@ from language.wiring import finished
 ENTRIES = ("init", "derive", "step")
 LEAP, DONE, RECORD, STARTED = "leap", "memory.is_done", "record", "memory.started"
 THROUGH = "through_events"
+END = "work.end_"
 UNDONE = (Assign(DONE, Value(False)),)
 
 
@@ -139,9 +140,9 @@ def _with_leaps(
     made: dict[str, Variable] = {}
     used = reads(blocks.values())
     for way in ways.values():
-        names = ((old, name) for old, name in _names(way) if name in used)
-        made |= {name: dataclasses.replace(way.made[old], name=name) for old, name in names}
-    made[DONE] = Variable(DONE, "truth", about="nothing happened in this step")
+        names = ((old, name) for old, name in _names(way).items() if name in used)
+        made |= {n: dataclasses.replace(way.made[old].variable, name=n) for old, n in names}
+    made[DONE] = Variable(DONE, "truth", about="the whole step is taken: nothing happened in it")
     variables = (
         *(v for v in program.variables if v.name not in made),
         *made.values(),
@@ -158,16 +159,31 @@ def _block(way: Way, tells: bool) -> Block:
     return (*way.first, *last) if way.is_sure else (*way.first, Branch(way.quiet, last))
 
 
-def _names(way: Way) -> Iterator[tuple[str, str]]:
-    """Yield the name of each value and what it is called: numbered if there are several."""
-    counts = Counter(variable.name for variable in way.made.values())
-    for name, variable in way.made.items():
-        yield name, name if counts[variable.name] > 1 else f"{variable.name}_now"
+def _names(way: Way) -> dict[str, str]:
+    """Return what each value is called: as its variable is, with the point of the step."""
+    names = {}
+    for name, made in way.made.items():
+        variable, point = made.variable.name, made.point
+        if variable.startswith(END):
+            variable, point = variable.replace(END, PLACE), way.points
+        names[name] = f"{variable}_{_title(point, way.points)}"
+    count = Counter(names.values())
+    return {
+        n: f"{title}{n[n.rindex('_') :]}" if count[title] > 1 else title
+        for n, title in names.items()
+    }
+
+
+def _title(point: int, points: int) -> str:
+    """Return what a point of a step is called: start, middle, end, or by its number."""
+    if point in (1, points):
+        return "start" if point == 1 else "end"
+    return "middle" if points == 3 else str(point)
 
 
 def _named(block: Block, way: Way) -> Block:
     """Return a block whose values are called by their names."""
-    names = dict(_names(way))
+    names = _names(way)
 
     def called(expr: Expr) -> Expr:
         if isinstance(expr, Ref):

@@ -30,7 +30,7 @@ from language.program import Program
 COMPILER, MERGER, EXPORTER = "clang-19", "llvm-profdata-19", "llvm-cov-19"
 COVERED = ("-fprofile-instr-generate", "-fcoverage-mapping", "-fcoverage-mcdc")
 APP, POOL, MERGED = "app", "counts_%1m.profraw", "counts.profdata"
-FUNCTION = re.compile(r"(?:static (?:inline|RARELY) )?void (\w+)\(")
+FUNCTION = re.compile(r"(?:static (?:inline|RARELY|APART) )?void (\w+)\(")
 Key = tuple[str, str]
 """The block and the text of a decision."""
 CASE = re.compile(r"case\b|default\b")

@@ -13,8 +13,17 @@ from language.number import NumberType, decimal
 from language.program import Constant, Program, Variable
 from language.units import shown_unit
 
-GROUPS = ("state", "discrete", "latched", "equation", "before", "innovation", "timer", "check")
-"""Nested structs of the instance, in order."""
+GROUPS = {
+    "state": "states",
+    "discrete": "discrete variables",
+    "latched": "inputs of this tick",
+    "equation": "equations",
+    "before": "inputs of the tick before",
+    "innovation": "measurements less what was predicted",
+    "timer": "ticks that a guard was true",
+    "check": "invariants that hold",
+}
+"""Nested structs of the instance, in order, with what is in them."""
 
 
 @dataclass(frozen=True)
@@ -97,13 +106,13 @@ def _constant(constant: Constant, number: NumberType) -> Field:
     return Field(kind, c_member(constant.name), safe(comment), value, len(constant.items))
 
 
-def _groups(program: Program) -> list[tuple[str, list[Field]]]:
+def _groups(program: Program) -> list[tuple[str, str, list[Field]]]:
     found = []
-    for group in GROUPS:
+    for group, about in GROUPS.items():
         inside = [v for v in program.variables if v.name.startswith(f"{group}.")]
         fields = [field_of(v, program.number) for v in inside]
         if fields:
-            found.append((group, fields))
+            found.append((group, about, fields))
     return found
 
 

@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
 from language.model import CHART
 from language.number import NumberType
-from language.program import MODE, TICKS, Constant, Program, Variable, mode_variable, short
+from language.program import (
+    MODE,
+    TICKS,
+    Constant,
+    Program,
+    TransitionInfo,
+    Variable,
+    mode_variable,
+    short,
+)
 
 REAL: Mapping[NumberType, str] = {"float64": "double", "float32": "float"}
 MODES = ("memory.mode", "memory.run_mode")
@@ -70,6 +80,8 @@ class CNames:
         for region in self.program.regions:
             if name == mode_variable(MODE, region.name):
                 return mode_constant(self.program, number, region.name)
+        if name.startswith(CHOSEN) and number in self._transitions:
+            return self._transitions[number]
         values = self._values(name)
         if values and 0 <= number < len(values):
             return value_constant(self.program, values, number)
@@ -85,13 +97,23 @@ class CNames:
         ticks = (c.name for c in self.program.constants if c.unit == TICKS)
         return frozenset((*(n for n, kind in kinds.items() if kind.startswith("uint")), *ticks))
 
+    @cached_property
+    def _transitions(self) -> Mapping[int, str]:
+        return transition_constants(self.program)
+
     def _values(self, name: str) -> tuple[str, ...]:
         return next((values for known, values in _lists(self.program) if known == name), ())
 
 
 def c_member(name: str) -> str:
-    """Return the name of a struct member or local: the name without its group."""
-    return short(name).replace(".", "_")
+    """Return the name of a struct member or local: the name without its group.
+
+    >>> c_member("solved.drive_L.w_em.y_w")
+    'drive_L_w_em__y_w'
+    """
+    matrix, *entry = short(name).split(".")
+    apart = "__" if name.startswith("solved.") else "_"
+    return "_".join((matrix, apart.join(entry))) if entry else matrix
 
 
 def c_type(variable: Variable | Constant, number: NumberType) -> str:
@@ -115,6 +137,24 @@ def mode_constant(program: Program, number: int, region: str = CHART) -> str:
     """Return the name of a mode in C."""
     where = "MODE" if region == CHART else region
     return f"{program.name}_{where}_{program.mode_name(number, region)}".replace(".", "_")
+
+
+def transition_constants(program: Program) -> dict[int, str]:
+    """Return the names of transitions in C by their numbers: source and name, with the number where
+    several are called like that.
+    """
+    names = {info.number: _called(program, info) for info in program.transitions}
+    count = Counter(names.values())
+    return {n: f"{name}_{n}" if count[name] > 1 else name for n, name in names.items()}
+
+
+def _called(program: Program, info: TransitionInfo) -> str:
+    source = program.mode_name(info.source, info.region)
+    if info.between:
+        source = info.between[0]
+    elif info.region != CHART:
+        source = f"{info.region}_{source}"
+    return f"{program.name}_FIRED_{source}_{info.name}".replace(".", "_")
 
 
 def run_mode_constant(program: Program, number: int) -> str:

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from codegen.expression import SUFFIX, literal
+from codegen.frame import apart
 from codegen.gate import APART, gated
 from codegen.leap import THROUGH, leaping
 from codegen.mathematics import math_files
@@ -21,8 +22,10 @@ from codegen.names import (
     enumerations,
     mode_constant,
     run_mode_constant,
+    transition_constants,
     value_constant,
 )
+from codegen.purpose import purpose
 from codegen.rendering import render, version
 from codegen.scratch import STEP, Scratch, scratch_of, with_own
 from codegen.statement import INDENT, WIDTH, Writer
@@ -91,8 +94,13 @@ def module_context(program: Program, page: Page = CONSTANTS) -> dict[str, Any]:
     scratch = scratch_of(program, shared, used, page.holds_solved)
     if scratch and scratch.block != STEP:
         used = with_own(program, used, scratch)
+    own = apart(program)
     blocks = [
-        _block(program, name, local[name], turned[name], used, kinds, page, scratch)
+        {
+            **_block(program, name, local[name], turned[name], used, kinds, page, scratch),
+            "purpose": purpose(name),
+            "keyword": "RARELY" if name.startswith(RARE) else "APART" if name in own else "inline",
+        }
         for name in _callees_first(program)
     ]
     return {
@@ -103,7 +111,7 @@ def module_context(program: Program, page: Page = CONSTANTS) -> dict[str, Any]:
         "work_type": _work_type(program, page, scratch),
         "blocks": [block for block in blocks if block["name"] not in ENTRIES],
         "entries": {block["name"]: block for block in blocks if block["name"] in ENTRIES},
-        "has_rare": any(block["is_rare"] for block in blocks),
+        "keywords": {block["keyword"] for block in blocks},
         "has_stamps": "compare_stamps" in program.blocks,
         "uses_math": bool(called & {*FUNCTIONS_OF[number], *INLINE}),
         "uses_libm": bool(called & {"abs", "sqrt", "floor"}),
@@ -126,6 +134,7 @@ def _names(program: Program) -> dict[str, Any]:
             )
             for info in program.regions
         ],
+        "numbered": [(c, number) for number, c in transition_constants(program).items()],
         "run_modes": [(run_mode_constant(program, m.number), m.number) for m in program.run_modes],
         "enumerations": [
             (name, [(value_constant(program, values, n), n) for n in range(len(values))])
@@ -209,7 +218,6 @@ def _block(
     return {
         "name": name,
         "parameters": _listed(f"static inline void {name}(", parameters),
-        "is_rare": name.startswith(RARE),
         "needs": usage.needs,
         "lines": [
             *(declared and [*declared, ""]),

@@ -115,16 +115,19 @@ class Writer:
             yield from self.lines(block)
             yield f"{INDENT}break;"
         yield "default:"
+        yield f"{INDENT}/* there is no other */"
         yield f"{INDENT}break;"
         yield "}"
 
     def _loop(self, count: int, index: str, body: Block) -> Iterator[str]:
         name = short(index)
-        bound = f"{name} < {count}"
-        condition, inner = _while(index, body)
+        yield f"for (int32_t {name} = 0; {name} < {count}; {name}++) {{"
+        condition, inner = going_on(index, body)
         if condition is not None:
-            bound = f"({bound}) && ({c_expression(condition, self.place)})"
-        yield f"for (int32_t {name} = 0; {bound}; {name}++) {{"
+            test = c_expression(opposite(condition), self.place)
+            yield from (INDENT + line for line in tested("if", test, "", self.room - len(INDENT)))
+            yield f"{2 * INDENT}break;"
+            yield f"{INDENT}}}"
         yield from self.lines(inner)
         yield "}"
 
@@ -137,7 +140,7 @@ class Writer:
         yield "}"
 
 
-def _while(index: str, body: Block) -> tuple[Expr | None, Block]:
+def going_on(index: str, body: Block) -> tuple[Expr | None, Block]:
     """Return the condition under which a body does anything, where it has one, and what it does.
 
     Once that is false it stays so, for nothing else is done: the loop may end.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Hashable
+from dataclasses import dataclass
 
 from codegen.statement import opposite
 from language.evaluate import evaluate
@@ -32,6 +33,18 @@ from language.traversal import block_reads, block_writes, expr_names
 WORK, LEFT, CROSSED = "work.", "work.left", "work.crossed"
 
 
+LOOKS, PLACE = ("rates_", "guards_"), "work.at_"
+"""Blocks that look at a point of the step, and how the states there are called."""
+
+
+@dataclass(frozen=True)
+class Made:
+    """One value of a `variable` of the Program, at a point of the step."""
+
+    variable: Variable
+    point: int
+
+
 class NotPlain(Exception):
     """What happens hangs on more than the guards of the mode."""
 
@@ -40,13 +53,15 @@ class Way:
     """A way without a crossing: `known` are the values of variables, `ops` what is done on it.
 
     What comes before the guards is in `first`; `quiet` is whether none of these changed. In `made`
-    are the variables of its own: each is one value of a variable of the Program.
+    are the variables of its own: each is one value of a variable of the Program, at a `point` of
+    the step; rates and guards are looked at in each of these, from 1 to `points`.
     """
 
     def __init__(self, program: Program, known: dict[str, Expr]) -> None:
         self.program = program
         self.known = known
-        self.made: dict[str, Variable] = {}
+        self.made: dict[str, Made] = {}
+        self.points = 1
         self.quiet: Expr = Value(True)
         self.first: list[Op] = []
         self.ops = self.first
@@ -55,6 +70,7 @@ class Way:
         self._numbers: dict[Hashable, int] = {}
         self._number_of: dict[str, int | None] = {}
         self._named: dict[int, str] = {}
+        self._has_looked = False
 
     @property
     def is_sure(self) -> bool:
@@ -92,6 +108,7 @@ class Way:
                     self._loop(count, body)
                 case Run(name):
                     self.follow(self.program.blocks[name])
+                    self._has_looked = self._has_looked or name.startswith(LOOKS)
                 case _:
                     raise NotPlain
 
@@ -107,6 +124,9 @@ class Way:
             self.ops[begin:] = [Branch(event, (Run("settle"), Run("equations")), now)]
 
     def _assign(self, target: str, value: Expr, key: str) -> None:
+        if self._has_looked and target.startswith(PLACE):
+            self._has_looked = False
+            self.points += 1
         if target == CROSSED:
             self.quiet = Value(True) if value == Value(False) else opposite(value)
             value = Value(False)
@@ -117,7 +137,7 @@ class Way:
         self._versions[target] += 1
         if target.startswith(WORK) and not isinstance(value, Value | Ref):
             name = f"{target}_{self._versions[target]}"
-            self.made[name] = self._of[target]
+            self.made[name] = Made(self._of[target], self.points)
             self.ops.append(Assign(name, value, key))
             self._name(name, number)
             value = Ref(name)

@@ -27,4 +27,4 @@ def exact(field: Field, solved: Solved, span: Span, problems: Problems) -> Metho
 
 
 def _step(field: Field, mode: str, solved: Solved) -> Block:
-    return (*opening(field, mode, solved), *closing(field, mode, solved))
+    return (*opening(field, mode), *closing(field, mode, solved))

@@ -6,8 +6,9 @@ Inside a step the solution of x' = A x + pull is a Taylor sum of a fixed number 
 
 from __future__ import annotations
 
+import dataclasses
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -19,10 +20,9 @@ from language.matrix import (
     Matrix,
     exponential as matrix_exponential,
     exponential_integral,
-    sum_of_sizes,
 )
 from language.motion import Method
-from language.number import DIGITS, NumberType
+from language.number import NumberType
 from language.operation import (
     Assign,
     Block,
@@ -45,6 +45,7 @@ from language.operation import (
 )
 from language.problem import Problems, Span
 from language.program import Constant, Variable
+from language.taylor import in_ranges, largest, row_sum_norm, taylor_terms
 
 LARGEST_NORM = 4.0
 """|A h| up to which the Taylor sum is accurate and short (docs/language.md, section 9)."""
@@ -87,7 +88,13 @@ class Solved:
 
 def exponential(field: Field, solved: Solved, span: Span, problems: Problems) -> Method:
     """Return the method for a field."""
-    return linear_motion(field, solved, _step, span, problems)
+    made = linear_motion(field, solved, _step, span, problems)
+    halves = {
+        f"half_{name}": _moved(field, name, ("at", "Eh", "Fh"), solved)
+        for name in field.automaton.modes
+        if f"step_{name}" in made.blocks
+    }
+    return dataclasses.replace(made, blocks={**made.blocks, **halves})
 
 
 def linear_motion(
@@ -113,6 +120,8 @@ def linear_motion(
             continue
         constants += _constants(field, name, solved)
         made[f"step_{name}"] = step(field, name, solved)
+        made[f"pull_{name}"] = _pull(field, name, solved)
+        made[f"whole_{name}"] = _moved(field, name, ("end", "E", "F"), solved)
     bounded = [step for name, norm in norms.items() if norm <= LARGEST_NORM for step in steps[name]]
     terms = max((taylor_terms(step, solved.number) for step in bounded), default=1)
     for name in field.automaton.modes:
@@ -123,52 +132,6 @@ def linear_motion(
     ]
     number = Variable("work.order", "real", about="order of a term")
     return Method(made, terms, tuple(constants), (*variables, number), norms)
-
-
-def in_ranges(field: Field, a: Matrix, h: float) -> Matrix:
-    """Return A h (n, n), each state in units of its range's width."""
-    widths = []
-    for state in field.automaton.states.values():
-        assert state.range is not None
-        widths.append(float(state.range[1] - state.range[0]))
-    return tuple(
-        tuple(entry * other / width * h for entry, other in zip(row, widths, strict=True))
-        for row, width in zip(a, widths, strict=True)
-    )
-
-
-def row_sum_norm(a: Matrix) -> float:
-    """Return the largest sum of sizes of a row."""
-    return largest(sum_of_sizes(row) for row in a)
-
-
-def largest(values: Iterable[float]) -> float:
-    """Return the largest of sizes; NaN if one is."""
-    found = 0.0
-    for value in values:
-        found = value if not value <= found else found
-    return found
-
-
-def taylor_terms(step: Matrix, number: NumberType = "float64") -> int:
-    """Return the number of terms of a Taylor sum after which none counts, for z = A h (n, n).
-
-    The sum is that of z^k (d0 h) / (k + 1)!, and d0 h is at most |z|. From K on
-    | |z|^K 1 | |z| / (K + 1)! <= 2^-53, 2^-24 in float32: powers of sizes see what the norm does
-    not, that what turns into another quantity is gone, such as speed into angle.
-    """
-    norm, tiny = row_sum_norm(step), 2.0 ** -DIGITS[number]
-    reach = [1.0 for _ in step]
-    terms, bound, order = 1, norm, 1
-    while bound > tiny:
-        if largest(reach) * norm > tiny:
-            terms = order
-        order += 1
-        bound = bound * norm / order
-        reach = [
-            sum_of_sizes(x * y for x, y in zip(row, reach, strict=True)) / order for row in step
-        ]
-    return terms
 
 
 def _table(field: Field, mode: str, solved: Solved) -> dict[str, Matrix]:
@@ -216,11 +179,11 @@ def _pulls(field: Field, mode: str, solved: Solved) -> dict[str, Expr]:
     return {name: Ref(f"work.pull_{name}") for name in field.states if name in pulled}
 
 
-def _pull(field: Field, mode: str, solved: Solved) -> list[Op]:
+def _pull(field: Field, mode: str, solved: Solved) -> Block:
     """pull = rate - A x at the point: what is not linear."""
     a, pulled = solved.matrix(field, mode), solved.pulled(field, mode)
     at: dict[str, Expr] = {name: Ref(f"work.at_{name}") for name in field.states}
-    ops: list[Op] = []
+    ops: list[Op] = [Run(f"rates_{mode}")]
     for i, name in enumerate(field.states):
         if name not in pulled:
             continue
@@ -228,14 +191,12 @@ def _pull(field: Field, mode: str, solved: Solved) -> list[Op]:
         rate = Ref(f"work.rate_{name}")
         value: Expr = subtract(rate, total(linear)) if linear else rate
         ops.append(Assign(f"work.pull_{name}", value))
-    return ops
+    return tuple(ops)
 
 
-def opening(field: Field, mode: str, solved: Solved) -> Block:
+def opening(field: Field, mode: str) -> Block:
     """Return the operations that find what is not linear, at the start of the step."""
-    pull = _pull(field, mode, solved)
-    start = (*at_state(field), *at_time(field, real(0.0)))
-    return (*start, Run(f"rates_{mode}"), *pull)
+    return (*at_state(field), *at_time(field, real(0.0)), Run(f"pull_{mode}"))
 
 
 def closing(field: Field, mode: str, solved: Solved) -> Block:
@@ -243,8 +204,7 @@ def closing(field: Field, mode: str, solved: Solved) -> Block:
     end = Assign("work.s", Ref("work.h"))
     arrive = [Assign(f"work.end_{name}", Ref(f"work.at_{name}")) for name in field.states]
     rest: Block = (Run(f"series_{mode}"), end, Run("point"), *arrive)
-    moved = _moved(field, mode, ("end", "E", "F"), solved)
-    return (Branch(_is_whole(solved), moved, rest),)
+    return (Branch(_is_whole(solved), (Run(f"whole_{mode}"),), rest),)
 
 
 def _is_whole(solved: Solved) -> Expr:
@@ -268,13 +228,12 @@ def _moved(field: Field, mode: str, letters: tuple[str, str, str], solved: Solve
 def _step(field: Field, mode: str, solved: Solved) -> Block:
     half = multiply(real(0.5), Ref("work.h"))
     middle = Assign("work.s", half)
-    moved = _moved(field, mode, ("at", "Eh", "Fh"), solved)
+    part: Block = (Run(f"series_{mode}"), middle, Run("point"))
     return (
-        *opening(field, mode, solved),
-        Branch(_is_whole(solved), moved, (Run(f"series_{mode}"), middle, Run("point"))),
+        *opening(field, mode),
+        Branch(_is_whole(solved), (Run(f"half_{mode}"),), part),
         *at_time(field, half),
-        Run(f"rates_{mode}"),
-        *_pull(field, mode, solved),
+        Run(f"pull_{mode}"),
         *closing(field, mode, solved),
     )
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from language.constants import constant_value
 from language.declaration import Formula
@@ -44,7 +44,8 @@ from language.riccati import discrete_noise, steady_gain
 class Kalman:
     """The operations and numbers of one mode's observer.
 
-    `start` sets its covariance at the first tick, `enter` when its mode is entered.
+    `start` sets its covariance at the first tick, `enter` when its mode is entered; `spreads` are
+    blocks that `predict` runs: its covariance over the period.
     """
 
     predict: Block
@@ -53,6 +54,7 @@ class Kalman:
     info: ObserverInfo
     start: Block = ()
     enter: Block = ()
+    spreads: Mapping[str, Block] = field(default_factory=dict)
 
 
 def kalman(

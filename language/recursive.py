@@ -110,18 +110,19 @@ class _Recursive:
         start, enter, more = self._steady(observer, own, c, r)
         constants += more
         if observer.runs:
-            predict, extra = self._by_run(given)
+            predict, extra, spreads = self._by_run(given)
             constants += extra
         else:
             mean, extra = self._mean(observer, own)
-            predict = (*self._spread(observer, own), *mean)
+            spreads = {f"spread_{self.mode.name}": self._spread(observer, own)}
+            predict = (*map(Run, spreads), *mean)
             constants += extra
         info = ObserverInfo(
             self.mode.name, self.states, observer.inputs, measured, own.a, (), c,
             (), r, self.period, {}, "recursive",
         )  # fmt: skip
         correct = self._correct(observer, c)
-        return Kalman(predict, correct, tuple(constants), info, start, enter)
+        return Kalman(predict, correct, tuple(constants), info, start, enter, spreads)
 
     def _same_states(self) -> None:
         """The covariance belongs to the automaton, as its states do."""
@@ -211,12 +212,13 @@ class _Recursive:
         )
         return mean, solved.constants(numbers, self.depends_on)
 
-    def _by_run(self, given: Observer) -> tuple[Block, tuple[Constant, ...]]:
+    def _by_run(self, given: Observer) -> tuple[Block, tuple[Constant, ...], Mapping[str, Block]]:
         """The covariance by the mode in which the run begins the period; the states by the run."""
         run, model = self.mode.run, self.automaton.model
         assert run and model
         modes = model.modes.values() if run.follow else [model.modes[run.mode]]
         cases: list[tuple[int, Block]] = []
+        spreads: dict[str, Block] = {}
         constants: tuple[Constant, ...] = ()
         for mode in modes:
             there = dataclasses.replace(given, of=mode.name)
@@ -227,11 +229,12 @@ class _Recursive:
                 solved = SolvedNames(tag, observer)
                 depends_on = tunables_of(self.automaton, solved_formulas(observer))
                 constants += solved.constants(ahead.numbers, depends_on)
-                cases.append((mode.number, self._spread(observer, ahead)))
+                spreads[f"spread_{tag}"] = self._spread(observer, ahead)
+                cases.append((mode.number, (Run(f"spread_{tag}"),)))
         chosen: Block = (Choose("memory.run_mode", tuple(cases)),)
         if not run.follow:
             chosen = cases[0][1] if cases else ()
-        return (*chosen, Run(f"run_{self.mode.name}")), constants
+        return (*chosen, Run(f"run_{self.mode.name}")), constants, spreads
 
     def _spread(self, observer: Observer, ahead: Ahead) -> Block:
         """The densities of now, then the covariance over the period."""

@@ -222,6 +222,7 @@ class _Sampled:
                 return {}
             self.observers[mode.name] = made
             self.constants += made.constants
+            found.update(made.spreads)
             found[f"predict_{mode.name}"] = made.predict
             found[f"correct_{mode.name}"] = made.correct
             if made.enter:

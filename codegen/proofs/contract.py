@@ -103,7 +103,9 @@ class _Mode:
 
     def annotated(self, text: str) -> str:
         """Return C with the contract before its function."""
-        head = re.compile(rf"^static (?:inline|RARELY) void jump_{self.mode.name}\(([^)]*)\)", re.M)
+        head = re.compile(
+            rf"^static (?:inline|RARELY|APART) void jump_{self.mode.name}\(([^)]*)\)", re.M
+        )
         found = head.search(text)
         assert found, self.mode.name
         pointers = re.findall(r"(const [^,*]*)?\*(\w+)", found[1])

@@ -15,9 +15,19 @@ from codegen.expression import LOGIC, c_expression
 from codegen.names import SOLVED_ON_PAGE, CNames
 from codegen.proofs.symbolic import Fact, World
 from codegen.proofs.terms import Range
-from codegen.statement import opposite
+from codegen.statement import going_on, opposite
 from codegen.usage import locals_of
-from language.operation import Assign, Binary, Branch, Count, Expr, Op, Select, Unary
+from language.operation import (
+    Assign,
+    Binary,
+    Branch,
+    Count,
+    Expr,
+    Loop,
+    Op,
+    Select,
+    Unary,
+)
 from language.program import Program
 from language.substitution import own_expressions, subexpressions
 from language.traversal import walk
@@ -39,6 +49,8 @@ def places_of(program: Program) -> Iterator[Place]:
         place = CNames(program, local[name], SOLVED_ON_PAGE)
         for op in walk(block):
             tests = [(test, test) for test in _inside(op)]
+            if isinstance(op, Loop) and (condition := going_on(op.index, op.body)[0]) is not None:
+                tests.append((opposite(condition), condition))
             if isinstance(op, Branch):
                 tests.append((op.condition, op.condition))
             if isinstance(op, Count):

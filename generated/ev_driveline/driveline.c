@@ -48,7 +48,7 @@ static const struct {
     .k_hs_per_c_hs = 342.85714285714283, /* k_hs / c_hs */
 };
 
-/* Kept out of the way of what a step does nearly always */
+/* Cold path, not inlined */
 #if defined(__GNUC__)
 #define RARELY __attribute__((noinline))
 #else
@@ -61,6 +61,7 @@ driveline_CALIBRATION const volatile driveline_Cal driveline_default_cal = {
     .J_em = 0.05,
 };
 
+/* Rates of the states in mode drive_contact */
 static inline void rates_drive_contact(const driveline_Self *self, driveline_Work *work)
 {
     /* driveline equations.w_d */
@@ -87,6 +88,7 @@ static inline void rates_drive_contact(const driveline_Self *self, driveline_Wor
     work->rate_theta_b = at_w_b; /* driveline flow.theta_b */
 }
 
+/* Guards of mode drive_contact */
 static inline void guards_drive_contact(driveline_Work *work)
 {
     /* driveline equations.w_d */
@@ -97,6 +99,7 @@ static inline void guards_drive_contact(driveline_Work *work)
     work->guard_0 = at_w_free < 0.0; /* driveline modes.drive_contact.transitions.no_contact.when */
 }
 
+/* Rates of the states in mode no_contact */
 static inline void rates_no_contact(const driveline_Self *self, driveline_Work *work)
 {
     /* driveline equations.w_d */
@@ -126,6 +129,7 @@ static inline void rates_no_contact(const driveline_Self *self, driveline_Work *
     work->rate_theta_b = at_w_b; /* driveline flow.theta_b */
 }
 
+/* Guards of mode no_contact */
 static inline void guards_no_contact(driveline_Work *work)
 {
     /* driveline equations.w_d */
@@ -139,6 +143,7 @@ static inline void guards_no_contact(driveline_Work *work)
     work->guard_1 = (work->at_theta_b <= (-constant.alpha)) && (at_w_free < 0.0);
 }
 
+/* Rates of the states in mode coast_contact */
 static inline void rates_coast_contact(const driveline_Self *self, driveline_Work *work)
 {
     /* driveline equations.w_d */
@@ -165,6 +170,7 @@ static inline void rates_coast_contact(const driveline_Self *self, driveline_Wor
     work->rate_theta_b = at_w_b; /* driveline flow.theta_b */
 }
 
+/* Guards of mode coast_contact */
 static inline void guards_coast_contact(driveline_Work *work)
 {
     /* driveline equations.w_d */
@@ -175,6 +181,7 @@ static inline void guards_coast_contact(driveline_Work *work)
     work->guard_0 = at_w_free > 0.0; /* driveline modes.coast_contact.transitions.no_contact.when */
 }
 
+/* One step of the method in mode drive_contact: from the states to work->end_* */
 static inline void step_drive_contact(const driveline_Self *self, driveline_Work *work)
 {
     work->at_w_w = self->state.w_w;
@@ -226,6 +233,7 @@ static inline void step_drive_contact(const driveline_Self *self, driveline_Work
         + (2.0 * k3_theta_b) + k4_theta_b));
 }
 
+/* Coefficients of the polynomial through the step in mode drive_contact */
 static inline void series_drive_contact(const driveline_Self *self, driveline_Work *work)
 {
     work->at_w_w = work->end_w_w;
@@ -256,6 +264,7 @@ static inline void series_drive_contact(const driveline_Self *self, driveline_Wo
         (work->k1_theta_b + work->rate_theta_b - (2.0 * slope_theta_b)) / h_squared;
 }
 
+/* One step of the method in mode no_contact: from the states to work->end_* */
 static inline void step_no_contact(const driveline_Self *self, driveline_Work *work)
 {
     work->at_w_w = self->state.w_w;
@@ -307,6 +316,7 @@ static inline void step_no_contact(const driveline_Self *self, driveline_Work *w
         + (2.0 * k3_theta_b) + k4_theta_b));
 }
 
+/* Coefficients of the polynomial through the step in mode no_contact */
 static inline void series_no_contact(const driveline_Self *self, driveline_Work *work)
 {
     work->at_w_w = work->end_w_w;
@@ -337,6 +347,7 @@ static inline void series_no_contact(const driveline_Self *self, driveline_Work 
         (work->k1_theta_b + work->rate_theta_b - (2.0 * slope_theta_b)) / h_squared;
 }
 
+/* One step of the method in mode coast_contact: from the states to work->end_* */
 static inline void step_coast_contact(const driveline_Self *self, driveline_Work *work)
 {
     work->at_w_w = self->state.w_w;
@@ -388,6 +399,7 @@ static inline void step_coast_contact(const driveline_Self *self, driveline_Work
         + (2.0 * k3_theta_b) + k4_theta_b));
 }
 
+/* Coefficients of the polynomial through the step in mode coast_contact */
 static inline void series_coast_contact(const driveline_Self *self, driveline_Work *work)
 {
     work->at_w_w = work->end_w_w;
@@ -418,6 +430,7 @@ static inline void series_coast_contact(const driveline_Self *self, driveline_Wo
         (work->k1_theta_b + work->rate_theta_b - (2.0 * slope_theta_b)) / h_squared;
 }
 
+/* States at work->s after the start of the step: its polynomial */
 static inline void point(const driveline_Self *self, driveline_Work *work)
 {
     work->at_w_w = self->state.w_w + (work->s * ((((work->series_w_w[2] * work->s)
@@ -430,12 +443,14 @@ static inline void point(const driveline_Self *self, driveline_Work *work)
         + work->series_theta_b[1]) * work->s) + work->series_theta_b[0]));
 }
 
+/* Guards of mode drive_contact at work->s after the start of the step */
 static inline void look_drive_contact(const driveline_Self *self, driveline_Work *work)
 {
     point(self, work);
     guards_drive_contact(work);
 }
 
+/* Halves the bracket in which a guard of mode drive_contact changes; its upper end is kept */
 static inline void locate_drive_contact(const driveline_Self *self, driveline_Work *work)
 {
     double high;
@@ -466,6 +481,7 @@ static inline void locate_drive_contact(const driveline_Self *self, driveline_Wo
     work->elapsed = ha_min(high, work->h);
 }
 
+/* Flows in mode drive_contact over work->h, or to the first change of a guard */
 static inline void move_drive_contact(driveline_Self *self, driveline_Work *work)
 {
     step_drive_contact(self, work);
@@ -500,6 +516,7 @@ static inline void move_drive_contact(driveline_Self *self, driveline_Work *work
     self->state.theta_b = work->end_theta_b;
 }
 
+/* Guards of mode no_contact at work->s after the start of the step */
 static inline void look_no_contact(const driveline_Self *self, driveline_Work *work)
 {
     work->at_theta_b = self->state.theta_b + (work->s * ((((work->series_theta_b[2] * work->s)
@@ -518,6 +535,7 @@ static inline void look_no_contact(const driveline_Self *self, driveline_Work *w
     }
 }
 
+/* Halves the bracket in which a guard of mode no_contact changes; its upper end is kept */
 static inline void locate_no_contact(const driveline_Self *self, driveline_Work *work)
 {
     double high;
@@ -564,6 +582,7 @@ static inline void locate_no_contact(const driveline_Self *self, driveline_Work 
     work->elapsed = ha_min(high, work->h);
 }
 
+/* Flows in mode no_contact over work->h, or to the first change of a guard */
 static inline void move_no_contact(driveline_Self *self, driveline_Work *work)
 {
     step_no_contact(self, work);
@@ -598,12 +617,14 @@ static inline void move_no_contact(driveline_Self *self, driveline_Work *work)
     self->state.theta_b = work->end_theta_b;
 }
 
+/* Guards of mode coast_contact at work->s after the start of the step */
 static inline void look_coast_contact(const driveline_Self *self, driveline_Work *work)
 {
     point(self, work);
     guards_coast_contact(work);
 }
 
+/* Halves the bracket in which a guard of mode coast_contact changes; its upper end is kept */
 static inline void locate_coast_contact(const driveline_Self *self, driveline_Work *work)
 {
     double high;
@@ -634,6 +655,7 @@ static inline void locate_coast_contact(const driveline_Self *self, driveline_Wo
     work->elapsed = ha_min(high, work->h);
 }
 
+/* Flows in mode coast_contact over work->h, or to the first change of a guard */
 static inline void move_coast_contact(driveline_Self *self, driveline_Work *work)
 {
     step_coast_contact(self, work);
@@ -668,6 +690,7 @@ static inline void move_coast_contact(driveline_Self *self, driveline_Work *work
     self->state.theta_b = work->end_theta_b;
 }
 
+/* Takes the inputs of now, each within its range */
 static inline void latch(driveline_Self *self, const driveline_In *in)
 {
     const bool changed_slope = in->slope != self->before.slope;
@@ -680,6 +703,7 @@ static inline void latch(driveline_Self *self, const driveline_In *in)
     }
 }
 
+/* The next piece of the step: it ends where a wait does */
 static inline void limit(const driveline_Self *self, driveline_Work *work)
 {
     work->h = work->left;
@@ -687,6 +711,7 @@ static inline void limit(const driveline_Self *self, driveline_Work *work)
     work->is_wait = false;
 }
 
+/* Time passes: what is left of the step and of waits */
 static inline void elapse(driveline_Self *self, driveline_Work *work)
 {
     if (work->crossed && ((work->h - work->elapsed) <= work->merge)) {
@@ -700,20 +725,24 @@ static inline void elapse(driveline_Self *self, driveline_Work *work)
     self->time = self->time + work->elapsed;
 }
 
+/* Waits whose guard is false begin anew */
 static inline void load(void)
 {
     /* nothing to do */
 }
 
+/* Transitions of mode drive_contact: the first one that is due is taken */
 static inline void jump_drive_contact(driveline_Self *self, driveline_Work *work)
 {
     guards_drive_contact(work);
     if (work->guard_0) {
         self->mode = driveline_MODE_no_contact;
-        self->fired = 1U; /* driveline modes.drive_contact.transitions.no_contact */
+        /* driveline modes.drive_contact.transitions.no_contact */
+        self->fired = driveline_FIRED_drive_contact_no_contact;
     }
 }
 
+/* Transitions of mode no_contact: the first one that is due is taken */
 static inline void jump_no_contact(driveline_Self *self, driveline_Work *work)
 {
     guards_no_contact(work);
@@ -721,26 +750,31 @@ static inline void jump_no_contact(driveline_Self *self, driveline_Work *work)
         /* driveline modes.no_contact.transitions.drive_contact.reset.theta_b */
         self->state.theta_b = constant.alpha;
         self->mode = driveline_MODE_drive_contact;
-        self->fired = 2U; /* driveline modes.no_contact.transitions.drive_contact */
+        /* driveline modes.no_contact.transitions.drive_contact */
+        self->fired = driveline_FIRED_no_contact_drive_contact;
     } else if (work->guard_1) {
         /* driveline modes.no_contact.transitions.coast_contact.reset.theta_b */
         self->state.theta_b = -constant.alpha;
         self->mode = driveline_MODE_coast_contact;
-        self->fired = 3U; /* driveline modes.no_contact.transitions.coast_contact */
+        /* driveline modes.no_contact.transitions.coast_contact */
+        self->fired = driveline_FIRED_no_contact_coast_contact;
     } else {
         /* nothing to do */
     }
 }
 
+/* Transitions of mode coast_contact: the first one that is due is taken */
 static inline void jump_coast_contact(driveline_Self *self, driveline_Work *work)
 {
     guards_coast_contact(work);
     if (work->guard_0) {
         self->mode = driveline_MODE_no_contact;
-        self->fired = 4U; /* driveline modes.coast_contact.transitions.no_contact */
+        /* driveline modes.coast_contact.transitions.no_contact */
+        self->fired = driveline_FIRED_coast_contact_no_contact;
     }
 }
 
+/* Transitions: the first one that is due is taken */
 static inline void jump(driveline_Self *self, driveline_Work *work)
 {
     self->fired = 0U;
@@ -759,10 +793,12 @@ static inline void jump(driveline_Self *self, driveline_Work *work)
         jump_coast_contact(self, work);
         break;
     default:
+        /* there is no other */
         break;
     }
 }
 
+/* What each guard is now */
 static inline void watch(driveline_Self *self, driveline_Work *work)
 {
     work->at_w_w = self->state.w_w;
@@ -784,17 +820,22 @@ static inline void watch(driveline_Self *self, driveline_Work *work)
         self->armed_0 = work->guard_0;
         break;
     default:
+        /* there is no other */
         break;
     }
     load();
 }
 
+/* Transitions until none is enabled */
 static inline void settle(driveline_Self *self, driveline_Work *work)
 {
     bool is_settling;
 
     is_settling = true;
-    for (int32_t micro_step = 0; (micro_step < 4) && (is_settling); micro_step++) {
+    for (int32_t micro_step = 0; micro_step < 4; micro_step++) {
+        if (!is_settling) {
+            break;
+        }
         jump(self, work);
         is_settling = self->fired != 0U;
     }
@@ -805,6 +846,7 @@ static inline void settle(driveline_Self *self, driveline_Work *work)
     watch(self, work);
 }
 
+/* One piece of the step: flow, then what is due at its end */
 static inline void segment(driveline_Self *self, driveline_Work *work)
 {
     limit(self, work);
@@ -819,6 +861,7 @@ static inline void segment(driveline_Self *self, driveline_Work *work)
         move_coast_contact(self, work);
         break;
     default:
+        /* there is no other */
         break;
     }
     elapse(self, work);
@@ -827,6 +870,7 @@ static inline void segment(driveline_Self *self, driveline_Work *work)
     }
 }
 
+/* Equations of mode drive_contact */
 static inline void equations_drive_contact(driveline_Self *self)
 {
     /* driveline equations.w_d */
@@ -850,6 +894,7 @@ static inline void equations_drive_contact(driveline_Self *self)
         - self->equation.w_b));
 }
 
+/* Equations of mode no_contact */
 static inline void equations_no_contact(driveline_Self *self)
 {
     /* driveline equations.w_d */
@@ -873,6 +918,7 @@ static inline void equations_no_contact(driveline_Self *self)
         - self->equation.w_b));
 }
 
+/* Equations of mode coast_contact */
 static inline void equations_coast_contact(driveline_Self *self)
 {
     /* driveline equations.w_d */
@@ -896,6 +942,7 @@ static inline void equations_coast_contact(driveline_Self *self)
         - self->equation.w_b));
 }
 
+/* The first values, from the inputs of the first tick; nothing advances yet */
 static inline void start(driveline_Self *self)
 {
     self->state.w_w = 11.11111111111111 / constant.r_w; /* driveline states.w_w.initial */
@@ -907,6 +954,7 @@ static inline void start(driveline_Self *self)
     self->started = true;
 }
 
+/* Equations */
 static inline void equations(driveline_Self *self)
 {
     switch (self->mode) {
@@ -920,22 +968,24 @@ static inline void equations(driveline_Self *self)
         equations_coast_contact(self);
         break;
     default:
+        /* there is no other */
         break;
     }
 }
 
+/* The whole step in mode drive_contact, if nothing happens in it */
 static inline void leap_drive_contact(driveline_Self *self, const driveline_In *in)
 {
     /* driveline flow.w_w */
-    const double rate_w_w_1 = (self->equation.T_hs - self->equation.T_v - self->before.T_br
+    const double rate_w_w_start = (self->equation.T_hs - self->equation.T_v - self->before.T_br
         - (constant.b_w * self->state.w_w)) * constant.per_J_v;
     /* driveline flow.w_em */
-    const double rate_w_em_1 = (self->before.T_em - (self->equation.T_hs * constant.per_R)
+    const double rate_w_em_start = (self->before.T_em - (self->equation.T_hs * constant.per_R)
         - (constant.b_em * self->state.w_em)) * self->derived.per_J_em;
-    const double at_w_w_2 = self->state.w_w + (0.000125 * rate_w_w_1);
-    const double at_w_em_2 = self->state.w_em + (0.000125 * rate_w_em_1);
+    const double at_w_w_2 = self->state.w_w + (0.000125 * rate_w_w_start);
+    const double at_w_em_2 = self->state.w_em + (0.000125 * rate_w_em_start);
     const double at_theta_d_2 = self->state.theta_d + (0.000125 * self->equation.w_d);
-    const double at_theta_b_now = self->state.theta_b + 0.0;
+    const double at_theta_b_2 = self->state.theta_b + 0.0;
     const double at_w_d_2 = (at_w_em_2 * constant.per_R) - at_w_w_2; /* driveline equations.w_d */
     const double w_w_squared_2 = at_w_w_2 * at_w_w_2; /* w_w * w_w */
     /* driveline equations.T_aer */
@@ -947,7 +997,7 @@ static inline void leap_drive_contact(driveline_Self *self, const driveline_In *
     const double at_T_v_2 = at_T_aer_2 + at_T_rr_2 + self->before.m_g_r_w_sin_slope;
     /* driveline equations.T_hs */
     const double at_T_hs_2 =
-        (constant.k_hs * (at_theta_d_2 - at_theta_b_now)) + (constant.c_hs * (at_w_d_2 - 0.0));
+        (constant.k_hs * (at_theta_d_2 - at_theta_b_2)) + (constant.c_hs * (at_w_d_2 - 0.0));
     /* driveline flow.w_w */
     const double rate_w_w_2 = (at_T_hs_2 - at_T_v_2 - self->before.T_br
         - (constant.b_w * at_w_w_2)) * constant.per_J_v;
@@ -968,7 +1018,7 @@ static inline void leap_drive_contact(driveline_Self *self, const driveline_In *
     const double at_T_v_3 = at_T_aer_3 + at_T_rr_3 + self->before.m_g_r_w_sin_slope;
     /* driveline equations.T_hs */
     const double at_T_hs_3 =
-        (constant.k_hs * (at_theta_d_3 - at_theta_b_now)) + (constant.c_hs * (at_w_d_3 - 0.0));
+        (constant.k_hs * (at_theta_d_3 - at_theta_b_2)) + (constant.c_hs * (at_w_d_3 - 0.0));
     /* driveline flow.w_w */
     const double rate_w_w_3 = (at_T_hs_3 - at_T_v_3 - self->before.T_br
         - (constant.b_w * at_w_w_3)) * constant.per_J_v;
@@ -989,74 +1039,75 @@ static inline void leap_drive_contact(driveline_Self *self, const driveline_In *
     const double at_T_v_4 = at_T_aer_4 + at_T_rr_4 + self->before.m_g_r_w_sin_slope;
     /* driveline equations.T_hs */
     const double at_T_hs_4 =
-        (constant.k_hs * (at_theta_d_4 - at_theta_b_now)) + (constant.c_hs * (at_w_d_4 - 0.0));
+        (constant.k_hs * (at_theta_d_4 - at_theta_b_2)) + (constant.c_hs * (at_w_d_4 - 0.0));
     /* driveline flow.w_w */
     const double rate_w_w_4 = (at_T_hs_4 - at_T_v_4 - self->before.T_br
         - (constant.b_w * at_w_w_4)) * constant.per_J_v;
     /* driveline flow.w_em */
     const double rate_w_em_4 = (self->before.T_em - (at_T_hs_4 * constant.per_R)
         - (constant.b_em * at_w_em_4)) * self->derived.per_J_em;
-    const double end_w_w_now =
-        self->state.w_w + (4.1666666666666665e-05 * (rate_w_w_1 + (2.0 * rate_w_w_2)
+    const double at_w_w_end =
+        self->state.w_w + (4.1666666666666665e-05 * (rate_w_w_start + (2.0 * rate_w_w_2)
         + (2.0 * rate_w_w_3) + rate_w_w_4));
-    const double end_w_em_now =
-        self->state.w_em + (4.1666666666666665e-05 * (rate_w_em_1 + (2.0 * rate_w_em_2)
+    const double at_w_em_end =
+        self->state.w_em + (4.1666666666666665e-05 * (rate_w_em_start + (2.0 * rate_w_em_2)
         + (2.0 * rate_w_em_3) + rate_w_em_4));
-    const double end_theta_d_now =
+    const double at_theta_d_end =
         self->state.theta_d + (4.1666666666666665e-05 * (self->equation.w_d + (2.0 * at_w_d_2)
         + (2.0 * at_w_d_3) + at_w_d_4));
     /* driveline equations.w_d */
-    const double at_w_d_5 = (end_w_em_now * constant.per_R) - end_w_w_now;
+    const double at_w_d_end = (at_w_em_end * constant.per_R) - at_w_w_end;
     /* driveline equations.w_free */
-    const double at_w_free_now =
-        at_w_d_5 + (constant.k_hs_per_c_hs * (end_theta_d_now - at_theta_b_now));
+    const double at_w_free_end =
+        at_w_d_end + (constant.k_hs_per_c_hs * (at_theta_d_end - at_theta_b_2));
     /* driveline modes.drive_contact.transitions.no_contact.when */
-    const bool guard_0_now = at_w_free_now < 0.0;
-    if (guard_0_now == self->armed_0) {
-        self->state.w_w = end_w_w_now;
-        self->state.w_em = end_w_em_now;
-        self->state.theta_d = end_theta_d_now;
-        self->state.theta_b = at_theta_b_now;
+    const bool guard_0_end = at_w_free_end < 0.0;
+    if (guard_0_end == self->armed_0) {
+        self->state.w_w = at_w_w_end;
+        self->state.w_em = at_w_em_end;
+        self->state.theta_d = at_theta_d_end;
+        self->state.theta_b = at_theta_b_2;
         self->time = self->time + 0.00025;
-        const bool changed_slope_now = in->slope != self->before.slope;
+        const bool changed_slope_end = in->slope != self->before.slope;
         self->before.T_em = in->T_em;
         self->before.T_br = in->T_br;
         self->before.slope = in->slope;
-        if (changed_slope_now) {
+        if (changed_slope_end) {
             /* m_g_r_w * sin(slope) */
             self->before.m_g_r_w_sin_slope = constant.m_g_r_w * ha_sin(in->slope);
         }
-        self->equation.w_d = at_w_d_5; /* driveline equations.w_d */
+        self->equation.w_d = at_w_d_end; /* driveline equations.w_d */
         /* theta_d - theta_b */
-        const double theta_d_minus_theta_b_now = end_theta_d_now - at_theta_b_now;
-        self->equation.w_free = at_w_free_now; /* driveline equations.w_free */
-        const double w_w_squared_5 = end_w_w_now * end_w_w_now; /* w_w * w_w */
+        const double theta_d_minus_theta_b_end = at_theta_d_end - at_theta_b_2;
+        self->equation.w_free = at_w_free_end; /* driveline equations.w_free */
+        const double w_w_squared_end = at_w_w_end * at_w_w_end; /* w_w * w_w */
         /* driveline equations.T_aer */
-        self->equation.T_aer = constant.a_aer_r_w_cubed * w_w_squared_5;
+        self->equation.T_aer = constant.a_aer_r_w_cubed * w_w_squared_end;
         /* driveline equations.T_rr */
-        self->equation.T_rr = constant.m_g_r_w * (constant.C_0 + (constant.C_1 * end_w_w_now)
-            + (constant.C_2 * w_w_squared_5));
+        self->equation.T_rr = constant.m_g_r_w * (constant.C_0 + (constant.C_1 * at_w_w_end)
+            + (constant.C_2 * w_w_squared_end));
         /* driveline equations.T_v */
         self->equation.T_v =
             self->equation.T_aer + self->equation.T_rr + self->before.m_g_r_w_sin_slope;
         self->equation.w_b = 0.0; /* driveline modes.drive_contact.equations.w_b */
         /* driveline equations.T_hs */
         self->equation.T_hs =
-            (constant.k_hs * theta_d_minus_theta_b_now) + (constant.c_hs * (at_w_d_5 - 0.0));
+            (constant.k_hs * theta_d_minus_theta_b_end) + (constant.c_hs * (at_w_d_end - 0.0));
         self->is_done = true;
     }
 }
 
+/* The whole step in mode no_contact, if nothing happens in it */
 static inline void leap_no_contact(driveline_Self *self, const driveline_In *in)
 {
     /* driveline flow.w_w */
-    const double rate_w_w_1 = (self->equation.T_hs - self->equation.T_v - self->before.T_br
+    const double rate_w_w_start = (self->equation.T_hs - self->equation.T_v - self->before.T_br
         - (constant.b_w * self->state.w_w)) * constant.per_J_v;
     /* driveline flow.w_em */
-    const double rate_w_em_1 = (self->before.T_em - (self->equation.T_hs * constant.per_R)
+    const double rate_w_em_start = (self->before.T_em - (self->equation.T_hs * constant.per_R)
         - (constant.b_em * self->state.w_em)) * self->derived.per_J_em;
-    const double at_w_w_2 = self->state.w_w + (0.000125 * rate_w_w_1);
-    const double at_w_em_2 = self->state.w_em + (0.000125 * rate_w_em_1);
+    const double at_w_w_2 = self->state.w_w + (0.000125 * rate_w_w_start);
+    const double at_w_em_2 = self->state.w_em + (0.000125 * rate_w_em_start);
     const double at_theta_d_2 = self->state.theta_d + (0.000125 * self->equation.w_d);
     const double at_theta_b_2 = self->state.theta_b + (0.000125 * self->equation.w_free);
     const double at_w_d_2 = (at_w_em_2 * constant.per_R) - at_w_w_2; /* driveline equations.w_d */
@@ -1130,75 +1181,76 @@ static inline void leap_no_contact(driveline_Self *self, const driveline_In *in)
     /* driveline flow.w_em */
     const double rate_w_em_4 = (self->before.T_em - (at_T_hs_4 * constant.per_R)
         - (constant.b_em * at_w_em_4)) * self->derived.per_J_em;
-    const double end_w_w_now =
-        self->state.w_w + (4.1666666666666665e-05 * (rate_w_w_1 + (2.0 * rate_w_w_2)
+    const double at_w_w_end =
+        self->state.w_w + (4.1666666666666665e-05 * (rate_w_w_start + (2.0 * rate_w_w_2)
         + (2.0 * rate_w_w_3) + rate_w_w_4));
-    const double end_w_em_now =
-        self->state.w_em + (4.1666666666666665e-05 * (rate_w_em_1 + (2.0 * rate_w_em_2)
+    const double at_w_em_end =
+        self->state.w_em + (4.1666666666666665e-05 * (rate_w_em_start + (2.0 * rate_w_em_2)
         + (2.0 * rate_w_em_3) + rate_w_em_4));
-    const double end_theta_d_now =
+    const double at_theta_d_end =
         self->state.theta_d + (4.1666666666666665e-05 * (self->equation.w_d + (2.0 * at_w_d_2)
         + (2.0 * at_w_d_3) + at_w_d_4));
-    const double end_theta_b_now =
+    const double at_theta_b_end =
         self->state.theta_b + (4.1666666666666665e-05 * (self->equation.w_free
         + (2.0 * at_w_free_2) + (2.0 * at_w_free_3) + at_w_free_4));
     /* driveline equations.w_d */
-    const double at_w_d_5 = (end_w_em_now * constant.per_R) - end_w_w_now;
+    const double at_w_d_end = (at_w_em_end * constant.per_R) - at_w_w_end;
     /* driveline equations.w_free */
-    const double at_w_free_5 =
-        at_w_d_5 + (constant.k_hs_per_c_hs * (end_theta_d_now - end_theta_b_now));
+    const double at_w_free_end =
+        at_w_d_end + (constant.k_hs_per_c_hs * (at_theta_d_end - at_theta_b_end));
     /* driveline modes.no_contact.transitions.drive_contact.when */
-    const bool guard_0_now = (end_theta_b_now >= constant.alpha) && (at_w_free_5 > 0.0);
+    const bool guard_0_end = (at_theta_b_end >= constant.alpha) && (at_w_free_end > 0.0);
     /* driveline modes.no_contact.transitions.coast_contact.when */
-    const bool guard_1_now = (end_theta_b_now <= (-constant.alpha)) && (at_w_free_5 < 0.0);
-    if (!((guard_0_now != self->armed_0) || (guard_1_now != self->armed_1))) {
-        self->state.w_w = end_w_w_now;
-        self->state.w_em = end_w_em_now;
-        self->state.theta_d = end_theta_d_now;
-        self->state.theta_b = end_theta_b_now;
+    const bool guard_1_end = (at_theta_b_end <= (-constant.alpha)) && (at_w_free_end < 0.0);
+    if (!((guard_0_end != self->armed_0) || (guard_1_end != self->armed_1))) {
+        self->state.w_w = at_w_w_end;
+        self->state.w_em = at_w_em_end;
+        self->state.theta_d = at_theta_d_end;
+        self->state.theta_b = at_theta_b_end;
         self->time = self->time + 0.00025;
-        const bool changed_slope_now = in->slope != self->before.slope;
+        const bool changed_slope_end = in->slope != self->before.slope;
         self->before.T_em = in->T_em;
         self->before.T_br = in->T_br;
         self->before.slope = in->slope;
-        if (changed_slope_now) {
+        if (changed_slope_end) {
             /* m_g_r_w * sin(slope) */
             self->before.m_g_r_w_sin_slope = constant.m_g_r_w * ha_sin(in->slope);
         }
-        self->equation.w_d = at_w_d_5; /* driveline equations.w_d */
+        self->equation.w_d = at_w_d_end; /* driveline equations.w_d */
         /* theta_d - theta_b */
-        const double theta_d_minus_theta_b_5 = end_theta_d_now - end_theta_b_now;
-        self->equation.w_free = at_w_free_5; /* driveline equations.w_free */
-        const double w_w_squared_5 = end_w_w_now * end_w_w_now; /* w_w * w_w */
+        const double theta_d_minus_theta_b_end = at_theta_d_end - at_theta_b_end;
+        self->equation.w_free = at_w_free_end; /* driveline equations.w_free */
+        const double w_w_squared_end = at_w_w_end * at_w_w_end; /* w_w * w_w */
         /* driveline equations.T_aer */
-        self->equation.T_aer = constant.a_aer_r_w_cubed * w_w_squared_5;
+        self->equation.T_aer = constant.a_aer_r_w_cubed * w_w_squared_end;
         /* driveline equations.T_rr */
-        self->equation.T_rr = constant.m_g_r_w * (constant.C_0 + (constant.C_1 * end_w_w_now)
-            + (constant.C_2 * w_w_squared_5));
+        self->equation.T_rr = constant.m_g_r_w * (constant.C_0 + (constant.C_1 * at_w_w_end)
+            + (constant.C_2 * w_w_squared_end));
         /* driveline equations.T_v */
         self->equation.T_v =
             self->equation.T_aer + self->equation.T_rr + self->before.m_g_r_w_sin_slope;
-        self->equation.w_b = at_w_free_5; /* driveline modes.no_contact.equations.w_b */
+        self->equation.w_b = at_w_free_end; /* driveline modes.no_contact.equations.w_b */
         /* driveline equations.T_hs */
         self->equation.T_hs =
-            (constant.k_hs * theta_d_minus_theta_b_5) + (constant.c_hs * (at_w_d_5
-            - at_w_free_5));
+            (constant.k_hs * theta_d_minus_theta_b_end) + (constant.c_hs * (at_w_d_end
+            - at_w_free_end));
         self->is_done = true;
     }
 }
 
+/* The whole step in mode coast_contact, if nothing happens in it */
 static inline void leap_coast_contact(driveline_Self *self, const driveline_In *in)
 {
     /* driveline flow.w_w */
-    const double rate_w_w_1 = (self->equation.T_hs - self->equation.T_v - self->before.T_br
+    const double rate_w_w_start = (self->equation.T_hs - self->equation.T_v - self->before.T_br
         - (constant.b_w * self->state.w_w)) * constant.per_J_v;
     /* driveline flow.w_em */
-    const double rate_w_em_1 = (self->before.T_em - (self->equation.T_hs * constant.per_R)
+    const double rate_w_em_start = (self->before.T_em - (self->equation.T_hs * constant.per_R)
         - (constant.b_em * self->state.w_em)) * self->derived.per_J_em;
-    const double at_w_w_2 = self->state.w_w + (0.000125 * rate_w_w_1);
-    const double at_w_em_2 = self->state.w_em + (0.000125 * rate_w_em_1);
+    const double at_w_w_2 = self->state.w_w + (0.000125 * rate_w_w_start);
+    const double at_w_em_2 = self->state.w_em + (0.000125 * rate_w_em_start);
     const double at_theta_d_2 = self->state.theta_d + (0.000125 * self->equation.w_d);
-    const double at_theta_b_now = self->state.theta_b + 0.0;
+    const double at_theta_b_2 = self->state.theta_b + 0.0;
     const double at_w_d_2 = (at_w_em_2 * constant.per_R) - at_w_w_2; /* driveline equations.w_d */
     const double w_w_squared_2 = at_w_w_2 * at_w_w_2; /* w_w * w_w */
     /* driveline equations.T_aer */
@@ -1210,7 +1262,7 @@ static inline void leap_coast_contact(driveline_Self *self, const driveline_In *
     const double at_T_v_2 = at_T_aer_2 + at_T_rr_2 + self->before.m_g_r_w_sin_slope;
     /* driveline equations.T_hs */
     const double at_T_hs_2 =
-        (constant.k_hs * (at_theta_d_2 - at_theta_b_now)) + (constant.c_hs * (at_w_d_2 - 0.0));
+        (constant.k_hs * (at_theta_d_2 - at_theta_b_2)) + (constant.c_hs * (at_w_d_2 - 0.0));
     /* driveline flow.w_w */
     const double rate_w_w_2 = (at_T_hs_2 - at_T_v_2 - self->before.T_br
         - (constant.b_w * at_w_w_2)) * constant.per_J_v;
@@ -1231,7 +1283,7 @@ static inline void leap_coast_contact(driveline_Self *self, const driveline_In *
     const double at_T_v_3 = at_T_aer_3 + at_T_rr_3 + self->before.m_g_r_w_sin_slope;
     /* driveline equations.T_hs */
     const double at_T_hs_3 =
-        (constant.k_hs * (at_theta_d_3 - at_theta_b_now)) + (constant.c_hs * (at_w_d_3 - 0.0));
+        (constant.k_hs * (at_theta_d_3 - at_theta_b_2)) + (constant.c_hs * (at_w_d_3 - 0.0));
     /* driveline flow.w_w */
     const double rate_w_w_3 = (at_T_hs_3 - at_T_v_3 - self->before.T_br
         - (constant.b_w * at_w_w_3)) * constant.per_J_v;
@@ -1252,64 +1304,65 @@ static inline void leap_coast_contact(driveline_Self *self, const driveline_In *
     const double at_T_v_4 = at_T_aer_4 + at_T_rr_4 + self->before.m_g_r_w_sin_slope;
     /* driveline equations.T_hs */
     const double at_T_hs_4 =
-        (constant.k_hs * (at_theta_d_4 - at_theta_b_now)) + (constant.c_hs * (at_w_d_4 - 0.0));
+        (constant.k_hs * (at_theta_d_4 - at_theta_b_2)) + (constant.c_hs * (at_w_d_4 - 0.0));
     /* driveline flow.w_w */
     const double rate_w_w_4 = (at_T_hs_4 - at_T_v_4 - self->before.T_br
         - (constant.b_w * at_w_w_4)) * constant.per_J_v;
     /* driveline flow.w_em */
     const double rate_w_em_4 = (self->before.T_em - (at_T_hs_4 * constant.per_R)
         - (constant.b_em * at_w_em_4)) * self->derived.per_J_em;
-    const double end_w_w_now =
-        self->state.w_w + (4.1666666666666665e-05 * (rate_w_w_1 + (2.0 * rate_w_w_2)
+    const double at_w_w_end =
+        self->state.w_w + (4.1666666666666665e-05 * (rate_w_w_start + (2.0 * rate_w_w_2)
         + (2.0 * rate_w_w_3) + rate_w_w_4));
-    const double end_w_em_now =
-        self->state.w_em + (4.1666666666666665e-05 * (rate_w_em_1 + (2.0 * rate_w_em_2)
+    const double at_w_em_end =
+        self->state.w_em + (4.1666666666666665e-05 * (rate_w_em_start + (2.0 * rate_w_em_2)
         + (2.0 * rate_w_em_3) + rate_w_em_4));
-    const double end_theta_d_now =
+    const double at_theta_d_end =
         self->state.theta_d + (4.1666666666666665e-05 * (self->equation.w_d + (2.0 * at_w_d_2)
         + (2.0 * at_w_d_3) + at_w_d_4));
     /* driveline equations.w_d */
-    const double at_w_d_5 = (end_w_em_now * constant.per_R) - end_w_w_now;
+    const double at_w_d_end = (at_w_em_end * constant.per_R) - at_w_w_end;
     /* driveline equations.w_free */
-    const double at_w_free_now =
-        at_w_d_5 + (constant.k_hs_per_c_hs * (end_theta_d_now - at_theta_b_now));
+    const double at_w_free_end =
+        at_w_d_end + (constant.k_hs_per_c_hs * (at_theta_d_end - at_theta_b_2));
     /* driveline modes.coast_contact.transitions.no_contact.when */
-    const bool guard_0_now = at_w_free_now > 0.0;
-    if (guard_0_now == self->armed_0) {
-        self->state.w_w = end_w_w_now;
-        self->state.w_em = end_w_em_now;
-        self->state.theta_d = end_theta_d_now;
-        self->state.theta_b = at_theta_b_now;
+    const bool guard_0_end = at_w_free_end > 0.0;
+    if (guard_0_end == self->armed_0) {
+        self->state.w_w = at_w_w_end;
+        self->state.w_em = at_w_em_end;
+        self->state.theta_d = at_theta_d_end;
+        self->state.theta_b = at_theta_b_2;
         self->time = self->time + 0.00025;
-        const bool changed_slope_now = in->slope != self->before.slope;
+        const bool changed_slope_end = in->slope != self->before.slope;
         self->before.T_em = in->T_em;
         self->before.T_br = in->T_br;
         self->before.slope = in->slope;
-        if (changed_slope_now) {
+        if (changed_slope_end) {
             /* m_g_r_w * sin(slope) */
             self->before.m_g_r_w_sin_slope = constant.m_g_r_w * ha_sin(in->slope);
         }
-        self->equation.w_d = at_w_d_5; /* driveline equations.w_d */
+        self->equation.w_d = at_w_d_end; /* driveline equations.w_d */
         /* theta_d - theta_b */
-        const double theta_d_minus_theta_b_now = end_theta_d_now - at_theta_b_now;
-        self->equation.w_free = at_w_free_now; /* driveline equations.w_free */
-        const double w_w_squared_5 = end_w_w_now * end_w_w_now; /* w_w * w_w */
+        const double theta_d_minus_theta_b_end = at_theta_d_end - at_theta_b_2;
+        self->equation.w_free = at_w_free_end; /* driveline equations.w_free */
+        const double w_w_squared_end = at_w_w_end * at_w_w_end; /* w_w * w_w */
         /* driveline equations.T_aer */
-        self->equation.T_aer = constant.a_aer_r_w_cubed * w_w_squared_5;
+        self->equation.T_aer = constant.a_aer_r_w_cubed * w_w_squared_end;
         /* driveline equations.T_rr */
-        self->equation.T_rr = constant.m_g_r_w * (constant.C_0 + (constant.C_1 * end_w_w_now)
-            + (constant.C_2 * w_w_squared_5));
+        self->equation.T_rr = constant.m_g_r_w * (constant.C_0 + (constant.C_1 * at_w_w_end)
+            + (constant.C_2 * w_w_squared_end));
         /* driveline equations.T_v */
         self->equation.T_v =
             self->equation.T_aer + self->equation.T_rr + self->before.m_g_r_w_sin_slope;
         self->equation.w_b = 0.0; /* driveline modes.coast_contact.equations.w_b */
         /* driveline equations.T_hs */
         self->equation.T_hs =
-            (constant.k_hs * theta_d_minus_theta_b_now) + (constant.c_hs * (at_w_d_5 - 0.0));
+            (constant.k_hs * theta_d_minus_theta_b_end) + (constant.c_hs * (at_w_d_end - 0.0));
         self->is_done = true;
     }
 }
 
+/* The whole step, if nothing happens in it */
 static inline void leap(driveline_Self *self, const driveline_In *in)
 {
     switch (self->mode) {
@@ -1323,10 +1376,12 @@ static inline void leap(driveline_Self *self, const driveline_In *in)
         leap_coast_contact(self, in);
         break;
     default:
+        /* there is no other */
         break;
     }
 }
 
+/* The step from event to event: taken where something happens in it */
 static RARELY void through_events(driveline_Self *self, const driveline_In *in)
 {
     driveline_Work *const work = &self->work;
@@ -1334,7 +1389,10 @@ static RARELY void through_events(driveline_Self *self, const driveline_In *in)
     if (self->started) {
         work->left = 0.00025;
         work->event = false;
-        for (int32_t piece = 0; (piece < 101) && (work->left > 0.0); piece++) {
+        for (int32_t piece = 0; piece < 101; piece++) {
+            if (!(work->left > 0.0)) {
+                break;
+            }
             segment(self, work);
         }
         if (work->left > 0.0) {

@@ -31,11 +31,18 @@ static const struct {
     .per_R = 0.1234567901234568, /* 1 / R */
 };
 
-/* Kept out of the way of what a step does nearly always */
+/* Cold path, not inlined */
 #if defined(__GNUC__)
 #define RARELY __attribute__((noinline))
 #else
 #define RARELY
+#endif
+
+/* Computes much: its values are on the stack only while it runs */
+#if defined(__GNUC__)
+#define APART __attribute__((noinline))
+#else
+#define APART
 #endif
 
 const char estimator_simple_Version[] = estimator_simple_DIGEST;
@@ -43,61 +50,61 @@ const char estimator_simple_Version[] = estimator_simple_DIGEST;
 estimator_simple_CALIBRATION const volatile estimator_simple_Cal estimator_simple_default_cal = {
     .J_em = 0.05,
     .solved = {
-        .drive_Phi_theta_d_theta_d = 0.9266450076651614,
-        .drive_Phi_theta_d_w_em = 0.0011774624864130231,
-        .drive_Phi_theta_d_w_w = -0.009538955318479479,
-        .drive_Phi_w_em_theta_d = -113.03639869565022,
-        .drive_Phi_w_em_w_em = 0.8877247096409043,
-        .drive_Phi_w_em_w_w = 0.9063027998317674,
-        .drive_Phi_w_w_theta_d = 0.4242481865063841,
-        .drive_Phi_w_w_w_em = 0.0004198762102533091,
-        .drive_Phi_w_w_w_w = 0.9965087774211902,
-        .drive_Gamma_theta_d_T_em = 0.00012013454601784477,
-        .drive_Gamma_theta_d_T_br = 4.5086463545619123e-07,
-        .drive_Gamma_w_em_T_em = 0.19102066835634401,
-        .drive_Gamma_w_em_T_br = -3.354883425114947e-05,
-        .drive_Gamma_w_w_T_em = 3.3548834251149476e-05,
-        .drive_Gamma_w_w_T_br = -9.25268702445275e-05,
-        .drive_G_theta_d_w_em = 6.006727300892239e-06,
-        .drive_G_theta_d_w_w = -4.865956578160943e-05,
-        .drive_G_w_em_w_em = 0.009551033417817201,
-        .drive_G_w_em_w_w = 0.003620757936555306,
-        .drive_G_w_w_w_em = 1.6774417125574738e-06,
-        .drive_G_w_w_w_w = 0.00998596247114063,
-        .drive_L_theta_d_y_em = -0.0013918329312859541,
-        .drive_L_theta_d_y_w = -0.00021584339292280485,
-        .drive_L_w_em_y_em = 0.6103463852031026,
-        .drive_L_w_em_y_w = 0.006514375143095953,
-        .drive_L_w_w_y_em = 0.00018095486508599873,
-        .drive_L_w_w_y_w = 0.05094578933709926,
+        .drive_Phi_theta_d__theta_d = 0.9266450076651614,
+        .drive_Phi_theta_d__w_em = 0.0011774624864130231,
+        .drive_Phi_theta_d__w_w = -0.009538955318479479,
+        .drive_Phi_w_em__theta_d = -113.03639869565022,
+        .drive_Phi_w_em__w_em = 0.8877247096409043,
+        .drive_Phi_w_em__w_w = 0.9063027998317674,
+        .drive_Phi_w_w__theta_d = 0.4242481865063841,
+        .drive_Phi_w_w__w_em = 0.0004198762102533091,
+        .drive_Phi_w_w__w_w = 0.9965087774211902,
+        .drive_Gamma_theta_d__T_em = 0.00012013454601784477,
+        .drive_Gamma_theta_d__T_br = 4.5086463545619123e-07,
+        .drive_Gamma_w_em__T_em = 0.19102066835634401,
+        .drive_Gamma_w_em__T_br = -3.354883425114947e-05,
+        .drive_Gamma_w_w__T_em = 3.3548834251149476e-05,
+        .drive_Gamma_w_w__T_br = -9.25268702445275e-05,
+        .drive_G_theta_d__w_em = 6.006727300892239e-06,
+        .drive_G_theta_d__w_w = -4.865956578160943e-05,
+        .drive_G_w_em__w_em = 0.009551033417817201,
+        .drive_G_w_em__w_w = 0.003620757936555306,
+        .drive_G_w_w__w_em = 1.6774417125574738e-06,
+        .drive_G_w_w__w_w = 0.00998596247114063,
+        .drive_L_theta_d__y_em = -0.0013918329312859541,
+        .drive_L_theta_d__y_w = -0.00021584339292280485,
+        .drive_L_w_em__y_em = 0.6103463852031026,
+        .drive_L_w_em__y_w = 0.006514375143095953,
+        .drive_L_w_w__y_em = 0.00018095486508599873,
+        .drive_L_w_w__y_w = 0.05094578933709926,
         .drive_f_w_w = -0.19926695404517647,
-        .coast_Phi_theta_d_theta_d = 0.9266450076651614,
-        .coast_Phi_theta_d_w_em = 0.0011774624864130231,
-        .coast_Phi_theta_d_w_w = -0.009538955318479479,
-        .coast_Phi_w_em_theta_d = -113.03639869565022,
-        .coast_Phi_w_em_w_em = 0.8877247096409043,
-        .coast_Phi_w_em_w_w = 0.9063027998317674,
-        .coast_Phi_w_w_theta_d = 0.4242481865063841,
-        .coast_Phi_w_w_w_em = 0.0004198762102533091,
-        .coast_Phi_w_w_w_w = 0.9965087774211902,
-        .coast_Gamma_theta_d_T_em = 0.00012013454601784477,
-        .coast_Gamma_theta_d_T_br = 4.5086463545619123e-07,
-        .coast_Gamma_w_em_T_em = 0.19102066835634401,
-        .coast_Gamma_w_em_T_br = -3.354883425114947e-05,
-        .coast_Gamma_w_w_T_em = 3.3548834251149476e-05,
-        .coast_Gamma_w_w_T_br = -9.25268702445275e-05,
-        .coast_G_theta_d_w_em = 6.006727300892239e-06,
-        .coast_G_theta_d_w_w = -4.865956578160943e-05,
-        .coast_G_w_em_w_em = 0.009551033417817201,
-        .coast_G_w_em_w_w = 0.003620757936555306,
-        .coast_G_w_w_w_em = 1.6774417125574738e-06,
-        .coast_G_w_w_w_w = 0.00998596247114063,
-        .coast_L_theta_d_y_em = -0.0013918329312859541,
-        .coast_L_theta_d_y_w = -0.00021584339292280485,
-        .coast_L_w_em_y_em = 0.6103463852031026,
-        .coast_L_w_em_y_w = 0.006514375143095953,
-        .coast_L_w_w_y_em = 0.00018095486508599873,
-        .coast_L_w_w_y_w = 0.05094578933709926,
+        .coast_Phi_theta_d__theta_d = 0.9266450076651614,
+        .coast_Phi_theta_d__w_em = 0.0011774624864130231,
+        .coast_Phi_theta_d__w_w = -0.009538955318479479,
+        .coast_Phi_w_em__theta_d = -113.03639869565022,
+        .coast_Phi_w_em__w_em = 0.8877247096409043,
+        .coast_Phi_w_em__w_w = 0.9063027998317674,
+        .coast_Phi_w_w__theta_d = 0.4242481865063841,
+        .coast_Phi_w_w__w_em = 0.0004198762102533091,
+        .coast_Phi_w_w__w_w = 0.9965087774211902,
+        .coast_Gamma_theta_d__T_em = 0.00012013454601784477,
+        .coast_Gamma_theta_d__T_br = 4.5086463545619123e-07,
+        .coast_Gamma_w_em__T_em = 0.19102066835634401,
+        .coast_Gamma_w_em__T_br = -3.354883425114947e-05,
+        .coast_Gamma_w_w__T_em = 3.3548834251149476e-05,
+        .coast_Gamma_w_w__T_br = -9.25268702445275e-05,
+        .coast_G_theta_d__w_em = 6.006727300892239e-06,
+        .coast_G_theta_d__w_w = -4.865956578160943e-05,
+        .coast_G_w_em__w_em = 0.009551033417817201,
+        .coast_G_w_em__w_w = 0.003620757936555306,
+        .coast_G_w_w__w_em = 1.6774417125574738e-06,
+        .coast_G_w_w__w_w = 0.00998596247114063,
+        .coast_L_theta_d__y_em = -0.0013918329312859541,
+        .coast_L_theta_d__y_w = -0.00021584339292280485,
+        .coast_L_w_em__y_em = 0.6103463852031026,
+        .coast_L_w_em__y_w = 0.006514375143095953,
+        .coast_L_w_w__y_em = 0.00018095486508599873,
+        .coast_L_w_w__y_w = 0.05094578933709926,
         .coast_f_w_w = -0.19926695404517647,
         .stamp_J_em = 0.05,
     },
@@ -105,12 +112,13 @@ estimator_simple_CALIBRATION const volatile estimator_simple_Cal estimator_simpl
 
 /* Values that live within one step */
 typedef struct {
-    double reset_theta_b;
-    double reset_theta_d;
-    double reset_w_em;
-    double reset_w_w;
+    double reset_theta_b; /* rad */
+    double reset_theta_d; /* rad */
+    double reset_w_em; /* rad/s */
+    double reset_w_w; /* rad/s */
 } Work;
 
+/* Inputs one by one: a fault bit for each that is not within its range */
 static RARELY void latch_apart(estimator_simple_Self *self, const estimator_simple_In *in)
 {
     if (ha_within(in->y_em, -400.0, 2400.0)) {
@@ -145,7 +153,8 @@ static RARELY void latch_apart(estimator_simple_Self *self, const estimator_simp
     }
 }
 
-static inline void predict_drive(estimator_simple_Self *self,
+/* Prediction of the observer in mode drive over one period */
+static APART void predict_drive(estimator_simple_Self *self,
     const volatile estimator_simple_Cal *cal)
 {
     /* estimator_simple modes.drive.observer.f.w_em */
@@ -153,27 +162,27 @@ static inline void predict_drive(estimator_simple_Self *self,
     /* estimator_simple modes.drive.observer.f.w_w */
     const double f_w_w = (-(constant.k_hs_per_J_v * self->state.theta_b)) + cal->solved.drive_f_w_w;
     /* estimator_simple modes.drive.observer */
-    const double predicted_theta_d = (cal->solved.drive_Phi_theta_d_theta_d * self->state.theta_d)
-        + (cal->solved.drive_Phi_theta_d_w_em * self->state.w_em)
-        + (cal->solved.drive_Phi_theta_d_w_w * self->state.w_w)
-        + (cal->solved.drive_Gamma_theta_d_T_em * self->before.T_em)
-        + (cal->solved.drive_Gamma_theta_d_T_br * self->before.T_br)
-        + (cal->solved.drive_G_theta_d_w_em * f_w_em)
-        + (cal->solved.drive_G_theta_d_w_w * f_w_w);
+    const double predicted_theta_d = (cal->solved.drive_Phi_theta_d__theta_d * self->state.theta_d)
+        + (cal->solved.drive_Phi_theta_d__w_em * self->state.w_em)
+        + (cal->solved.drive_Phi_theta_d__w_w * self->state.w_w)
+        + (cal->solved.drive_Gamma_theta_d__T_em * self->before.T_em)
+        + (cal->solved.drive_Gamma_theta_d__T_br * self->before.T_br)
+        + (cal->solved.drive_G_theta_d__w_em * f_w_em)
+        + (cal->solved.drive_G_theta_d__w_w * f_w_w);
     /* estimator_simple modes.drive.observer */
-    const double predicted_w_em = (cal->solved.drive_Phi_w_em_theta_d * self->state.theta_d)
-        + (cal->solved.drive_Phi_w_em_w_em * self->state.w_em)
-        + (cal->solved.drive_Phi_w_em_w_w * self->state.w_w)
-        + (cal->solved.drive_Gamma_w_em_T_em * self->before.T_em)
-        + (cal->solved.drive_Gamma_w_em_T_br * self->before.T_br)
-        + (cal->solved.drive_G_w_em_w_em * f_w_em) + (cal->solved.drive_G_w_em_w_w * f_w_w);
+    const double predicted_w_em = (cal->solved.drive_Phi_w_em__theta_d * self->state.theta_d)
+        + (cal->solved.drive_Phi_w_em__w_em * self->state.w_em)
+        + (cal->solved.drive_Phi_w_em__w_w * self->state.w_w)
+        + (cal->solved.drive_Gamma_w_em__T_em * self->before.T_em)
+        + (cal->solved.drive_Gamma_w_em__T_br * self->before.T_br)
+        + (cal->solved.drive_G_w_em__w_em * f_w_em) + (cal->solved.drive_G_w_em__w_w * f_w_w);
     /* estimator_simple modes.drive.observer */
-    const double predicted_w_w = (cal->solved.drive_Phi_w_w_theta_d * self->state.theta_d)
-        + (cal->solved.drive_Phi_w_w_w_em * self->state.w_em)
-        + (cal->solved.drive_Phi_w_w_w_w * self->state.w_w)
-        + (cal->solved.drive_Gamma_w_w_T_em * self->before.T_em)
-        + (cal->solved.drive_Gamma_w_w_T_br * self->before.T_br)
-        + (cal->solved.drive_G_w_w_w_em * f_w_em) + (cal->solved.drive_G_w_w_w_w * f_w_w);
+    const double predicted_w_w = (cal->solved.drive_Phi_w_w__theta_d * self->state.theta_d)
+        + (cal->solved.drive_Phi_w_w__w_em * self->state.w_em)
+        + (cal->solved.drive_Phi_w_w__w_w * self->state.w_w)
+        + (cal->solved.drive_Gamma_w_w__T_em * self->before.T_em)
+        + (cal->solved.drive_Gamma_w_w__T_br * self->before.T_br)
+        + (cal->solved.drive_G_w_w__w_em * f_w_em) + (cal->solved.drive_G_w_w__w_w * f_w_w);
     if (fabs(predicted_theta_d) <= 0.5) {
         self->state.theta_d = predicted_theta_d;
     } else {
@@ -194,14 +203,15 @@ static inline void predict_drive(estimator_simple_Self *self,
     }
 }
 
-static inline void correct_drive(estimator_simple_Self *self,
+/* Innovations and correction of the observer in mode drive */
+static APART void correct_drive(estimator_simple_Self *self,
     const volatile estimator_simple_Cal *cal, const estimator_simple_In *in)
 {
     self->innovation.y_em = in->is_new.y_em ? (self->latched.y_em - self->state.w_em) : 0.0;
     self->innovation.y_w = in->is_new.y_w ? (self->latched.y_w - self->state.w_w) : 0.0;
     const double new_theta_d =
-        self->state.theta_d + ((cal->solved.drive_L_theta_d_y_em * self->innovation.y_em)
-        + (cal->solved.drive_L_theta_d_y_w * self->innovation.y_w));
+        self->state.theta_d + ((cal->solved.drive_L_theta_d__y_em * self->innovation.y_em)
+        + (cal->solved.drive_L_theta_d__y_w * self->innovation.y_w));
     if (fabs(new_theta_d) <= 0.5) {
         self->state.theta_d = new_theta_d;
     } else {
@@ -209,8 +219,8 @@ static inline void correct_drive(estimator_simple_Self *self,
         self->state.theta_d = ha_clip(new_theta_d, -0.5, 0.5);
     }
     const double new_w_em =
-        self->state.w_em + ((cal->solved.drive_L_w_em_y_em * self->innovation.y_em)
-        + (cal->solved.drive_L_w_em_y_w * self->innovation.y_w));
+        self->state.w_em + ((cal->solved.drive_L_w_em__y_em * self->innovation.y_em)
+        + (cal->solved.drive_L_w_em__y_w * self->innovation.y_w));
     if (ha_within(new_w_em, -400.0, 2400.0)) {
         self->state.w_em = new_w_em;
     } else {
@@ -218,8 +228,8 @@ static inline void correct_drive(estimator_simple_Self *self,
         self->state.w_em = ha_clip(new_w_em, -400.0, 2400.0);
     }
     const double new_w_w =
-        self->state.w_w + ((cal->solved.drive_L_w_w_y_em * self->innovation.y_em)
-        + (cal->solved.drive_L_w_w_y_w * self->innovation.y_w));
+        self->state.w_w + ((cal->solved.drive_L_w_w__y_em * self->innovation.y_em)
+        + (cal->solved.drive_L_w_w__y_w * self->innovation.y_w));
     if (ha_within(new_w_w, -50.0, 300.0)) {
         self->state.w_w = new_w_w;
     } else {
@@ -228,7 +238,8 @@ static inline void correct_drive(estimator_simple_Self *self,
     }
 }
 
-static inline void predict_coast(estimator_simple_Self *self,
+/* Prediction of the observer in mode coast over one period */
+static APART void predict_coast(estimator_simple_Self *self,
     const volatile estimator_simple_Cal *cal)
 {
     /* estimator_simple modes.coast.observer.f.w_em */
@@ -236,27 +247,27 @@ static inline void predict_coast(estimator_simple_Self *self,
     /* estimator_simple modes.coast.observer.f.w_w */
     const double f_w_w = (-(constant.k_hs_per_J_v * self->state.theta_b)) + cal->solved.coast_f_w_w;
     /* estimator_simple modes.coast.observer */
-    const double predicted_theta_d = (cal->solved.coast_Phi_theta_d_theta_d * self->state.theta_d)
-        + (cal->solved.coast_Phi_theta_d_w_em * self->state.w_em)
-        + (cal->solved.coast_Phi_theta_d_w_w * self->state.w_w)
-        + (cal->solved.coast_Gamma_theta_d_T_em * self->before.T_em)
-        + (cal->solved.coast_Gamma_theta_d_T_br * self->before.T_br)
-        + (cal->solved.coast_G_theta_d_w_em * f_w_em)
-        + (cal->solved.coast_G_theta_d_w_w * f_w_w);
+    const double predicted_theta_d = (cal->solved.coast_Phi_theta_d__theta_d * self->state.theta_d)
+        + (cal->solved.coast_Phi_theta_d__w_em * self->state.w_em)
+        + (cal->solved.coast_Phi_theta_d__w_w * self->state.w_w)
+        + (cal->solved.coast_Gamma_theta_d__T_em * self->before.T_em)
+        + (cal->solved.coast_Gamma_theta_d__T_br * self->before.T_br)
+        + (cal->solved.coast_G_theta_d__w_em * f_w_em)
+        + (cal->solved.coast_G_theta_d__w_w * f_w_w);
     /* estimator_simple modes.coast.observer */
-    const double predicted_w_em = (cal->solved.coast_Phi_w_em_theta_d * self->state.theta_d)
-        + (cal->solved.coast_Phi_w_em_w_em * self->state.w_em)
-        + (cal->solved.coast_Phi_w_em_w_w * self->state.w_w)
-        + (cal->solved.coast_Gamma_w_em_T_em * self->before.T_em)
-        + (cal->solved.coast_Gamma_w_em_T_br * self->before.T_br)
-        + (cal->solved.coast_G_w_em_w_em * f_w_em) + (cal->solved.coast_G_w_em_w_w * f_w_w);
+    const double predicted_w_em = (cal->solved.coast_Phi_w_em__theta_d * self->state.theta_d)
+        + (cal->solved.coast_Phi_w_em__w_em * self->state.w_em)
+        + (cal->solved.coast_Phi_w_em__w_w * self->state.w_w)
+        + (cal->solved.coast_Gamma_w_em__T_em * self->before.T_em)
+        + (cal->solved.coast_Gamma_w_em__T_br * self->before.T_br)
+        + (cal->solved.coast_G_w_em__w_em * f_w_em) + (cal->solved.coast_G_w_em__w_w * f_w_w);
     /* estimator_simple modes.coast.observer */
-    const double predicted_w_w = (cal->solved.coast_Phi_w_w_theta_d * self->state.theta_d)
-        + (cal->solved.coast_Phi_w_w_w_em * self->state.w_em)
-        + (cal->solved.coast_Phi_w_w_w_w * self->state.w_w)
-        + (cal->solved.coast_Gamma_w_w_T_em * self->before.T_em)
-        + (cal->solved.coast_Gamma_w_w_T_br * self->before.T_br)
-        + (cal->solved.coast_G_w_w_w_em * f_w_em) + (cal->solved.coast_G_w_w_w_w * f_w_w);
+    const double predicted_w_w = (cal->solved.coast_Phi_w_w__theta_d * self->state.theta_d)
+        + (cal->solved.coast_Phi_w_w__w_em * self->state.w_em)
+        + (cal->solved.coast_Phi_w_w__w_w * self->state.w_w)
+        + (cal->solved.coast_Gamma_w_w__T_em * self->before.T_em)
+        + (cal->solved.coast_Gamma_w_w__T_br * self->before.T_br)
+        + (cal->solved.coast_G_w_w__w_em * f_w_em) + (cal->solved.coast_G_w_w__w_w * f_w_w);
     if (fabs(predicted_theta_d) <= 0.5) {
         self->state.theta_d = predicted_theta_d;
     } else {
@@ -277,14 +288,15 @@ static inline void predict_coast(estimator_simple_Self *self,
     }
 }
 
-static inline void correct_coast(estimator_simple_Self *self,
+/* Innovations and correction of the observer in mode coast */
+static APART void correct_coast(estimator_simple_Self *self,
     const volatile estimator_simple_Cal *cal, const estimator_simple_In *in)
 {
     self->innovation.y_em = in->is_new.y_em ? (self->latched.y_em - self->state.w_em) : 0.0;
     self->innovation.y_w = in->is_new.y_w ? (self->latched.y_w - self->state.w_w) : 0.0;
     const double new_theta_d =
-        self->state.theta_d + ((cal->solved.coast_L_theta_d_y_em * self->innovation.y_em)
-        + (cal->solved.coast_L_theta_d_y_w * self->innovation.y_w));
+        self->state.theta_d + ((cal->solved.coast_L_theta_d__y_em * self->innovation.y_em)
+        + (cal->solved.coast_L_theta_d__y_w * self->innovation.y_w));
     if (fabs(new_theta_d) <= 0.5) {
         self->state.theta_d = new_theta_d;
     } else {
@@ -292,8 +304,8 @@ static inline void correct_coast(estimator_simple_Self *self,
         self->state.theta_d = ha_clip(new_theta_d, -0.5, 0.5);
     }
     const double new_w_em =
-        self->state.w_em + ((cal->solved.coast_L_w_em_y_em * self->innovation.y_em)
-        + (cal->solved.coast_L_w_em_y_w * self->innovation.y_w));
+        self->state.w_em + ((cal->solved.coast_L_w_em__y_em * self->innovation.y_em)
+        + (cal->solved.coast_L_w_em__y_w * self->innovation.y_w));
     if (ha_within(new_w_em, -400.0, 2400.0)) {
         self->state.w_em = new_w_em;
     } else {
@@ -301,8 +313,8 @@ static inline void correct_coast(estimator_simple_Self *self,
         self->state.w_em = ha_clip(new_w_em, -400.0, 2400.0);
     }
     const double new_w_w =
-        self->state.w_w + ((cal->solved.coast_L_w_w_y_em * self->innovation.y_em)
-        + (cal->solved.coast_L_w_w_y_w * self->innovation.y_w));
+        self->state.w_w + ((cal->solved.coast_L_w_w__y_em * self->innovation.y_em)
+        + (cal->solved.coast_L_w_w__y_w * self->innovation.y_w));
     if (ha_within(new_w_w, -50.0, 300.0)) {
         self->state.w_w = new_w_w;
     } else {
@@ -311,7 +323,8 @@ static inline void correct_coast(estimator_simple_Self *self,
     }
 }
 
-static inline void equations_drive(estimator_simple_Self *self)
+/* Equations of mode drive */
+static APART void equations_drive(estimator_simple_Self *self)
 {
     /* estimator_simple equations.w_d */
     self->equation.w_d = (self->state.w_em * constant.per_R) - self->state.w_w;
@@ -321,6 +334,7 @@ static inline void equations_drive(estimator_simple_Self *self)
         + (constant.c_hs * (self->equation.w_d - self->equation.w_b));
 }
 
+/* Transitions of mode drive: the first one that is due is taken */
 static inline void jump_drive(estimator_simple_Self *self)
 {
     if (!(self->equation.T_hs <= 0.0)) { /* estimator_simple modes.drive.transitions.gap.when */
@@ -333,11 +347,13 @@ static inline void jump_drive(estimator_simple_Self *self)
     if (self->timer.drive_gap > 1U) {
         self->timer.drive_gap = 0U;
         self->mode = estimator_simple_MODE_gap;
-        self->fired = 1U; /* estimator_simple modes.drive.transitions.gap */
+        /* estimator_simple modes.drive.transitions.gap */
+        self->fired = estimator_simple_FIRED_drive_gap;
     }
 }
 
-static inline void equations_gap(estimator_simple_Self *self)
+/* Equations of mode gap */
+static APART void equations_gap(estimator_simple_Self *self)
 {
     /* estimator_simple equations.w_d */
     self->equation.w_d = (self->state.w_em * constant.per_R) - self->state.w_w;
@@ -347,6 +363,7 @@ static inline void equations_gap(estimator_simple_Self *self)
         + (constant.c_hs * (self->equation.w_d - self->equation.w_b));
 }
 
+/* Transitions of mode gap: the first one that is due is taken */
 static inline void jump_gap(estimator_simple_Self *self)
 {
     Work scratch;
@@ -402,7 +419,8 @@ static inline void jump_gap(estimator_simple_Self *self)
         self->timer.gap_drive = 0U;
         self->timer.gap_coast = 0U;
         self->mode = estimator_simple_MODE_drive;
-        self->fired = 2U; /* estimator_simple modes.gap.transitions.drive */
+        /* estimator_simple modes.gap.transitions.drive */
+        self->fired = estimator_simple_FIRED_gap_drive;
     } else if (self->timer.gap_coast > 1U) {
         /* estimator_simple modes.gap.transitions.coast.reset.theta_b */
         work->reset_theta_b = -constant.alpha;
@@ -439,12 +457,14 @@ static inline void jump_gap(estimator_simple_Self *self)
         self->timer.gap_drive = 0U;
         self->timer.gap_coast = 0U;
         self->mode = estimator_simple_MODE_coast;
-        self->fired = 3U; /* estimator_simple modes.gap.transitions.coast */
+        /* estimator_simple modes.gap.transitions.coast */
+        self->fired = estimator_simple_FIRED_gap_coast;
     } else {
         /* nothing to do */
     }
 }
 
+/* Updates of mode gap, from the values of this tick */
 static inline void update_gap(estimator_simple_Self *self)
 {
     const double next_w_em = self->latched.y_em; /* estimator_simple modes.gap.update.w_em */
@@ -477,7 +497,8 @@ static inline void update_gap(estimator_simple_Self *self)
     }
 }
 
-static inline void equations_coast(estimator_simple_Self *self)
+/* Equations of mode coast */
+static APART void equations_coast(estimator_simple_Self *self)
 {
     /* estimator_simple equations.w_d */
     self->equation.w_d = (self->state.w_em * constant.per_R) - self->state.w_w;
@@ -487,6 +508,7 @@ static inline void equations_coast(estimator_simple_Self *self)
         + (constant.c_hs * (self->equation.w_d - self->equation.w_b));
 }
 
+/* Transitions of mode coast: the first one that is due is taken */
 static inline void jump_coast(estimator_simple_Self *self)
 {
     if (!(self->equation.T_hs >= 0.0)) { /* estimator_simple modes.coast.transitions.gap.when */
@@ -499,10 +521,12 @@ static inline void jump_coast(estimator_simple_Self *self)
     if (self->timer.coast_gap > 1U) {
         self->timer.coast_gap = 0U;
         self->mode = estimator_simple_MODE_gap;
-        self->fired = 4U; /* estimator_simple modes.coast.transitions.gap */
+        /* estimator_simple modes.coast.transitions.gap */
+        self->fired = estimator_simple_FIRED_coast_gap;
     }
 }
 
+/* Sets a fault where solved numbers belong to another calibration */
 static inline void compare_stamps(estimator_simple_Self *self,
     const volatile estimator_simple_Cal *cal)
 {
@@ -511,6 +535,7 @@ static inline void compare_stamps(estimator_simple_Self *self,
     }
 }
 
+/* Takes the inputs of now, each within its range */
 static inline void latch(estimator_simple_Self *self, const estimator_simple_In *in)
 {
     if (ha_within(in->y_em, -400.0, 2400.0) && ha_within(in->y_w, -50.0, 300.0)
@@ -526,12 +551,14 @@ static inline void latch(estimator_simple_Self *self, const estimator_simple_In 
     }
 }
 
+/* Keeps the inputs of this tick for the next one */
 static inline void remember(estimator_simple_Self *self)
 {
     self->before.T_em = self->latched.T_em;
     self->before.T_br = self->latched.T_br;
 }
 
+/* The first values, from the inputs of the first tick; nothing advances yet */
 static inline void start(estimator_simple_Self *self, const volatile estimator_simple_Cal *cal,
     const estimator_simple_In *in)
 {
@@ -613,6 +640,7 @@ void estimator_simple_Step(estimator_simple_Self *self, const volatile estimator
             correct_coast(self, cal, in);
             break;
         default:
+            /* there is no other */
             break;
         }
     } else {
@@ -629,6 +657,7 @@ void estimator_simple_Step(estimator_simple_Self *self, const volatile estimator
         equations_coast(self);
         break;
     default:
+        /* there is no other */
         break;
     }
     switch (self->mode) {
@@ -642,6 +671,7 @@ void estimator_simple_Step(estimator_simple_Self *self, const volatile estimator
         jump_coast(self);
         break;
     default:
+        /* there is no other */
         break;
     }
     if (self->fired != 0U) {
@@ -656,6 +686,7 @@ void estimator_simple_Step(estimator_simple_Self *self, const volatile estimator
             equations_coast(self);
             break;
         default:
+            /* there is no other */
             break;
         }
     }
@@ -664,6 +695,7 @@ void estimator_simple_Step(estimator_simple_Self *self, const volatile estimator
         update_gap(self);
         break;
     default:
+        /* there is no other */
         break;
     }
     remember(self);

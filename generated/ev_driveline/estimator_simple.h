@@ -18,6 +18,12 @@ enum {
     estimator_simple_MODE_coast = -1
 };
 
+/* Transitions, as `fired` tells them; 0U is none */
+#define estimator_simple_FIRED_drive_gap 1U
+#define estimator_simple_FIRED_gap_drive 2U
+#define estimator_simple_FIRED_gap_coast 3U
+#define estimator_simple_FIRED_coast_gap 4U
+
 /* Latched fault bits */
 #define estimator_simple_FAULT_stale_calibration (1UL << 0)
 #define estimator_simple_FAULT_range_y_em (1UL << 1)
@@ -34,61 +40,61 @@ enum {
 typedef struct {
     double J_em; /* kg*m^2; driveline parameters.J_em; 0.01 to 0.2; motor and gears, at the motor */
     struct {
-        double drive_Phi_theta_d_theta_d;
-        double drive_Phi_theta_d_w_em;
-        double drive_Phi_theta_d_w_w;
-        double drive_Phi_w_em_theta_d;
-        double drive_Phi_w_em_w_em;
-        double drive_Phi_w_em_w_w;
-        double drive_Phi_w_w_theta_d;
-        double drive_Phi_w_w_w_em;
-        double drive_Phi_w_w_w_w;
-        double drive_Gamma_theta_d_T_em;
-        double drive_Gamma_theta_d_T_br;
-        double drive_Gamma_w_em_T_em;
-        double drive_Gamma_w_em_T_br;
-        double drive_Gamma_w_w_T_em;
-        double drive_Gamma_w_w_T_br;
-        double drive_G_theta_d_w_em;
-        double drive_G_theta_d_w_w;
-        double drive_G_w_em_w_em;
-        double drive_G_w_em_w_w;
-        double drive_G_w_w_w_em;
-        double drive_G_w_w_w_w;
-        double drive_L_theta_d_y_em;
-        double drive_L_theta_d_y_w;
-        double drive_L_w_em_y_em;
-        double drive_L_w_em_y_w;
-        double drive_L_w_w_y_em;
-        double drive_L_w_w_y_w;
+        double drive_Phi_theta_d__theta_d;
+        double drive_Phi_theta_d__w_em;
+        double drive_Phi_theta_d__w_w;
+        double drive_Phi_w_em__theta_d;
+        double drive_Phi_w_em__w_em;
+        double drive_Phi_w_em__w_w;
+        double drive_Phi_w_w__theta_d;
+        double drive_Phi_w_w__w_em;
+        double drive_Phi_w_w__w_w;
+        double drive_Gamma_theta_d__T_em;
+        double drive_Gamma_theta_d__T_br;
+        double drive_Gamma_w_em__T_em;
+        double drive_Gamma_w_em__T_br;
+        double drive_Gamma_w_w__T_em;
+        double drive_Gamma_w_w__T_br;
+        double drive_G_theta_d__w_em;
+        double drive_G_theta_d__w_w;
+        double drive_G_w_em__w_em;
+        double drive_G_w_em__w_w;
+        double drive_G_w_w__w_em;
+        double drive_G_w_w__w_w;
+        double drive_L_theta_d__y_em;
+        double drive_L_theta_d__y_w;
+        double drive_L_w_em__y_em;
+        double drive_L_w_em__y_w;
+        double drive_L_w_w__y_em;
+        double drive_L_w_w__y_w;
         double drive_f_w_w;
-        double coast_Phi_theta_d_theta_d;
-        double coast_Phi_theta_d_w_em;
-        double coast_Phi_theta_d_w_w;
-        double coast_Phi_w_em_theta_d;
-        double coast_Phi_w_em_w_em;
-        double coast_Phi_w_em_w_w;
-        double coast_Phi_w_w_theta_d;
-        double coast_Phi_w_w_w_em;
-        double coast_Phi_w_w_w_w;
-        double coast_Gamma_theta_d_T_em;
-        double coast_Gamma_theta_d_T_br;
-        double coast_Gamma_w_em_T_em;
-        double coast_Gamma_w_em_T_br;
-        double coast_Gamma_w_w_T_em;
-        double coast_Gamma_w_w_T_br;
-        double coast_G_theta_d_w_em;
-        double coast_G_theta_d_w_w;
-        double coast_G_w_em_w_em;
-        double coast_G_w_em_w_w;
-        double coast_G_w_w_w_em;
-        double coast_G_w_w_w_w;
-        double coast_L_theta_d_y_em;
-        double coast_L_theta_d_y_w;
-        double coast_L_w_em_y_em;
-        double coast_L_w_em_y_w;
-        double coast_L_w_w_y_em;
-        double coast_L_w_w_y_w;
+        double coast_Phi_theta_d__theta_d;
+        double coast_Phi_theta_d__w_em;
+        double coast_Phi_theta_d__w_w;
+        double coast_Phi_w_em__theta_d;
+        double coast_Phi_w_em__w_em;
+        double coast_Phi_w_em__w_w;
+        double coast_Phi_w_w__theta_d;
+        double coast_Phi_w_w__w_em;
+        double coast_Phi_w_w__w_w;
+        double coast_Gamma_theta_d__T_em;
+        double coast_Gamma_theta_d__T_br;
+        double coast_Gamma_w_em__T_em;
+        double coast_Gamma_w_em__T_br;
+        double coast_Gamma_w_w__T_em;
+        double coast_Gamma_w_w__T_br;
+        double coast_G_theta_d__w_em;
+        double coast_G_theta_d__w_w;
+        double coast_G_w_em__w_em;
+        double coast_G_w_em__w_w;
+        double coast_G_w_w__w_em;
+        double coast_G_w_w__w_w;
+        double coast_L_theta_d__y_em;
+        double coast_L_theta_d__y_w;
+        double coast_L_w_em__y_em;
+        double coast_L_w_em__y_w;
+        double coast_L_w_w__y_em;
+        double coast_L_w_w__y_w;
         double coast_f_w_w;
         double stamp_J_em;
     } solved; /* matrix exponentials and gains for these values, stamps of the values */
@@ -127,33 +133,33 @@ typedef struct {
         double w_em; /* rad/s */
         double w_w; /* rad/s */
         double theta_b; /* rad */
-    } state;
+    } state; /* states */
     struct {
         double y_em; /* rad/s; inputs.y_em within its range */
         double y_w; /* rad/s; inputs.y_w within its range */
         double T_em; /* N*m; inputs.T_em within its range */
         double T_br; /* N*m; inputs.T_br within its range */
         double T_req; /* N*m; inputs.T_req within its range */
-    } latched;
+    } latched; /* inputs of this tick */
     struct {
         double w_d; /* rad/s */
         double T_hs; /* N*m */
         double w_b; /* rad/s */
-    } equation;
+    } equation; /* equations */
     struct {
         double T_em; /* N*m */
         double T_br; /* N*m */
-    } before;
+    } before; /* inputs of the tick before */
     struct {
         double y_em; /* rad/s; y_em minus its prediction, 0 where there is no new value */
         double y_w; /* rad/s; y_w minus its prediction, 0 where there is no new value */
-    } innovation;
+    } innovation; /* measurements less what was predicted */
     struct {
         uint16_t drive_gap; /* ticks that the guard has been true, at most 2 */
         uint16_t gap_drive; /* ticks that the guard has been true, at most 2 */
         uint16_t gap_coast; /* ticks that the guard has been true, at most 2 */
         uint16_t coast_gap; /* ticks that the guard has been true, at most 2 */
-    } timer;
+    } timer; /* ticks that a guard was true */
     int16_t mode; /* active mode */
     uint16_t fired; /* transition of this tick, 0: none */
     bool started; /* the first tick is done */

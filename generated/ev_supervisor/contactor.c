@@ -17,11 +17,13 @@ contactor_CALIBRATION const volatile contactor_Cal contactor_default_cal = {
     .reserved = 0U,
 };
 
+/* Equations of mode open */
 static inline void equations_open(contactor_Self *self)
 {
     self->equation.closed = false; /* contactor modes.open.equations.closed */
 }
 
+/* Transitions of mode open: the first one that is due is taken */
 static inline void jump_open(contactor_Self *self, const contactor_In *in)
 {
     if (!in->command) { /* contactor modes.open.transitions.shut.when */
@@ -34,23 +36,26 @@ static inline void jump_open(contactor_Self *self, const contactor_In *in)
     if (self->timer.open_shut > 4U) {
         self->timer.open_shut = 0U;
         self->mode = contactor_MODE_shut;
-        self->fired = 1U; /* contactor modes.open.transitions.shut */
+        self->fired = contactor_FIRED_open_shut; /* contactor modes.open.transitions.shut */
     }
 }
 
+/* Equations of mode shut */
 static inline void equations_shut(contactor_Self *self)
 {
     self->equation.closed = true; /* contactor modes.shut.equations.closed */
 }
 
+/* Transitions of mode shut: the first one that is due is taken */
 static inline void jump_shut(contactor_Self *self, const contactor_In *in)
 {
     if (!in->command) {
         self->mode = contactor_MODE_open;
-        self->fired = 2U; /* contactor modes.shut.transitions.open */
+        self->fired = contactor_FIRED_shut_open; /* contactor modes.shut.transitions.open */
     }
 }
 
+/* Keeps the inputs of this tick for the next one */
 static inline void remember(void)
 {
     /* nothing to do */
@@ -90,6 +95,7 @@ void contactor_Step(contactor_Self *self, const volatile contactor_Cal *cal,
         equations_shut(self);
         break;
     default:
+        /* there is no other */
         break;
     }
     switch (self->mode) {
@@ -100,6 +106,7 @@ void contactor_Step(contactor_Self *self, const volatile contactor_Cal *cal,
         jump_shut(self, in);
         break;
     default:
+        /* there is no other */
         break;
     }
     if (self->fired != 0U) {
@@ -111,6 +118,7 @@ void contactor_Step(contactor_Self *self, const volatile contactor_Cal *cal,
             equations_shut(self);
             break;
         default:
+            /* there is no other */
             break;
         }
     }

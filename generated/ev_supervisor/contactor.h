@@ -17,6 +17,10 @@ enum {
     contactor_MODE_shut = 1
 };
 
+/* Transitions, as `fired` tells them; 0U is none */
+#define contactor_FIRED_open_shut 1U
+#define contactor_FIRED_shut_open 2U
+
 /* The calibration page: tunable parameters */
 typedef struct {
     uint8_t reserved; /* there are none */
@@ -39,10 +43,10 @@ typedef struct {
 typedef struct {
     struct {
         bool closed; /*  */
-    } equation;
+    } equation; /* equations */
     struct {
         uint16_t open_shut; /* ticks that the guard has been true, at most 5 */
-    } timer;
+    } timer; /* ticks that a guard was true */
     int16_t mode; /* active mode */
     uint16_t fired; /* transition of this tick, 0: none */
     uint32_t faults; /* latched fault bits */

@@ -26,7 +26,7 @@ static const struct {
 /* Points of the axes of tables, SI */
 static const float axis_lim_1[3] = {333.15F, 363.15F, 393.15F}; /* K; supervisor parameters.lim.table.over temp */
 
-/* Kept out of the way of what a step does nearly always */
+/* Cold path, not inlined */
 #if defined(__GNUC__)
 #define RARELY __attribute__((noinline))
 #else
@@ -41,6 +41,7 @@ supervisor_CALIBRATION const volatile supervisor_Cal supervisor_default_cal = {
     .v_creep = 1.6666666F,
 };
 
+/* Inputs one by one: a fault bit for each that is not within its range */
 static RARELY void latch_apart(supervisor_Self *self, const supervisor_In *in)
 {
     if (in->key <= supervisor_key_crank) {
@@ -96,6 +97,7 @@ static RARELY void latch_apart(supervisor_Self *self, const supervisor_In *in)
     }
 }
 
+/* Equations of mode operation_standby */
 static inline void equations_operation_standby(supervisor_Self *self)
 {
     self->equation.main_command = self->discrete.main_cmd; /* supervisor equations.main_command */
@@ -110,6 +112,7 @@ static inline void equations_operation_standby(supervisor_Self *self)
         self->equation.main_closed = true;
         break;
     default:
+        /* there is no other */
         break;
     }
     switch (self->mode_pre) {
@@ -122,10 +125,12 @@ static inline void equations_operation_standby(supervisor_Self *self)
         self->equation.pre_closed = true;
         break;
     default:
+        /* there is no other */
         break;
     }
 }
 
+/* Equations of mode operation_precharge */
 static inline void equations_operation_precharge(supervisor_Self *self)
 {
     self->equation.main_command = self->discrete.main_cmd; /* supervisor equations.main_command */
@@ -140,6 +145,7 @@ static inline void equations_operation_precharge(supervisor_Self *self)
         self->equation.main_closed = true;
         break;
     default:
+        /* there is no other */
         break;
     }
     switch (self->mode_pre) {
@@ -152,10 +158,12 @@ static inline void equations_operation_precharge(supervisor_Self *self)
         self->equation.pre_closed = true;
         break;
     default:
+        /* there is no other */
         break;
     }
 }
 
+/* Equations of mode operation_ready */
 static inline void equations_operation_ready(supervisor_Self *self)
 {
     self->equation.main_command = self->discrete.main_cmd; /* supervisor equations.main_command */
@@ -170,6 +178,7 @@ static inline void equations_operation_ready(supervisor_Self *self)
         self->equation.main_closed = true;
         break;
     default:
+        /* there is no other */
         break;
     }
     switch (self->mode_pre) {
@@ -182,10 +191,12 @@ static inline void equations_operation_ready(supervisor_Self *self)
         self->equation.pre_closed = true;
         break;
     default:
+        /* there is no other */
         break;
     }
 }
 
+/* Equations of mode operation_drive */
 static inline void equations_operation_drive(supervisor_Self *self)
 {
     self->equation.main_command = self->discrete.main_cmd; /* supervisor equations.main_command */
@@ -200,6 +211,7 @@ static inline void equations_operation_drive(supervisor_Self *self)
         self->equation.main_closed = true;
         break;
     default:
+        /* there is no other */
         break;
     }
     switch (self->mode_pre) {
@@ -212,10 +224,12 @@ static inline void equations_operation_drive(supervisor_Self *self)
         self->equation.pre_closed = true;
         break;
     default:
+        /* there is no other */
         break;
     }
 }
 
+/* Equations of mode fault */
 static inline void equations_fault(supervisor_Self *self)
 {
     self->equation.main_command = self->discrete.main_cmd; /* supervisor equations.main_command */
@@ -230,6 +244,7 @@ static inline void equations_fault(supervisor_Self *self)
         self->equation.main_closed = true;
         break;
     default:
+        /* there is no other */
         break;
     }
     switch (self->mode_pre) {
@@ -242,10 +257,12 @@ static inline void equations_fault(supervisor_Self *self)
         self->equation.pre_closed = true;
         break;
     default:
+        /* there is no other */
         break;
     }
 }
 
+/* Updates of mode operation_drive_torque_creep, from the values of this tick */
 static inline void update_operation_drive_torque_creep(const supervisor_Self *self,
     const volatile supervisor_Cal *cal, supervisor_Work *work)
 {
@@ -253,6 +270,7 @@ static inline void update_operation_drive_torque_creep(const supervisor_Self *se
     work->next_T_cmd = self->discrete.share * cal->T_creep;
 }
 
+/* What updates of mode operation_drive_torque_creep found, stored together */
 static inline void store_operation_drive_torque_creep(supervisor_Self *self,
     const supervisor_Work *work)
 {
@@ -264,6 +282,7 @@ static inline void store_operation_drive_torque_creep(supervisor_Self *self,
     }
 }
 
+/* Updates of mode operation_drive_torque_pull, from the values of this tick */
 static inline void update_operation_drive_torque_pull(const supervisor_Self *self,
     supervisor_Work *work)
 {
@@ -271,6 +290,7 @@ static inline void update_operation_drive_torque_pull(const supervisor_Self *sel
     work->next_T_cmd = self->discrete.share * self->latched.T_req;
 }
 
+/* What updates of mode operation_drive_torque_pull found, stored together */
 static inline void store_operation_drive_torque_pull(supervisor_Self *self,
     const supervisor_Work *work)
 {
@@ -282,6 +302,7 @@ static inline void store_operation_drive_torque_pull(supervisor_Self *self,
     }
 }
 
+/* Updates of mode operation_drive_torque_regen, from the values of this tick */
 static inline void update_operation_drive_torque_regen(const supervisor_Self *self,
     const volatile supervisor_Cal *cal, supervisor_Work *work)
 {
@@ -289,6 +310,7 @@ static inline void update_operation_drive_torque_regen(const supervisor_Self *se
     work->next_T_cmd = self->discrete.share * ha_maxf(self->latched.T_req, -cal->T_regen);
 }
 
+/* What updates of mode operation_drive_torque_regen found, stored together */
 static inline void store_operation_drive_torque_regen(supervisor_Self *self,
     const supervisor_Work *work)
 {
@@ -300,12 +322,14 @@ static inline void store_operation_drive_torque_regen(supervisor_Self *self,
     }
 }
 
+/* Updates of mode operation_drive_derating_cool, from the values of this tick */
 static inline void update_operation_drive_derating_cool(supervisor_Work *work)
 {
     /* supervisor modes.operation.modes.drive.regions.derating.modes.cool.update.share */
     work->next_share = 1.0F;
 }
 
+/* What updates of mode operation_drive_derating_cool found, stored together */
 static inline void store_operation_drive_derating_cool(supervisor_Self *self,
     const supervisor_Work *work)
 {
@@ -317,6 +341,7 @@ static inline void store_operation_drive_derating_cool(supervisor_Self *self,
     }
 }
 
+/* Updates of mode operation_drive_derating_warm, from the values of this tick */
 static inline void update_operation_drive_derating_warm(const supervisor_Self *self,
     supervisor_Work *work)
 {
@@ -324,6 +349,7 @@ static inline void update_operation_drive_derating_warm(const supervisor_Self *s
     work->next_share = ha_lookupf(axis_lim_1, 3, constant.lim, self->latched.temp);
 }
 
+/* What updates of mode operation_drive_derating_warm found, stored together */
 static inline void store_operation_drive_derating_warm(supervisor_Self *self,
     const supervisor_Work *work)
 {
@@ -335,6 +361,7 @@ static inline void store_operation_drive_derating_warm(supervisor_Self *self,
     }
 }
 
+/* Counts the ticks that guards of mode operation were true, and its time */
 static inline void count_operation(supervisor_Self *self, const supervisor_In *in,
     const supervisor_Work *work)
 {
@@ -357,25 +384,31 @@ static inline void count_operation(supervisor_Self *self, const supervisor_In *i
     }
 }
 
+/* The transition that mode operation wishes for */
 static inline void choose_operation(const supervisor_Self *self, supervisor_Work *work)
 {
     if (self->timer.operation_fault > 3U) {
-        work->wish_chart = 19U; /* supervisor modes.operation.transitions.fault */
+        /* supervisor modes.operation.transitions.fault */
+        work->wish_chart = supervisor_FIRED_operation_fault;
     } else if (work->event == 2) {
-        work->wish_chart = 20U; /* supervisor modes.operation.transitions.tripped */
+        /* supervisor modes.operation.transitions.tripped */
+        work->wish_chart = supervisor_FIRED_operation_tripped;
     } else {
         /* nothing to do */
     }
 }
 
+/* The transition that mode operation_standby wishes for */
 static inline void choose_operation_standby(const supervisor_Self *self, const supervisor_In *in,
     supervisor_Work *work)
 {
     if ((self->latched.key == supervisor_key_ignition) && in->hv_ok) {
-        work->wish_chart = 1U; /* supervisor modes.operation.modes.standby.transitions.precharge */
+        /* supervisor modes.operation.modes.standby.transitions.precharge */
+        work->wish_chart = supervisor_FIRED_operation_standby_precharge;
     }
 }
 
+/* Counts the ticks that guards of mode operation_precharge were true, and its time */
 static inline void count_operation_precharge(supervisor_Self *self, const supervisor_Work *work)
 {
     if (work->is_first) {
@@ -398,30 +431,38 @@ static inline void count_operation_precharge(supervisor_Self *self, const superv
     }
 }
 
+/* The transition that mode operation_precharge wishes for */
 static inline void choose_operation_precharge(const supervisor_Self *self, supervisor_Work *work)
 {
     if (self->timer.operation_precharge_ready > 5U) {
-        work->wish_chart = 2U; /* supervisor modes.operation.modes.precharge.transitions.ready */
+        /* supervisor modes.operation.modes.precharge.transitions.ready */
+        work->wish_chart = supervisor_FIRED_operation_precharge_ready;
     } else if (self->latched.key == supervisor_key_parked) {
-        work->wish_chart = 3U; /* supervisor modes.operation.modes.precharge.transitions.standby */
+        /* supervisor modes.operation.modes.precharge.transitions.standby */
+        work->wish_chart = supervisor_FIRED_operation_precharge_standby;
     } else if (self->timer.after_1 >= 200U) {
-        work->wish_chart = 4U; /* supervisor modes.operation.modes.precharge.transitions.too_long */
+        /* supervisor modes.operation.modes.precharge.transitions.too_long */
+        work->wish_chart = supervisor_FIRED_operation_precharge_too_long;
     } else {
         /* nothing to do */
     }
 }
 
+/* The transition that mode operation_ready wishes for */
 static inline void choose_operation_ready(const supervisor_Self *self, supervisor_Work *work)
 {
     if (self->equation.main_closed && (self->latched.key == supervisor_key_crank)) {
-        work->wish_chart = 5U; /* supervisor modes.operation.modes.ready.transitions.drive */
+        /* supervisor modes.operation.modes.ready.transitions.drive */
+        work->wish_chart = supervisor_FIRED_operation_ready_drive;
     } else if (self->latched.key == supervisor_key_parked) {
-        work->wish_chart = 6U; /* supervisor modes.operation.modes.ready.transitions.standby */
+        /* supervisor modes.operation.modes.ready.transitions.standby */
+        work->wish_chart = supervisor_FIRED_operation_ready_standby;
     } else {
         /* nothing to do */
     }
 }
 
+/* Counts the ticks that guards of mode operation_drive were true, and its time */
 static inline void count_operation_drive(supervisor_Self *self, supervisor_Work *work)
 {
     if (work->is_first) {
@@ -437,36 +478,41 @@ static inline void count_operation_drive(supervisor_Self *self, supervisor_Work 
     }
 }
 
+/* The transition that mode operation_drive wishes for */
 static inline void choose_operation_drive(supervisor_Work *work)
 {
     if (work->edge_1) {
-        work->wish_chart = 7U; /* supervisor modes.operation.modes.drive.transitions.ready */
+        /* supervisor modes.operation.modes.drive.transitions.ready */
+        work->wish_chart = supervisor_FIRED_operation_drive_ready;
     }
 }
 
+/* The transition that mode operation_drive_torque_creep wishes for */
 static inline void choose_operation_drive_torque_creep(const supervisor_Self *self,
     const volatile supervisor_Cal *cal, supervisor_Work *work)
 {
     if (self->latched.T_req > 1.0F) {
         /* supervisor modes.operation.modes.drive.regions.torque.modes.creep.transitions.pull */
-        work->wish_operation_drive_torque = 9U;
+        work->wish_operation_drive_torque = supervisor_FIRED_operation_drive_torque_creep_pull;
     } else if ((self->latched.T_req < (-1.0F)) && (self->latched.v > cal->v_creep)) {
         /* supervisor modes.operation.modes.drive.regions.torque.modes.creep.transitions.regen */
-        work->wish_operation_drive_torque = 10U;
+        work->wish_operation_drive_torque = supervisor_FIRED_operation_drive_torque_creep_regen;
     } else {
         /* nothing to do */
     }
 }
 
+/* The transition that mode operation_drive_torque_pull wishes for */
 static inline void choose_operation_drive_torque_pull(const supervisor_Self *self,
     supervisor_Work *work)
 {
     if (self->latched.T_req <= 0.0F) {
         /* supervisor modes.operation.modes.drive.regions.torque.modes.pull.transitions.creep */
-        work->wish_operation_drive_torque = 11U;
+        work->wish_operation_drive_torque = supervisor_FIRED_operation_drive_torque_pull_creep;
     }
 }
 
+/* Counts the ticks that guards of mode operation_drive_torque_regen were true, and its time */
 static inline void count_operation_drive_torque_regen(supervisor_Self *self,
     const volatile supervisor_Cal *cal, const supervisor_Work *work)
 {
@@ -490,15 +536,17 @@ static inline void count_operation_drive_torque_regen(supervisor_Self *self,
     }
 }
 
+/* The transition that mode operation_drive_torque_regen wishes for */
 static inline void choose_operation_drive_torque_regen(const supervisor_Self *self,
     supervisor_Work *work)
 {
     if (self->timer.operation_drive_torque_regen_creep > 2U) {
         /* supervisor modes.operation.modes.drive.regions.torque.modes.regen.transitions.creep */
-        work->wish_operation_drive_torque = 12U;
+        work->wish_operation_drive_torque = supervisor_FIRED_operation_drive_torque_regen_creep;
     }
 }
 
+/* Counts the ticks that guards of mode operation_drive_derating_cool were true, and its time */
 static inline void count_operation_drive_derating_cool(supervisor_Self *self,
     const supervisor_Work *work)
 {
@@ -522,15 +570,17 @@ static inline void count_operation_drive_derating_cool(supervisor_Self *self,
     }
 }
 
+/* The transition that mode operation_drive_derating_cool wishes for */
 static inline void choose_operation_drive_derating_cool(const supervisor_Self *self,
     supervisor_Work *work)
 {
     if (self->timer.operation_drive_derating_cool_warm > 100U) {
         /* supervisor modes.operation.modes.drive.regions.derating.modes.cool.transitions.warm */
-        work->wish_operation_drive_derating = 13U;
+        work->wish_operation_drive_derating = supervisor_FIRED_operation_drive_derating_cool_warm;
     }
 }
 
+/* Counts the ticks that guards of mode operation_drive_derating_warm were true, and its time */
 static inline void count_operation_drive_derating_warm(supervisor_Self *self,
     const supervisor_Work *work)
 {
@@ -554,22 +604,26 @@ static inline void count_operation_drive_derating_warm(supervisor_Self *self,
     }
 }
 
+/* The transition that mode operation_drive_derating_warm wishes for */
 static inline void choose_operation_drive_derating_warm(const supervisor_Self *self,
     supervisor_Work *work)
 {
     if (self->timer.operation_drive_derating_warm_cool > 500U) {
         /* supervisor modes.operation.modes.drive.regions.derating.modes.warm.transitions.cool */
-        work->wish_operation_drive_derating = 14U;
+        work->wish_operation_drive_derating = supervisor_FIRED_operation_drive_derating_warm_cool;
     }
 }
 
+/* The transition that mode fault wishes for */
 static inline void choose_fault(const supervisor_In *in, supervisor_Work *work)
 {
     if ((work->event == 1) && in->hv_ok) {
-        work->wish_chart = 8U; /* supervisor modes.fault.transitions.operation */
+        /* supervisor modes.fault.transitions.operation */
+        work->wish_chart = supervisor_FIRED_fault_operation;
     }
 }
 
+/* Counts the ticks that guards of mode main_open were true, and its time */
 static inline void count_main_open(supervisor_Self *self, const supervisor_Work *work)
 {
     if (work->is_first) {
@@ -592,20 +646,25 @@ static inline void count_main_open(supervisor_Self *self, const supervisor_Work 
     }
 }
 
+/* The transition that mode main_open wishes for */
 static inline void choose_main_open(const supervisor_Self *self, supervisor_Work *work)
 {
     if (self->timer.main_open_shut > 4U) {
-        work->wish_main = 15U; /* supervisor regions.main.modes.open.transitions.shut */
+        /* supervisor regions.main.modes.open.transitions.shut */
+        work->wish_main = supervisor_FIRED_main_open_shut;
     }
 }
 
+/* The transition that mode main_shut wishes for */
 static inline void choose_main_shut(const supervisor_Self *self, supervisor_Work *work)
 {
     if (!self->equation.main_command) {
-        work->wish_main = 16U; /* supervisor regions.main.modes.shut.transitions.open */
+        /* supervisor regions.main.modes.shut.transitions.open */
+        work->wish_main = supervisor_FIRED_main_shut_open;
     }
 }
 
+/* Counts the ticks that guards of mode pre_open were true, and its time */
 static inline void count_pre_open(supervisor_Self *self, const supervisor_Work *work)
 {
     if (work->is_first) {
@@ -628,20 +687,25 @@ static inline void count_pre_open(supervisor_Self *self, const supervisor_Work *
     }
 }
 
+/* The transition that mode pre_open wishes for */
 static inline void choose_pre_open(const supervisor_Self *self, supervisor_Work *work)
 {
     if (self->timer.pre_open_shut > 2U) {
-        work->wish_pre = 17U; /* supervisor regions.pre.modes.open.transitions.shut */
+        /* supervisor regions.pre.modes.open.transitions.shut */
+        work->wish_pre = supervisor_FIRED_pre_open_shut;
     }
 }
 
+/* The transition that mode pre_shut wishes for */
 static inline void choose_pre_shut(const supervisor_Self *self, supervisor_Work *work)
 {
     if (!self->equation.pre_command) {
-        work->wish_pre = 18U; /* supervisor regions.pre.modes.shut.transitions.open */
+        /* supervisor regions.pre.modes.shut.transitions.open */
+        work->wish_pre = supervisor_FIRED_pre_shut_open;
     }
 }
 
+/* The transitions of one micro-step */
 static inline void select_transitions(supervisor_Self *self, const volatile supervisor_Cal *cal,
     const supervisor_In *in, supervisor_Work *work)
 {
@@ -685,6 +749,7 @@ static inline void select_transitions(supervisor_Self *self, const volatile supe
         choose_fault(in, work);
         break;
     default:
+        /* there is no other */
         break;
     }
     switch (self->mode_operation_drive_torque) {
@@ -699,6 +764,7 @@ static inline void select_transitions(supervisor_Self *self, const volatile supe
         choose_operation_drive_torque_regen(self, work);
         break;
     default:
+        /* there is no other */
         break;
     }
     switch (self->mode_operation_drive_derating) {
@@ -711,6 +777,7 @@ static inline void select_transitions(supervisor_Self *self, const volatile supe
         choose_operation_drive_derating_warm(self, work);
         break;
     default:
+        /* there is no other */
         break;
     }
     switch (self->mode_main) {
@@ -722,6 +789,7 @@ static inline void select_transitions(supervisor_Self *self, const volatile supe
         choose_main_shut(self, work);
         break;
     default:
+        /* there is no other */
         break;
     }
     switch (self->mode_pre) {
@@ -733,10 +801,12 @@ static inline void select_transitions(supervisor_Self *self, const volatile supe
         choose_pre_shut(self, work);
         break;
     default:
+        /* there is no other */
         break;
     }
 }
 
+/* Decides between the wishes of regions: chart */
 static inline void hear_chart(supervisor_Work *work)
 {
     work->heard_chart = true;
@@ -763,6 +833,7 @@ static inline void hear_chart(supervisor_Work *work)
     }
 }
 
+/* Decides between the wishes of regions: operation_drive_torque */
 static inline void hear_operation_drive_torque(supervisor_Work *work)
 {
     work->heard_operation_drive_torque = true;
@@ -781,6 +852,7 @@ static inline void hear_operation_drive_torque(supervisor_Work *work)
     }
 }
 
+/* Decides between the wishes of regions: operation_drive_derating */
 static inline void hear_operation_drive_derating(supervisor_Work *work)
 {
     work->heard_operation_drive_derating = true;
@@ -799,18 +871,21 @@ static inline void hear_operation_drive_derating(supervisor_Work *work)
     }
 }
 
+/* Decides between the wishes of regions: main */
 static inline void hear_main(supervisor_Work *work)
 {
     work->heard_main = true;
     work->takes_main = work->wish_main;
 }
 
+/* Decides between the wishes of regions: pre */
 static inline void hear_pre(supervisor_Work *work)
 {
     work->heard_pre = true;
     work->takes_pre = work->wish_pre;
 }
 
+/* Decides between the wishes of regions */
 static inline void hear(const supervisor_Self *self, supervisor_Work *work)
 {
     work->takes_chart = 0U;
@@ -818,47 +893,48 @@ static inline void hear(const supervisor_Self *self, supervisor_Work *work)
     work->low_chart = 1;
     work->high_chart = 0;
     switch (work->wish_chart) {
-    case 19U:
+    case supervisor_FIRED_operation_fault:
         work->low_chart = 1;
         work->high_chart = 14;
         break;
-    case 20U:
+    case supervisor_FIRED_operation_tripped:
         work->low_chart = 1;
         work->high_chart = 14;
         break;
-    case 1U:
+    case supervisor_FIRED_operation_standby_precharge:
         work->low_chart = 2;
         work->high_chart = 13;
         break;
-    case 2U:
+    case supervisor_FIRED_operation_precharge_ready:
         work->low_chart = 2;
         work->high_chart = 13;
         break;
-    case 3U:
+    case supervisor_FIRED_operation_precharge_standby:
         work->low_chart = 2;
         work->high_chart = 13;
         break;
-    case 4U:
+    case supervisor_FIRED_operation_precharge_too_long:
         work->low_chart = 2;
         work->high_chart = 13;
         break;
-    case 5U:
+    case supervisor_FIRED_operation_ready_drive:
         work->low_chart = 2;
         work->high_chart = 13;
         break;
-    case 6U:
+    case supervisor_FIRED_operation_ready_standby:
         work->low_chart = 2;
         work->high_chart = 13;
         break;
-    case 7U:
+    case supervisor_FIRED_operation_drive_ready:
         work->low_chart = 2;
         work->high_chart = 13;
         break;
-    case 8U:
+    case supervisor_FIRED_fault_operation:
         work->low_chart = 1;
         work->high_chart = 14;
         break;
     default:
+        /* there is no other */
         break;
     }
     work->takes_operation_drive_torque = 0U;
@@ -866,23 +942,24 @@ static inline void hear(const supervisor_Self *self, supervisor_Work *work)
     work->low_operation_drive_torque = 1;
     work->high_operation_drive_torque = 0;
     switch (work->wish_operation_drive_torque) {
-    case 9U:
+    case supervisor_FIRED_operation_drive_torque_creep_pull:
         work->low_operation_drive_torque = 7;
         work->high_operation_drive_torque = 10;
         break;
-    case 10U:
+    case supervisor_FIRED_operation_drive_torque_creep_regen:
         work->low_operation_drive_torque = 7;
         work->high_operation_drive_torque = 10;
         break;
-    case 11U:
+    case supervisor_FIRED_operation_drive_torque_pull_creep:
         work->low_operation_drive_torque = 7;
         work->high_operation_drive_torque = 10;
         break;
-    case 12U:
+    case supervisor_FIRED_operation_drive_torque_regen_creep:
         work->low_operation_drive_torque = 7;
         work->high_operation_drive_torque = 10;
         break;
     default:
+        /* there is no other */
         break;
     }
     work->takes_operation_drive_derating = 0U;
@@ -890,15 +967,16 @@ static inline void hear(const supervisor_Self *self, supervisor_Work *work)
     work->low_operation_drive_derating = 1;
     work->high_operation_drive_derating = 0;
     switch (work->wish_operation_drive_derating) {
-    case 13U:
+    case supervisor_FIRED_operation_drive_derating_cool_warm:
         work->low_operation_drive_derating = 11;
         work->high_operation_drive_derating = 13;
         break;
-    case 14U:
+    case supervisor_FIRED_operation_drive_derating_warm_cool:
         work->low_operation_drive_derating = 11;
         work->high_operation_drive_derating = 13;
         break;
     default:
+        /* there is no other */
         break;
     }
     work->takes_main = 0U;
@@ -906,15 +984,16 @@ static inline void hear(const supervisor_Self *self, supervisor_Work *work)
     work->low_main = 1;
     work->high_main = 0;
     switch (work->wish_main) {
-    case 15U:
+    case supervisor_FIRED_main_open_shut:
         work->low_main = 15;
         work->high_main = 17;
         break;
-    case 16U:
+    case supervisor_FIRED_main_shut_open:
         work->low_main = 15;
         work->high_main = 17;
         break;
     default:
+        /* there is no other */
         break;
     }
     work->takes_pre = 0U;
@@ -922,15 +1001,16 @@ static inline void hear(const supervisor_Self *self, supervisor_Work *work)
     work->low_pre = 1;
     work->high_pre = 0;
     switch (work->wish_pre) {
-    case 17U:
+    case supervisor_FIRED_pre_open_shut:
         work->low_pre = 18;
         work->high_pre = 20;
         break;
-    case 18U:
+    case supervisor_FIRED_pre_shut_open:
         work->low_pre = 18;
         work->high_pre = 20;
         break;
     default:
+        /* there is no other */
         break;
     }
     switch (self->mode) {
@@ -971,6 +1051,7 @@ static inline void hear(const supervisor_Self *self, supervisor_Work *work)
         }
         break;
     default:
+        /* there is no other */
         break;
     }
     switch (self->mode_operation_drive_torque) {
@@ -1026,6 +1107,7 @@ static inline void hear(const supervisor_Self *self, supervisor_Work *work)
         }
         break;
     default:
+        /* there is no other */
         break;
     }
     switch (self->mode_operation_drive_derating) {
@@ -1064,6 +1146,7 @@ static inline void hear(const supervisor_Self *self, supervisor_Work *work)
         }
         break;
     default:
+        /* there is no other */
         break;
     }
     switch (self->mode_main) {
@@ -1086,6 +1169,7 @@ static inline void hear(const supervisor_Self *self, supervisor_Work *work)
         }
         break;
     default:
+        /* there is no other */
         break;
     }
     switch (self->mode_pre) {
@@ -1108,10 +1192,12 @@ static inline void hear(const supervisor_Self *self, supervisor_Work *work)
         }
         break;
     default:
+        /* there is no other */
         break;
     }
 }
 
+/* Leaves region operation_drive_torque with all that is active in it */
 static inline void quit_operation_drive_torque(supervisor_Self *self)
 {
     switch (self->mode_operation_drive_torque) {
@@ -1126,10 +1212,12 @@ static inline void quit_operation_drive_torque(supervisor_Self *self)
         self->left_operation_drive_torque = self->mode_operation_drive_torque;
         break;
     default:
+        /* there is no other */
         break;
     }
 }
 
+/* Leaves region operation_drive_derating with all that is active in it */
 static inline void quit_operation_drive_derating(supervisor_Self *self)
 {
     switch (self->mode_operation_drive_derating) {
@@ -1142,10 +1230,12 @@ static inline void quit_operation_drive_derating(supervisor_Self *self)
         self->left_operation_drive_derating = self->mode_operation_drive_derating;
         break;
     default:
+        /* there is no other */
         break;
     }
 }
 
+/* What is forgotten where chart is left */
 static inline void leave_chart(supervisor_Self *self, supervisor_Work *work)
 {
     switch (self->mode) {
@@ -1168,10 +1258,12 @@ static inline void leave_chart(supervisor_Self *self, supervisor_Work *work)
         self->timer.operation_fault = 0U;
         break;
     default:
+        /* there is no other */
         break;
     }
 }
 
+/* What is forgotten where operation is left */
 static inline void leave_operation(supervisor_Self *self, supervisor_Work *work)
 {
     switch (self->mode) {
@@ -1186,10 +1278,12 @@ static inline void leave_operation(supervisor_Self *self, supervisor_Work *work)
         self->opposite_1 = false;
         break;
     default:
+        /* there is no other */
         break;
     }
 }
 
+/* What is forgotten where operation_drive_torque is left */
 static inline void leave_operation_drive_torque(supervisor_Self *self)
 {
     switch (self->mode_operation_drive_torque) {
@@ -1197,10 +1291,12 @@ static inline void leave_operation_drive_torque(supervisor_Self *self)
         self->timer.operation_drive_torque_regen_creep = 0U;
         break;
     default:
+        /* there is no other */
         break;
     }
 }
 
+/* What is forgotten where operation_drive_derating is left */
 static inline void leave_operation_drive_derating(supervisor_Self *self)
 {
     switch (self->mode_operation_drive_derating) {
@@ -1211,10 +1307,12 @@ static inline void leave_operation_drive_derating(supervisor_Self *self)
         self->timer.operation_drive_derating_warm_cool = 0U;
         break;
     default:
+        /* there is no other */
         break;
     }
 }
 
+/* What is forgotten where main is left */
 static inline void leave_main(supervisor_Self *self)
 {
     switch (self->mode_main) {
@@ -1222,10 +1320,12 @@ static inline void leave_main(supervisor_Self *self)
         self->timer.main_open_shut = 0U;
         break;
     default:
+        /* there is no other */
         break;
     }
 }
 
+/* What is forgotten where pre is left */
 static inline void leave_pre(supervisor_Self *self)
 {
     switch (self->mode_pre) {
@@ -1233,10 +1333,12 @@ static inline void leave_pre(supervisor_Self *self)
         self->timer.pre_open_shut = 0U;
         break;
     default:
+        /* there is no other */
         break;
     }
 }
 
+/* Leaves, resets and enters what the chosen transitions say */
 static inline void commit(supervisor_Self *self, supervisor_Work *work)
 {
     work->exit_operation_drive = false;
@@ -1252,37 +1354,38 @@ static inline void commit(supervisor_Self *self, supervisor_Work *work)
         }
     }
     switch (work->takes_chart) {
-    case 19U:
+    case supervisor_FIRED_operation_fault:
         leave_chart(self, work);
         break;
-    case 20U:
+    case supervisor_FIRED_operation_tripped:
         leave_chart(self, work);
         break;
-    case 1U:
+    case supervisor_FIRED_operation_standby_precharge:
         leave_operation(self, work);
         break;
-    case 2U:
+    case supervisor_FIRED_operation_precharge_ready:
         leave_operation(self, work);
         break;
-    case 3U:
+    case supervisor_FIRED_operation_precharge_standby:
         leave_operation(self, work);
         break;
-    case 4U:
+    case supervisor_FIRED_operation_precharge_too_long:
         leave_operation(self, work);
         break;
-    case 5U:
+    case supervisor_FIRED_operation_ready_drive:
         leave_operation(self, work);
         break;
-    case 6U:
+    case supervisor_FIRED_operation_ready_standby:
         leave_operation(self, work);
         break;
-    case 7U:
+    case supervisor_FIRED_operation_drive_ready:
         leave_operation(self, work);
         break;
-    case 8U:
+    case supervisor_FIRED_fault_operation:
         leave_chart(self, work);
         break;
     default:
+        /* there is no other */
         break;
     }
     if (work->takes_operation_drive_torque != 0U) {
@@ -1293,19 +1396,20 @@ static inline void commit(supervisor_Self *self, supervisor_Work *work)
         }
     }
     switch (work->takes_operation_drive_torque) {
-    case 9U:
+    case supervisor_FIRED_operation_drive_torque_creep_pull:
         leave_operation_drive_torque(self);
         break;
-    case 10U:
+    case supervisor_FIRED_operation_drive_torque_creep_regen:
         leave_operation_drive_torque(self);
         break;
-    case 11U:
+    case supervisor_FIRED_operation_drive_torque_pull_creep:
         leave_operation_drive_torque(self);
         break;
-    case 12U:
+    case supervisor_FIRED_operation_drive_torque_regen_creep:
         leave_operation_drive_torque(self);
         break;
     default:
+        /* there is no other */
         break;
     }
     if (work->takes_operation_drive_derating != 0U) {
@@ -1316,13 +1420,14 @@ static inline void commit(supervisor_Self *self, supervisor_Work *work)
         }
     }
     switch (work->takes_operation_drive_derating) {
-    case 13U:
+    case supervisor_FIRED_operation_drive_derating_cool_warm:
         leave_operation_drive_derating(self);
         break;
-    case 14U:
+    case supervisor_FIRED_operation_drive_derating_warm_cool:
         leave_operation_drive_derating(self);
         break;
     default:
+        /* there is no other */
         break;
     }
     if (work->takes_main != 0U) {
@@ -1333,13 +1438,14 @@ static inline void commit(supervisor_Self *self, supervisor_Work *work)
         }
     }
     switch (work->takes_main) {
-    case 15U:
+    case supervisor_FIRED_main_open_shut:
         leave_main(self);
         break;
-    case 16U:
+    case supervisor_FIRED_main_shut_open:
         leave_main(self);
         break;
     default:
+        /* there is no other */
         break;
     }
     if (work->takes_pre != 0U) {
@@ -1350,13 +1456,14 @@ static inline void commit(supervisor_Self *self, supervisor_Work *work)
         }
     }
     switch (work->takes_pre) {
-    case 17U:
+    case supervisor_FIRED_pre_open_shut:
         leave_pre(self);
         break;
-    case 18U:
+    case supervisor_FIRED_pre_shut_open:
         leave_pre(self);
         break;
     default:
+        /* there is no other */
         break;
     }
     if (work->exit_operation_drive) {
@@ -1371,7 +1478,7 @@ static inline void commit(supervisor_Self *self, supervisor_Work *work)
         }
     }
     switch (work->takes_chart) {
-    case 4U:
+    case supervisor_FIRED_operation_precharge_too_long:
         if (work->tail < 5) {
             work->queue[work->tail] = 2;
             work->tail = work->tail + 1;
@@ -1380,48 +1487,49 @@ static inline void commit(supervisor_Self *self, supervisor_Work *work)
         }
         break;
     default:
+        /* there is no other */
         break;
     }
     switch (work->takes_chart) {
-    case 19U:
+    case supervisor_FIRED_operation_fault:
         self->mode_operation_drive_torque = supervisor_operation_drive_torque_inactive;
         self->mode_operation_drive_derating = supervisor_operation_drive_derating_inactive;
         self->mode = supervisor_MODE_fault;
         work->enter_fault = true;
         break;
-    case 20U:
+    case supervisor_FIRED_operation_tripped:
         self->mode_operation_drive_torque = supervisor_operation_drive_torque_inactive;
         self->mode_operation_drive_derating = supervisor_operation_drive_derating_inactive;
         self->mode = supervisor_MODE_fault;
         work->enter_fault = true;
         break;
-    case 1U:
+    case supervisor_FIRED_operation_standby_precharge:
         self->mode_operation_drive_torque = supervisor_operation_drive_torque_inactive;
         self->mode_operation_drive_derating = supervisor_operation_drive_derating_inactive;
         self->mode = supervisor_MODE_operation_precharge;
         work->enter_operation_precharge = true;
         self->timer.after_1 = 0U;
         break;
-    case 2U:
+    case supervisor_FIRED_operation_precharge_ready:
         self->mode_operation_drive_torque = supervisor_operation_drive_torque_inactive;
         self->mode_operation_drive_derating = supervisor_operation_drive_derating_inactive;
         self->mode = supervisor_MODE_operation_ready;
         work->enter_operation_ready = true;
         break;
-    case 3U:
+    case supervisor_FIRED_operation_precharge_standby:
         self->mode_operation_drive_torque = supervisor_operation_drive_torque_inactive;
         self->mode_operation_drive_derating = supervisor_operation_drive_derating_inactive;
         self->mode = supervisor_MODE_operation_standby;
         work->enter_operation_standby = true;
         break;
-    case 4U:
+    case supervisor_FIRED_operation_precharge_too_long:
         self->mode_operation_drive_torque = supervisor_operation_drive_torque_inactive;
         self->mode_operation_drive_derating = supervisor_operation_drive_derating_inactive;
         self->mode = supervisor_MODE_operation_precharge;
         work->enter_operation_precharge = true;
         self->timer.after_1 = 0U;
         break;
-    case 5U:
+    case supervisor_FIRED_operation_ready_drive:
         self->mode_operation_drive_torque = supervisor_operation_drive_torque_inactive;
         self->mode_operation_drive_derating = supervisor_operation_drive_derating_inactive;
         self->mode = supervisor_MODE_operation_drive;
@@ -1443,6 +1551,7 @@ static inline void commit(supervisor_Self *self, supervisor_Work *work)
                     self->mode_operation_drive_torque = supervisor_operation_drive_torque_regen;
                     break;
                 default:
+                    /* there is no other */
                     break;
                 }
             }
@@ -1457,76 +1566,82 @@ static inline void commit(supervisor_Self *self, supervisor_Work *work)
                     self->mode_operation_drive_derating = supervisor_operation_drive_derating_warm;
                     break;
                 default:
+                    /* there is no other */
                     break;
                 }
             }
         }
         break;
-    case 6U:
+    case supervisor_FIRED_operation_ready_standby:
         self->mode_operation_drive_torque = supervisor_operation_drive_torque_inactive;
         self->mode_operation_drive_derating = supervisor_operation_drive_derating_inactive;
         self->mode = supervisor_MODE_operation_standby;
         work->enter_operation_standby = true;
         break;
-    case 7U:
+    case supervisor_FIRED_operation_drive_ready:
         self->mode_operation_drive_torque = supervisor_operation_drive_torque_inactive;
         self->mode_operation_drive_derating = supervisor_operation_drive_derating_inactive;
         self->mode = supervisor_MODE_operation_ready;
         work->enter_operation_ready = true;
         break;
-    case 8U:
+    case supervisor_FIRED_fault_operation:
         self->mode_operation_drive_torque = supervisor_operation_drive_torque_inactive;
         self->mode_operation_drive_derating = supervisor_operation_drive_derating_inactive;
         self->mode = supervisor_MODE_operation_standby;
         work->enter_operation_standby = true;
         break;
     default:
+        /* there is no other */
         break;
     }
     switch (work->takes_operation_drive_torque) {
-    case 9U:
+    case supervisor_FIRED_operation_drive_torque_creep_pull:
         self->mode_operation_drive_torque = supervisor_operation_drive_torque_pull;
         break;
-    case 10U:
+    case supervisor_FIRED_operation_drive_torque_creep_regen:
         self->mode_operation_drive_torque = supervisor_operation_drive_torque_regen;
         break;
-    case 11U:
+    case supervisor_FIRED_operation_drive_torque_pull_creep:
         self->mode_operation_drive_torque = supervisor_operation_drive_torque_creep;
         break;
-    case 12U:
+    case supervisor_FIRED_operation_drive_torque_regen_creep:
         self->mode_operation_drive_torque = supervisor_operation_drive_torque_creep;
         break;
     default:
+        /* there is no other */
         break;
     }
     switch (work->takes_operation_drive_derating) {
-    case 13U:
+    case supervisor_FIRED_operation_drive_derating_cool_warm:
         self->mode_operation_drive_derating = supervisor_operation_drive_derating_warm;
         break;
-    case 14U:
+    case supervisor_FIRED_operation_drive_derating_warm_cool:
         self->mode_operation_drive_derating = supervisor_operation_drive_derating_cool;
         break;
     default:
+        /* there is no other */
         break;
     }
     switch (work->takes_main) {
-    case 15U:
+    case supervisor_FIRED_main_open_shut:
         self->mode_main = supervisor_main_shut;
         break;
-    case 16U:
+    case supervisor_FIRED_main_shut_open:
         self->mode_main = supervisor_main_open;
         break;
     default:
+        /* there is no other */
         break;
     }
     switch (work->takes_pre) {
-    case 17U:
+    case supervisor_FIRED_pre_open_shut:
         self->mode_pre = supervisor_pre_shut;
         break;
-    case 18U:
+    case supervisor_FIRED_pre_shut_open:
         self->mode_pre = supervisor_pre_open;
         break;
     default:
+        /* there is no other */
         break;
     }
     if (work->enter_fault) {
@@ -1597,10 +1712,12 @@ static inline void commit(supervisor_Self *self, supervisor_Work *work)
         equations_fault(self);
         break;
     default:
+        /* there is no other */
         break;
     }
 }
 
+/* One micro-step: choose, leave, reset, enter */
 static inline void micro_step(supervisor_Self *self, const volatile supervisor_Cal *cal,
     const supervisor_In *in, supervisor_Work *work)
 {
@@ -1636,6 +1753,7 @@ static inline void micro_step(supervisor_Self *self, const volatile supervisor_C
     work->is_first = false;
 }
 
+/* Transitions: the first one that is due is taken */
 static inline void jump(supervisor_Self *self, const volatile supervisor_Cal *cal,
     const supervisor_In *in, supervisor_Work *work)
 {
@@ -1655,11 +1773,15 @@ static inline void jump(supervisor_Self *self, const volatile supervisor_Cal *ca
     work->is_busy = true;
     work->is_first = true;
     work->is_over = false;
-    for (int32_t turn = 0; (turn < 11) && (work->is_busy); turn++) {
+    for (int32_t turn = 0; turn < 11; turn++) {
+        if (!work->is_busy) {
+            break;
+        }
         micro_step(self, cal, in, work);
     }
 }
 
+/* Takes the inputs of now, each within its range */
 static inline void latch(supervisor_Self *self, const supervisor_In *in)
 {
     if ((in->key <= supervisor_key_crank) && ha_withinf(in->U_dc, 0.0F, 500.0F)
@@ -1677,11 +1799,13 @@ static inline void latch(supervisor_Self *self, const supervisor_In *in)
     }
 }
 
+/* Keeps the inputs of this tick for the next one */
 static inline void remember(void)
 {
     /* nothing to do */
 }
 
+/* The truth tables */
 static inline void decide(supervisor_Self *self, const supervisor_In *in, supervisor_Work *work)
 {
     /* supervisor tables.permission.if.ready_key */
@@ -1701,6 +1825,7 @@ static inline void decide(supervisor_Self *self, const supervisor_In *in, superv
     self->discrete.permit = work->decided_permit;
 }
 
+/* Keeps the values that are read later: delays, and ticks that are looked back to */
 static inline void keep(supervisor_Self *self)
 {
     /* supervisor modes.operation.modes.precharge */
@@ -1713,6 +1838,7 @@ static inline void keep(supervisor_Self *self)
     }
 }
 
+/* The first values, from the inputs of the first tick; nothing advances yet */
 static inline void start(supervisor_Self *self, supervisor_Work *work)
 {
     const float new_T_cmd = 0.0F; /* supervisor discrete.T_cmd.initial */
@@ -1824,6 +1950,7 @@ void supervisor_Step(supervisor_Self *self, const volatile supervisor_Cal *cal,
         equations_fault(self);
         break;
     default:
+        /* there is no other */
         break;
     }
     decide(self, in, work);
@@ -1840,6 +1967,7 @@ void supervisor_Step(supervisor_Self *self, const volatile supervisor_Cal *cal,
         update_operation_drive_torque_regen(self, cal, work);
         break;
     default:
+        /* there is no other */
         break;
     }
     switch (self->mode_operation_drive_derating) {
@@ -1850,6 +1978,7 @@ void supervisor_Step(supervisor_Self *self, const volatile supervisor_Cal *cal,
         update_operation_drive_derating_warm(self, work);
         break;
     default:
+        /* there is no other */
         break;
     }
     switch (self->mode_operation_drive_torque) {
@@ -1863,6 +1992,7 @@ void supervisor_Step(supervisor_Self *self, const volatile supervisor_Cal *cal,
         store_operation_drive_torque_regen(self, work);
         break;
     default:
+        /* there is no other */
         break;
     }
     switch (self->mode_operation_drive_derating) {
@@ -1873,6 +2003,7 @@ void supervisor_Step(supervisor_Self *self, const volatile supervisor_Cal *cal,
         store_operation_drive_derating_warm(self, work);
         break;
     default:
+        /* there is no other */
         break;
     }
     remember();

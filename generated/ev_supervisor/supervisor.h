@@ -20,6 +20,28 @@ enum {
     supervisor_MODE_fault = 4
 };
 
+/* Transitions, as `fired` tells them; 0U is none */
+#define supervisor_FIRED_operation_standby_precharge 1U
+#define supervisor_FIRED_operation_precharge_ready 2U
+#define supervisor_FIRED_operation_precharge_standby 3U
+#define supervisor_FIRED_operation_precharge_too_long 4U
+#define supervisor_FIRED_operation_ready_drive 5U
+#define supervisor_FIRED_operation_ready_standby 6U
+#define supervisor_FIRED_operation_drive_ready 7U
+#define supervisor_FIRED_fault_operation 8U
+#define supervisor_FIRED_operation_drive_torque_creep_pull 9U
+#define supervisor_FIRED_operation_drive_torque_creep_regen 10U
+#define supervisor_FIRED_operation_drive_torque_pull_creep 11U
+#define supervisor_FIRED_operation_drive_torque_regen_creep 12U
+#define supervisor_FIRED_operation_drive_derating_cool_warm 13U
+#define supervisor_FIRED_operation_drive_derating_warm_cool 14U
+#define supervisor_FIRED_main_open_shut 15U
+#define supervisor_FIRED_main_shut_open 16U
+#define supervisor_FIRED_pre_open_shut 17U
+#define supervisor_FIRED_pre_shut_open 18U
+#define supervisor_FIRED_operation_fault 19U
+#define supervisor_FIRED_operation_tripped 20U
+
 /* Modes of region operation.drive.torque */
 enum {
     supervisor_operation_drive_torque_creep = 0,
@@ -104,53 +126,53 @@ typedef struct {
 
 /* Values that live within one step */
 typedef struct {
-    bool level_1;
-    bool edge_1;
-    uint16_t wish_chart;
-    uint16_t takes_chart;
-    int32_t low_chart;
-    int32_t high_chart;
-    bool heard_chart;
-    uint16_t wish_operation_drive_torque;
-    uint16_t takes_operation_drive_torque;
-    int32_t low_operation_drive_torque;
-    int32_t high_operation_drive_torque;
-    bool heard_operation_drive_torque;
-    uint16_t wish_operation_drive_derating;
-    uint16_t takes_operation_drive_derating;
-    int32_t low_operation_drive_derating;
-    int32_t high_operation_drive_derating;
-    bool heard_operation_drive_derating;
-    uint16_t wish_main;
-    uint16_t takes_main;
-    int32_t low_main;
-    int32_t high_main;
-    bool heard_main;
-    uint16_t wish_pre;
-    uint16_t takes_pre;
-    int32_t low_pre;
-    int32_t high_pre;
-    bool heard_pre;
-    bool keeps;
-    bool is_first;
-    bool is_over;
-    int32_t head;
-    int32_t tail;
-    int32_t event;
-    int32_t queue[5];
-    bool enter_operation_standby;
-    bool enter_operation_precharge;
-    bool enter_operation_ready;
-    bool exit_operation_drive;
-    bool enter_fault;
-    int32_t steps;
-    bool is_busy;
-    float reset_T_cmd;
-    bool reset_main_cmd;
-    bool reset_pre_cmd;
-    float next_T_cmd;
-    float next_share;
-    bool decided_permit;
+    bool level_1; /*  */
+    bool edge_1; /*  */
+    uint16_t wish_chart; /*  */
+    uint16_t takes_chart; /*  */
+    int32_t low_chart; /*  */
+    int32_t high_chart; /*  */
+    bool heard_chart; /*  */
+    uint16_t wish_operation_drive_torque; /*  */
+    uint16_t takes_operation_drive_torque; /*  */
+    int32_t low_operation_drive_torque; /*  */
+    int32_t high_operation_drive_torque; /*  */
+    bool heard_operation_drive_torque; /*  */
+    uint16_t wish_operation_drive_derating; /*  */
+    uint16_t takes_operation_drive_derating; /*  */
+    int32_t low_operation_drive_derating; /*  */
+    int32_t high_operation_drive_derating; /*  */
+    bool heard_operation_drive_derating; /*  */
+    uint16_t wish_main; /*  */
+    uint16_t takes_main; /*  */
+    int32_t low_main; /*  */
+    int32_t high_main; /*  */
+    bool heard_main; /*  */
+    uint16_t wish_pre; /*  */
+    uint16_t takes_pre; /*  */
+    int32_t low_pre; /*  */
+    int32_t high_pre; /*  */
+    bool heard_pre; /*  */
+    bool keeps; /*  */
+    bool is_first; /*  */
+    bool is_over; /*  */
+    int32_t head; /*  */
+    int32_t tail; /*  */
+    int32_t event; /*  */
+    int32_t queue[5]; /* events that wait */
+    bool enter_operation_standby; /*  */
+    bool enter_operation_precharge; /*  */
+    bool enter_operation_ready; /*  */
+    bool exit_operation_drive; /*  */
+    bool enter_fault; /*  */
+    int32_t steps; /*  */
+    bool is_busy; /*  */
+    float reset_T_cmd; /* N*m */
+    bool reset_main_cmd; /*  */
+    bool reset_pre_cmd; /*  */
+    float next_T_cmd; /* N*m */
+    float next_share; /* 1 */
+    bool decided_permit; /*  */
 } supervisor_Work;
 
 /* One instance: allocated by the caller, written by this module alone */
@@ -161,7 +183,7 @@ typedef struct {
         bool permit; /* discrete.permit */
         bool main_cmd; /* discrete.main_cmd */
         bool pre_cmd; /* discrete.pre_cmd */
-    } discrete;
+    } discrete; /* discrete variables */
     struct {
         uint8_t key; /* inputs.key within its range */
         float U_dc; /* V; inputs.U_dc within its range */
@@ -169,13 +191,13 @@ typedef struct {
         float T_req; /* N*m; inputs.T_req within its range */
         float v; /* m/s; inputs.v within its range */
         float temp; /* K; inputs.temp within its range */
-    } latched;
+    } latched; /* inputs of this tick */
     struct {
         bool main_command; /*  */
         bool pre_command; /*  */
         bool main_closed; /*  */
         bool pre_closed; /*  */
-    } equation;
+    } equation; /* equations */
     struct {
         uint16_t operation_precharge_ready; /* ticks that the guard has been true, at most 6 */
         uint16_t operation_drive_torque_regen_creep; /* ticks that the guard has been true, at most 3 */
@@ -185,7 +207,7 @@ typedef struct {
         uint16_t pre_open_shut; /* ticks that the guard has been true, at most 3 */
         uint16_t operation_fault; /* ticks that the guard has been true, at most 4 */
         uint16_t after_1; /* ticks since entry of `operation.precharge`, at most 200 */
-    } timer;
+    } timer; /* ticks that a guard was true */
     bool opposite_1; /* opposite seen in `modes.operation.modes.drive` */
     int16_t mode; /* active mode */
     uint16_t fired; /* transition of this tick, 0: none */

@@ -47,7 +47,7 @@ static const struct {
     .k_per_c = 100.0, /* k / c */
 };
 
-/* Kept out of the way of what a step does nearly always */
+/* Cold path, not inlined */
 #if defined(__GNUC__)
 #define RARELY __attribute__((noinline))
 #else
@@ -60,6 +60,7 @@ blind_driveline_CALIBRATION const volatile blind_driveline_Cal blind_driveline_d
     .reserved = 0U,
 };
 
+/* Rates of the states in mode drive_contact */
 static inline void rates_drive_contact(const blind_driveline_Self *self, blind_driveline_Work *work)
 {
     /* blind_driveline equations.w_d */
@@ -85,6 +86,7 @@ static inline void rates_drive_contact(const blind_driveline_Self *self, blind_d
     work->rate_w_s = (work->at_w_w - work->at_w_s) * constant.per_tau_f;
 }
 
+/* Guards of mode drive_contact */
 static inline void guards_drive_contact(blind_driveline_Work *work)
 {
     /* blind_driveline equations.w_d */
@@ -95,6 +97,7 @@ static inline void guards_drive_contact(blind_driveline_Work *work)
     work->guard_0 = at_w_free < 0.0;
 }
 
+/* Rates of the states in mode no_contact */
 static inline void rates_no_contact(const blind_driveline_Self *self, blind_driveline_Work *work)
 {
     /* blind_driveline equations.w_d */
@@ -123,6 +126,7 @@ static inline void rates_no_contact(const blind_driveline_Self *self, blind_driv
     work->rate_w_s = (work->at_w_w - work->at_w_s) * constant.per_tau_f;
 }
 
+/* Guards of mode no_contact */
 static inline void guards_no_contact(blind_driveline_Work *work)
 {
     /* blind_driveline equations.w_d */
@@ -135,6 +139,7 @@ static inline void guards_no_contact(blind_driveline_Work *work)
     work->guard_1 = (work->at_theta_b <= (-constant.alpha)) && (at_w_free < 0.0);
 }
 
+/* Rates of the states in mode coast_contact */
 static inline void rates_coast_contact(const blind_driveline_Self *self, blind_driveline_Work *work)
 {
     /* blind_driveline equations.w_d */
@@ -160,6 +165,7 @@ static inline void rates_coast_contact(const blind_driveline_Self *self, blind_d
     work->rate_w_s = (work->at_w_w - work->at_w_s) * constant.per_tau_f;
 }
 
+/* Guards of mode coast_contact */
 static inline void guards_coast_contact(blind_driveline_Work *work)
 {
     /* blind_driveline equations.w_d */
@@ -170,6 +176,7 @@ static inline void guards_coast_contact(blind_driveline_Work *work)
     work->guard_0 = at_w_free > 0.0;
 }
 
+/* One step of the method in mode drive_contact: from the states to work->end_* */
 static inline void step_drive_contact(const blind_driveline_Self *self, blind_driveline_Work *work)
 {
     work->at_w_em = self->state.w_em;
@@ -231,6 +238,7 @@ static inline void step_drive_contact(const blind_driveline_Self *self, blind_dr
         self->state.w_s + (h_per_6 * (work->k1_w_s + (2.0 * k2_w_s) + (2.0 * k3_w_s) + k4_w_s));
 }
 
+/* Coefficients of the polynomial through the step in mode drive_contact */
 static inline void series_drive_contact(const blind_driveline_Self *self,
     blind_driveline_Work *work)
 {
@@ -267,6 +275,7 @@ static inline void series_drive_contact(const blind_driveline_Self *self,
     work->series_w_s[2] = (work->k1_w_s + work->rate_w_s - (2.0 * slope_w_s)) / h_squared;
 }
 
+/* One step of the method in mode no_contact: from the states to work->end_* */
 static inline void step_no_contact(const blind_driveline_Self *self, blind_driveline_Work *work)
 {
     work->at_w_em = self->state.w_em;
@@ -328,6 +337,7 @@ static inline void step_no_contact(const blind_driveline_Self *self, blind_drive
         self->state.w_s + (h_per_6 * (work->k1_w_s + (2.0 * k2_w_s) + (2.0 * k3_w_s) + k4_w_s));
 }
 
+/* Coefficients of the polynomial through the step in mode no_contact */
 static inline void series_no_contact(const blind_driveline_Self *self, blind_driveline_Work *work)
 {
     work->at_w_em = work->end_w_em;
@@ -363,6 +373,7 @@ static inline void series_no_contact(const blind_driveline_Self *self, blind_dri
     work->series_w_s[2] = (work->k1_w_s + work->rate_w_s - (2.0 * slope_w_s)) / h_squared;
 }
 
+/* One step of the method in mode coast_contact: from the states to work->end_* */
 static inline void step_coast_contact(const blind_driveline_Self *self, blind_driveline_Work *work)
 {
     work->at_w_em = self->state.w_em;
@@ -424,6 +435,7 @@ static inline void step_coast_contact(const blind_driveline_Self *self, blind_dr
         self->state.w_s + (h_per_6 * (work->k1_w_s + (2.0 * k2_w_s) + (2.0 * k3_w_s) + k4_w_s));
 }
 
+/* Coefficients of the polynomial through the step in mode coast_contact */
 static inline void series_coast_contact(const blind_driveline_Self *self,
     blind_driveline_Work *work)
 {
@@ -460,6 +472,7 @@ static inline void series_coast_contact(const blind_driveline_Self *self,
     work->series_w_s[2] = (work->k1_w_s + work->rate_w_s - (2.0 * slope_w_s)) / h_squared;
 }
 
+/* States at work->s after the start of the step: its polynomial */
 static inline void point(const blind_driveline_Self *self, blind_driveline_Work *work)
 {
     work->at_w_em = self->state.w_em + (work->s * ((((work->series_w_em[2] * work->s)
@@ -474,6 +487,7 @@ static inline void point(const blind_driveline_Self *self, blind_driveline_Work 
         + work->series_w_s[1]) * work->s) + work->series_w_s[0]));
 }
 
+/* Guards of mode drive_contact at work->s after the start of the step */
 static inline void look_drive_contact(const blind_driveline_Self *self, blind_driveline_Work *work)
 {
     work->at_w_em = self->state.w_em + (work->s * ((((work->series_w_em[2] * work->s)
@@ -487,6 +501,7 @@ static inline void look_drive_contact(const blind_driveline_Self *self, blind_dr
     guards_drive_contact(work);
 }
 
+/* Halves the bracket in which a guard of mode drive_contact changes; its upper end is kept */
 static inline void locate_drive_contact(const blind_driveline_Self *self,
     blind_driveline_Work *work)
 {
@@ -519,6 +534,7 @@ static inline void locate_drive_contact(const blind_driveline_Self *self,
     work->elapsed = ha_min(high, work->h);
 }
 
+/* Flows in mode drive_contact over work->h, or to the first change of a guard */
 static inline void move_drive_contact(blind_driveline_Self *self, blind_driveline_Work *work)
 {
     step_drive_contact(self, work);
@@ -556,6 +572,7 @@ static inline void move_drive_contact(blind_driveline_Self *self, blind_drivelin
     self->state.w_s = work->end_w_s;
 }
 
+/* Guards of mode no_contact at work->s after the start of the step */
 static inline void look_no_contact(const blind_driveline_Self *self, blind_driveline_Work *work)
 {
     work->at_theta_b = self->state.theta_b + (work->s * ((((work->series_theta_b[2] * work->s)
@@ -574,6 +591,7 @@ static inline void look_no_contact(const blind_driveline_Self *self, blind_drive
     }
 }
 
+/* Halves the bracket in which a guard of mode no_contact changes; its upper end is kept */
 static inline void locate_no_contact(const blind_driveline_Self *self, blind_driveline_Work *work)
 {
     double high;
@@ -622,6 +640,7 @@ static inline void locate_no_contact(const blind_driveline_Self *self, blind_dri
     work->elapsed = ha_min(high, work->h);
 }
 
+/* Flows in mode no_contact over work->h, or to the first change of a guard */
 static inline void move_no_contact(blind_driveline_Self *self, blind_driveline_Work *work)
 {
     step_no_contact(self, work);
@@ -659,6 +678,7 @@ static inline void move_no_contact(blind_driveline_Self *self, blind_driveline_W
     self->state.w_s = work->end_w_s;
 }
 
+/* Guards of mode coast_contact at work->s after the start of the step */
 static inline void look_coast_contact(const blind_driveline_Self *self, blind_driveline_Work *work)
 {
     work->at_w_em = self->state.w_em + (work->s * ((((work->series_w_em[2] * work->s)
@@ -672,6 +692,7 @@ static inline void look_coast_contact(const blind_driveline_Self *self, blind_dr
     guards_coast_contact(work);
 }
 
+/* Halves the bracket in which a guard of mode coast_contact changes; its upper end is kept */
 static inline void locate_coast_contact(const blind_driveline_Self *self,
     blind_driveline_Work *work)
 {
@@ -704,6 +725,7 @@ static inline void locate_coast_contact(const blind_driveline_Self *self,
     work->elapsed = ha_min(high, work->h);
 }
 
+/* Flows in mode coast_contact over work->h, or to the first change of a guard */
 static inline void move_coast_contact(blind_driveline_Self *self, blind_driveline_Work *work)
 {
     step_coast_contact(self, work);
@@ -741,12 +763,14 @@ static inline void move_coast_contact(blind_driveline_Self *self, blind_drivelin
     self->state.w_s = work->end_w_s;
 }
 
+/* Takes the inputs of now, each within its range */
 static inline void latch(blind_driveline_Self *self, const blind_driveline_In *in)
 {
     self->before.T_em = in->T_em;
     self->before.T_br = in->T_br;
 }
 
+/* The next piece of the step: it ends where a wait does */
 static inline void limit(const blind_driveline_Self *self, blind_driveline_Work *work)
 {
     work->h = work->left;
@@ -754,6 +778,7 @@ static inline void limit(const blind_driveline_Self *self, blind_driveline_Work 
     work->is_wait = false;
 }
 
+/* Time passes: what is left of the step and of waits */
 static inline void elapse(blind_driveline_Self *self, blind_driveline_Work *work)
 {
     if (work->crossed && ((work->h - work->elapsed) <= work->merge)) {
@@ -767,20 +792,24 @@ static inline void elapse(blind_driveline_Self *self, blind_driveline_Work *work
     self->time = self->time + work->elapsed;
 }
 
+/* Waits whose guard is false begin anew */
 static inline void load(void)
 {
     /* nothing to do */
 }
 
+/* Transitions of mode drive_contact: the first one that is due is taken */
 static inline void jump_drive_contact(blind_driveline_Self *self, blind_driveline_Work *work)
 {
     guards_drive_contact(work);
     if (work->guard_0) {
         self->mode = blind_driveline_MODE_no_contact;
-        self->fired = 1U; /* blind_driveline modes.drive_contact.transitions.no_contact */
+        /* blind_driveline modes.drive_contact.transitions.no_contact */
+        self->fired = blind_driveline_FIRED_drive_contact_no_contact;
     }
 }
 
+/* Transitions of mode no_contact: the first one that is due is taken */
 static inline void jump_no_contact(blind_driveline_Self *self, blind_driveline_Work *work)
 {
     guards_no_contact(work);
@@ -788,26 +817,31 @@ static inline void jump_no_contact(blind_driveline_Self *self, blind_driveline_W
         /* blind_driveline modes.no_contact.transitions.drive_contact.reset.theta_b */
         self->state.theta_b = constant.alpha;
         self->mode = blind_driveline_MODE_drive_contact;
-        self->fired = 2U; /* blind_driveline modes.no_contact.transitions.drive_contact */
+        /* blind_driveline modes.no_contact.transitions.drive_contact */
+        self->fired = blind_driveline_FIRED_no_contact_drive_contact;
     } else if (work->guard_1) {
         /* blind_driveline modes.no_contact.transitions.coast_contact.reset.theta_b */
         self->state.theta_b = -constant.alpha;
         self->mode = blind_driveline_MODE_coast_contact;
-        self->fired = 3U; /* blind_driveline modes.no_contact.transitions.coast_contact */
+        /* blind_driveline modes.no_contact.transitions.coast_contact */
+        self->fired = blind_driveline_FIRED_no_contact_coast_contact;
     } else {
         /* nothing to do */
     }
 }
 
+/* Transitions of mode coast_contact: the first one that is due is taken */
 static inline void jump_coast_contact(blind_driveline_Self *self, blind_driveline_Work *work)
 {
     guards_coast_contact(work);
     if (work->guard_0) {
         self->mode = blind_driveline_MODE_no_contact;
-        self->fired = 4U; /* blind_driveline modes.coast_contact.transitions.no_contact */
+        /* blind_driveline modes.coast_contact.transitions.no_contact */
+        self->fired = blind_driveline_FIRED_coast_contact_no_contact;
     }
 }
 
+/* Transitions: the first one that is due is taken */
 static inline void jump(blind_driveline_Self *self, blind_driveline_Work *work)
 {
     self->fired = 0U;
@@ -827,10 +861,12 @@ static inline void jump(blind_driveline_Self *self, blind_driveline_Work *work)
         jump_coast_contact(self, work);
         break;
     default:
+        /* there is no other */
         break;
     }
 }
 
+/* What each guard is now */
 static inline void watch(blind_driveline_Self *self, blind_driveline_Work *work)
 {
     work->at_w_em = self->state.w_em;
@@ -853,17 +889,22 @@ static inline void watch(blind_driveline_Self *self, blind_driveline_Work *work)
         self->armed_0 = work->guard_0;
         break;
     default:
+        /* there is no other */
         break;
     }
     load();
 }
 
+/* Transitions until none is enabled */
 static inline void settle(blind_driveline_Self *self, blind_driveline_Work *work)
 {
     bool is_settling;
 
     is_settling = true;
-    for (int32_t micro_step = 0; (micro_step < 4) && (is_settling); micro_step++) {
+    for (int32_t micro_step = 0; micro_step < 4; micro_step++) {
+        if (!is_settling) {
+            break;
+        }
         jump(self, work);
         is_settling = self->fired != 0U;
     }
@@ -874,6 +915,7 @@ static inline void settle(blind_driveline_Self *self, blind_driveline_Work *work
     watch(self, work);
 }
 
+/* One piece of the step: flow, then what is due at its end */
 static inline void segment(blind_driveline_Self *self, blind_driveline_Work *work)
 {
     limit(self, work);
@@ -888,6 +930,7 @@ static inline void segment(blind_driveline_Self *self, blind_driveline_Work *wor
         move_coast_contact(self, work);
         break;
     default:
+        /* there is no other */
         break;
     }
     elapse(self, work);
@@ -896,6 +939,7 @@ static inline void segment(blind_driveline_Self *self, blind_driveline_Work *wor
     }
 }
 
+/* Equations of mode drive_contact */
 static inline void equations_drive_contact(blind_driveline_Self *self)
 {
     /* blind_driveline equations.w_d */
@@ -913,6 +957,7 @@ static inline void equations_drive_contact(blind_driveline_Self *self)
         - self->equation.w_b));
 }
 
+/* Equations of mode no_contact */
 static inline void equations_no_contact(blind_driveline_Self *self)
 {
     /* blind_driveline equations.w_d */
@@ -930,6 +975,7 @@ static inline void equations_no_contact(blind_driveline_Self *self)
         - self->equation.w_b));
 }
 
+/* Equations of mode coast_contact */
 static inline void equations_coast_contact(blind_driveline_Self *self)
 {
     /* blind_driveline equations.w_d */
@@ -947,6 +993,7 @@ static inline void equations_coast_contact(blind_driveline_Self *self)
         - self->equation.w_b));
 }
 
+/* The first values, from the inputs of the first tick; nothing advances yet */
 static inline void start(blind_driveline_Self *self)
 {
     self->state.w_s = 0.0; /* blind_driveline states.w_s.initial */
@@ -963,6 +1010,7 @@ static inline void start(blind_driveline_Self *self)
     self->started = true;
 }
 
+/* Equations */
 static inline void equations(blind_driveline_Self *self)
 {
     switch (self->mode) {
@@ -976,28 +1024,30 @@ static inline void equations(blind_driveline_Self *self)
         equations_coast_contact(self);
         break;
     default:
+        /* there is no other */
         break;
     }
 }
 
+/* The whole step in mode drive_contact, if nothing happens in it */
 static inline void leap_drive_contact(blind_driveline_Self *self, const blind_driveline_In *in)
 {
     /* tanh(w_w * per_w_sm) */
-    const double tanh_w_w_per_w_sm_1 = ha_tanh(self->state.w_w * constant.per_w_sm);
+    const double tanh_w_w_per_w_sm_start = ha_tanh(self->state.w_w * constant.per_w_sm);
     /* blind_driveline flow.w_em */
-    const double rate_w_em_1 = (self->before.T_em - (self->equation.T_hs * constant.per_R)
+    const double rate_w_em_start = (self->before.T_em - (self->equation.T_hs * constant.per_R)
         - (constant.b_em * self->state.w_em)) * constant.per_J_em;
     /* blind_driveline flow.w_w */
-    const double rate_w_w_1 =
-        (self->equation.T_hs - self->equation.T_v - (self->before.T_br * tanh_w_w_per_w_sm_1)
+    const double rate_w_w_start = (self->equation.T_hs - self->equation.T_v
+        - (self->before.T_br * tanh_w_w_per_w_sm_start)
         - (constant.b_w * self->state.w_w)) * constant.per_J_v;
     /* blind_driveline flow.w_s */
-    const double rate_w_s_1 = (self->state.w_w - self->state.w_s) * constant.per_tau_f;
-    const double at_w_em_2 = self->state.w_em + (0.0005 * rate_w_em_1);
-    const double at_w_w_2 = self->state.w_w + (0.0005 * rate_w_w_1);
+    const double rate_w_s_start = (self->state.w_w - self->state.w_s) * constant.per_tau_f;
+    const double at_w_em_2 = self->state.w_em + (0.0005 * rate_w_em_start);
+    const double at_w_w_2 = self->state.w_w + (0.0005 * rate_w_w_start);
     const double at_theta_d_2 = self->state.theta_d + (0.0005 * self->equation.w_d);
-    const double at_theta_b_now = self->state.theta_b + 0.0;
-    const double at_w_s_2 = self->state.w_s + (0.0005 * rate_w_s_1);
+    const double at_theta_b_2 = self->state.theta_b + 0.0;
+    const double at_w_s_2 = self->state.w_s + (0.0005 * rate_w_s_start);
     /* blind_driveline equations.w_d */
     const double at_w_d_2 = (at_w_em_2 * constant.per_R) - at_w_w_2;
     /* tanh(w_w * per_w_sm) */
@@ -1007,7 +1057,7 @@ static inline void leap_drive_contact(blind_driveline_Self *self, const blind_dr
         (constant.f0 * tanh_w_w_per_w_sm_2) + (constant.cd2 * at_w_w_2 * fabs(at_w_w_2));
     /* blind_driveline equations.T_hs */
     const double at_T_hs_2 =
-        (constant.k * (at_theta_d_2 - at_theta_b_now)) + (constant.c * (at_w_d_2 - 0.0));
+        (constant.k * (at_theta_d_2 - at_theta_b_2)) + (constant.c * (at_w_d_2 - 0.0));
     /* blind_driveline flow.w_em */
     const double rate_w_em_2 = (self->before.T_em - (at_T_hs_2 * constant.per_R)
         - (constant.b_em * at_w_em_2)) * constant.per_J_em;
@@ -1029,7 +1079,7 @@ static inline void leap_drive_contact(blind_driveline_Self *self, const blind_dr
         (constant.f0 * tanh_w_w_per_w_sm_3) + (constant.cd2 * at_w_w_3 * fabs(at_w_w_3));
     /* blind_driveline equations.T_hs */
     const double at_T_hs_3 =
-        (constant.k * (at_theta_d_3 - at_theta_b_now)) + (constant.c * (at_w_d_3 - 0.0));
+        (constant.k * (at_theta_d_3 - at_theta_b_2)) + (constant.c * (at_w_d_3 - 0.0));
     /* blind_driveline flow.w_em */
     const double rate_w_em_3 = (self->before.T_em - (at_T_hs_3 * constant.per_R)
         - (constant.b_em * at_w_em_3)) * constant.per_J_em;
@@ -1051,7 +1101,7 @@ static inline void leap_drive_contact(blind_driveline_Self *self, const blind_dr
         (constant.f0 * tanh_w_w_per_w_sm_4) + (constant.cd2 * at_w_w_4 * fabs(at_w_w_4));
     /* blind_driveline equations.T_hs */
     const double at_T_hs_4 =
-        (constant.k * (at_theta_d_4 - at_theta_b_now)) + (constant.c * (at_w_d_4 - 0.0));
+        (constant.k * (at_theta_d_4 - at_theta_b_2)) + (constant.c * (at_w_d_4 - 0.0));
     /* blind_driveline flow.w_em */
     const double rate_w_em_4 = (self->before.T_em - (at_T_hs_4 * constant.per_R)
         - (constant.b_em * at_w_em_4)) * constant.per_J_em;
@@ -1060,66 +1110,67 @@ static inline void leap_drive_contact(blind_driveline_Self *self, const blind_dr
         - (constant.b_w * at_w_w_4)) * constant.per_J_v;
     /* blind_driveline flow.w_s */
     const double rate_w_s_4 = (at_w_w_4 - at_w_s_4) * constant.per_tau_f;
-    const double end_w_em_now =
-        self->state.w_em + (0.00016666666666666666 * (rate_w_em_1 + (2.0 * rate_w_em_2)
+    const double at_w_em_end =
+        self->state.w_em + (0.00016666666666666666 * (rate_w_em_start + (2.0 * rate_w_em_2)
         + (2.0 * rate_w_em_3) + rate_w_em_4));
-    const double end_w_w_now =
-        self->state.w_w + (0.00016666666666666666 * (rate_w_w_1 + (2.0 * rate_w_w_2)
+    const double at_w_w_end =
+        self->state.w_w + (0.00016666666666666666 * (rate_w_w_start + (2.0 * rate_w_w_2)
         + (2.0 * rate_w_w_3) + rate_w_w_4));
-    const double end_theta_d_now =
+    const double at_theta_d_end =
         self->state.theta_d + (0.00016666666666666666 * (self->equation.w_d + (2.0 * at_w_d_2)
         + (2.0 * at_w_d_3) + at_w_d_4));
-    const double end_w_s_now =
-        self->state.w_s + (0.00016666666666666666 * (rate_w_s_1 + (2.0 * rate_w_s_2)
+    const double at_w_s_end =
+        self->state.w_s + (0.00016666666666666666 * (rate_w_s_start + (2.0 * rate_w_s_2)
         + (2.0 * rate_w_s_3) + rate_w_s_4));
     /* blind_driveline equations.w_d */
-    const double at_w_d_5 = (end_w_em_now * constant.per_R) - end_w_w_now;
+    const double at_w_d_end = (at_w_em_end * constant.per_R) - at_w_w_end;
     /* blind_driveline equations.w_free */
-    const double at_w_free_now = at_w_d_5 + (constant.k_per_c * (end_theta_d_now - at_theta_b_now));
+    const double at_w_free_end = at_w_d_end + (constant.k_per_c * (at_theta_d_end - at_theta_b_2));
     /* blind_driveline modes.drive_contact.transitions.no_contact.when */
-    const bool guard_0_now = at_w_free_now < 0.0;
-    if (guard_0_now == self->armed_0) {
-        self->state.w_em = end_w_em_now;
-        self->state.w_w = end_w_w_now;
-        self->state.theta_d = end_theta_d_now;
-        self->state.theta_b = at_theta_b_now;
-        self->state.w_s = end_w_s_now;
+    const bool guard_0_end = at_w_free_end < 0.0;
+    if (guard_0_end == self->armed_0) {
+        self->state.w_em = at_w_em_end;
+        self->state.w_w = at_w_w_end;
+        self->state.theta_d = at_theta_d_end;
+        self->state.theta_b = at_theta_b_2;
+        self->state.w_s = at_w_s_end;
         self->time = self->time + 0.001;
         self->before.T_em = in->T_em;
         self->before.T_br = in->T_br;
-        self->equation.w_d = at_w_d_5; /* blind_driveline equations.w_d */
+        self->equation.w_d = at_w_d_end; /* blind_driveline equations.w_d */
         /* theta_d - theta_b */
-        const double theta_d_minus_theta_b_now = end_theta_d_now - at_theta_b_now;
-        self->equation.w_free = at_w_free_now; /* blind_driveline equations.w_free */
+        const double theta_d_minus_theta_b_end = at_theta_d_end - at_theta_b_2;
+        self->equation.w_free = at_w_free_end; /* blind_driveline equations.w_free */
         /* blind_driveline equations.T_v */
-        self->equation.T_v = (constant.f0 * ha_tanh(end_w_w_now * constant.per_w_sm))
-            + (constant.cd2 * end_w_w_now * fabs(end_w_w_now));
+        self->equation.T_v = (constant.f0 * ha_tanh(at_w_w_end * constant.per_w_sm))
+            + (constant.cd2 * at_w_w_end * fabs(at_w_w_end));
         self->equation.w_b = 0.0; /* blind_driveline modes.drive_contact.equations.w_b */
         /* blind_driveline equations.T_hs */
         self->equation.T_hs =
-            (constant.k * theta_d_minus_theta_b_now) + (constant.c * (at_w_d_5 - 0.0));
+            (constant.k * theta_d_minus_theta_b_end) + (constant.c * (at_w_d_end - 0.0));
         self->is_done = true;
     }
 }
 
+/* The whole step in mode no_contact, if nothing happens in it */
 static inline void leap_no_contact(blind_driveline_Self *self, const blind_driveline_In *in)
 {
     /* tanh(w_w * per_w_sm) */
-    const double tanh_w_w_per_w_sm_1 = ha_tanh(self->state.w_w * constant.per_w_sm);
+    const double tanh_w_w_per_w_sm_start = ha_tanh(self->state.w_w * constant.per_w_sm);
     /* blind_driveline flow.w_em */
-    const double rate_w_em_1 = (self->before.T_em - (self->equation.T_hs * constant.per_R)
+    const double rate_w_em_start = (self->before.T_em - (self->equation.T_hs * constant.per_R)
         - (constant.b_em * self->state.w_em)) * constant.per_J_em;
     /* blind_driveline flow.w_w */
-    const double rate_w_w_1 =
-        (self->equation.T_hs - self->equation.T_v - (self->before.T_br * tanh_w_w_per_w_sm_1)
+    const double rate_w_w_start = (self->equation.T_hs - self->equation.T_v
+        - (self->before.T_br * tanh_w_w_per_w_sm_start)
         - (constant.b_w * self->state.w_w)) * constant.per_J_v;
     /* blind_driveline flow.w_s */
-    const double rate_w_s_1 = (self->state.w_w - self->state.w_s) * constant.per_tau_f;
-    const double at_w_em_2 = self->state.w_em + (0.0005 * rate_w_em_1);
-    const double at_w_w_2 = self->state.w_w + (0.0005 * rate_w_w_1);
+    const double rate_w_s_start = (self->state.w_w - self->state.w_s) * constant.per_tau_f;
+    const double at_w_em_2 = self->state.w_em + (0.0005 * rate_w_em_start);
+    const double at_w_w_2 = self->state.w_w + (0.0005 * rate_w_w_start);
     const double at_theta_d_2 = self->state.theta_d + (0.0005 * self->equation.w_d);
     const double at_theta_b_2 = self->state.theta_b + (0.0005 * self->equation.w_free);
-    const double at_w_s_2 = self->state.w_s + (0.0005 * rate_w_s_1);
+    const double at_w_s_2 = self->state.w_s + (0.0005 * rate_w_s_start);
     /* blind_driveline equations.w_d */
     const double at_w_d_2 = (at_w_em_2 * constant.per_R) - at_w_w_2;
     const double theta_d_minus_theta_b_2 = at_theta_d_2 - at_theta_b_2; /* theta_d - theta_b */
@@ -1193,71 +1244,73 @@ static inline void leap_no_contact(blind_driveline_Self *self, const blind_drive
         - (constant.b_w * at_w_w_4)) * constant.per_J_v;
     /* blind_driveline flow.w_s */
     const double rate_w_s_4 = (at_w_w_4 - at_w_s_4) * constant.per_tau_f;
-    const double end_w_em_now =
-        self->state.w_em + (0.00016666666666666666 * (rate_w_em_1 + (2.0 * rate_w_em_2)
+    const double at_w_em_end =
+        self->state.w_em + (0.00016666666666666666 * (rate_w_em_start + (2.0 * rate_w_em_2)
         + (2.0 * rate_w_em_3) + rate_w_em_4));
-    const double end_w_w_now =
-        self->state.w_w + (0.00016666666666666666 * (rate_w_w_1 + (2.0 * rate_w_w_2)
+    const double at_w_w_end =
+        self->state.w_w + (0.00016666666666666666 * (rate_w_w_start + (2.0 * rate_w_w_2)
         + (2.0 * rate_w_w_3) + rate_w_w_4));
-    const double end_theta_d_now =
+    const double at_theta_d_end =
         self->state.theta_d + (0.00016666666666666666 * (self->equation.w_d + (2.0 * at_w_d_2)
         + (2.0 * at_w_d_3) + at_w_d_4));
-    const double end_theta_b_now =
+    const double at_theta_b_end =
         self->state.theta_b + (0.00016666666666666666 * (self->equation.w_free
         + (2.0 * at_w_free_2) + (2.0 * at_w_free_3) + at_w_free_4));
-    const double end_w_s_now =
-        self->state.w_s + (0.00016666666666666666 * (rate_w_s_1 + (2.0 * rate_w_s_2)
+    const double at_w_s_end =
+        self->state.w_s + (0.00016666666666666666 * (rate_w_s_start + (2.0 * rate_w_s_2)
         + (2.0 * rate_w_s_3) + rate_w_s_4));
     /* blind_driveline equations.w_d */
-    const double at_w_d_5 = (end_w_em_now * constant.per_R) - end_w_w_now;
+    const double at_w_d_end = (at_w_em_end * constant.per_R) - at_w_w_end;
     /* blind_driveline equations.w_free */
-    const double at_w_free_5 = at_w_d_5 + (constant.k_per_c * (end_theta_d_now - end_theta_b_now));
+    const double at_w_free_end =
+        at_w_d_end + (constant.k_per_c * (at_theta_d_end - at_theta_b_end));
     /* blind_driveline modes.no_contact.transitions.drive_contact.when */
-    const bool guard_0_now = (end_theta_b_now >= constant.alpha) && (at_w_free_5 > 0.0);
+    const bool guard_0_end = (at_theta_b_end >= constant.alpha) && (at_w_free_end > 0.0);
     /* blind_driveline modes.no_contact.transitions.coast_contact.when */
-    const bool guard_1_now = (end_theta_b_now <= (-constant.alpha)) && (at_w_free_5 < 0.0);
-    if (!((guard_0_now != self->armed_0) || (guard_1_now != self->armed_1))) {
-        self->state.w_em = end_w_em_now;
-        self->state.w_w = end_w_w_now;
-        self->state.theta_d = end_theta_d_now;
-        self->state.theta_b = end_theta_b_now;
-        self->state.w_s = end_w_s_now;
+    const bool guard_1_end = (at_theta_b_end <= (-constant.alpha)) && (at_w_free_end < 0.0);
+    if (!((guard_0_end != self->armed_0) || (guard_1_end != self->armed_1))) {
+        self->state.w_em = at_w_em_end;
+        self->state.w_w = at_w_w_end;
+        self->state.theta_d = at_theta_d_end;
+        self->state.theta_b = at_theta_b_end;
+        self->state.w_s = at_w_s_end;
         self->time = self->time + 0.001;
         self->before.T_em = in->T_em;
         self->before.T_br = in->T_br;
-        self->equation.w_d = at_w_d_5; /* blind_driveline equations.w_d */
+        self->equation.w_d = at_w_d_end; /* blind_driveline equations.w_d */
         /* theta_d - theta_b */
-        const double theta_d_minus_theta_b_5 = end_theta_d_now - end_theta_b_now;
-        self->equation.w_free = at_w_free_5; /* blind_driveline equations.w_free */
+        const double theta_d_minus_theta_b_end = at_theta_d_end - at_theta_b_end;
+        self->equation.w_free = at_w_free_end; /* blind_driveline equations.w_free */
         /* blind_driveline equations.T_v */
-        self->equation.T_v = (constant.f0 * ha_tanh(end_w_w_now * constant.per_w_sm))
-            + (constant.cd2 * end_w_w_now * fabs(end_w_w_now));
-        self->equation.w_b = at_w_free_5; /* blind_driveline modes.no_contact.equations.w_b */
+        self->equation.T_v = (constant.f0 * ha_tanh(at_w_w_end * constant.per_w_sm))
+            + (constant.cd2 * at_w_w_end * fabs(at_w_w_end));
+        self->equation.w_b = at_w_free_end; /* blind_driveline modes.no_contact.equations.w_b */
         /* blind_driveline equations.T_hs */
-        self->equation.T_hs =
-            (constant.k * theta_d_minus_theta_b_5) + (constant.c * (at_w_d_5 - at_w_free_5));
+        self->equation.T_hs = (constant.k * theta_d_minus_theta_b_end) + (constant.c * (at_w_d_end
+            - at_w_free_end));
         self->is_done = true;
     }
 }
 
+/* The whole step in mode coast_contact, if nothing happens in it */
 static inline void leap_coast_contact(blind_driveline_Self *self, const blind_driveline_In *in)
 {
     /* tanh(w_w * per_w_sm) */
-    const double tanh_w_w_per_w_sm_1 = ha_tanh(self->state.w_w * constant.per_w_sm);
+    const double tanh_w_w_per_w_sm_start = ha_tanh(self->state.w_w * constant.per_w_sm);
     /* blind_driveline flow.w_em */
-    const double rate_w_em_1 = (self->before.T_em - (self->equation.T_hs * constant.per_R)
+    const double rate_w_em_start = (self->before.T_em - (self->equation.T_hs * constant.per_R)
         - (constant.b_em * self->state.w_em)) * constant.per_J_em;
     /* blind_driveline flow.w_w */
-    const double rate_w_w_1 =
-        (self->equation.T_hs - self->equation.T_v - (self->before.T_br * tanh_w_w_per_w_sm_1)
+    const double rate_w_w_start = (self->equation.T_hs - self->equation.T_v
+        - (self->before.T_br * tanh_w_w_per_w_sm_start)
         - (constant.b_w * self->state.w_w)) * constant.per_J_v;
     /* blind_driveline flow.w_s */
-    const double rate_w_s_1 = (self->state.w_w - self->state.w_s) * constant.per_tau_f;
-    const double at_w_em_2 = self->state.w_em + (0.0005 * rate_w_em_1);
-    const double at_w_w_2 = self->state.w_w + (0.0005 * rate_w_w_1);
+    const double rate_w_s_start = (self->state.w_w - self->state.w_s) * constant.per_tau_f;
+    const double at_w_em_2 = self->state.w_em + (0.0005 * rate_w_em_start);
+    const double at_w_w_2 = self->state.w_w + (0.0005 * rate_w_w_start);
     const double at_theta_d_2 = self->state.theta_d + (0.0005 * self->equation.w_d);
-    const double at_theta_b_now = self->state.theta_b + 0.0;
-    const double at_w_s_2 = self->state.w_s + (0.0005 * rate_w_s_1);
+    const double at_theta_b_2 = self->state.theta_b + 0.0;
+    const double at_w_s_2 = self->state.w_s + (0.0005 * rate_w_s_start);
     /* blind_driveline equations.w_d */
     const double at_w_d_2 = (at_w_em_2 * constant.per_R) - at_w_w_2;
     /* tanh(w_w * per_w_sm) */
@@ -1267,7 +1320,7 @@ static inline void leap_coast_contact(blind_driveline_Self *self, const blind_dr
         (constant.f0 * tanh_w_w_per_w_sm_2) + (constant.cd2 * at_w_w_2 * fabs(at_w_w_2));
     /* blind_driveline equations.T_hs */
     const double at_T_hs_2 =
-        (constant.k * (at_theta_d_2 - at_theta_b_now)) + (constant.c * (at_w_d_2 - 0.0));
+        (constant.k * (at_theta_d_2 - at_theta_b_2)) + (constant.c * (at_w_d_2 - 0.0));
     /* blind_driveline flow.w_em */
     const double rate_w_em_2 = (self->before.T_em - (at_T_hs_2 * constant.per_R)
         - (constant.b_em * at_w_em_2)) * constant.per_J_em;
@@ -1289,7 +1342,7 @@ static inline void leap_coast_contact(blind_driveline_Self *self, const blind_dr
         (constant.f0 * tanh_w_w_per_w_sm_3) + (constant.cd2 * at_w_w_3 * fabs(at_w_w_3));
     /* blind_driveline equations.T_hs */
     const double at_T_hs_3 =
-        (constant.k * (at_theta_d_3 - at_theta_b_now)) + (constant.c * (at_w_d_3 - 0.0));
+        (constant.k * (at_theta_d_3 - at_theta_b_2)) + (constant.c * (at_w_d_3 - 0.0));
     /* blind_driveline flow.w_em */
     const double rate_w_em_3 = (self->before.T_em - (at_T_hs_3 * constant.per_R)
         - (constant.b_em * at_w_em_3)) * constant.per_J_em;
@@ -1311,7 +1364,7 @@ static inline void leap_coast_contact(blind_driveline_Self *self, const blind_dr
         (constant.f0 * tanh_w_w_per_w_sm_4) + (constant.cd2 * at_w_w_4 * fabs(at_w_w_4));
     /* blind_driveline equations.T_hs */
     const double at_T_hs_4 =
-        (constant.k * (at_theta_d_4 - at_theta_b_now)) + (constant.c * (at_w_d_4 - 0.0));
+        (constant.k * (at_theta_d_4 - at_theta_b_2)) + (constant.c * (at_w_d_4 - 0.0));
     /* blind_driveline flow.w_em */
     const double rate_w_em_4 = (self->before.T_em - (at_T_hs_4 * constant.per_R)
         - (constant.b_em * at_w_em_4)) * constant.per_J_em;
@@ -1320,48 +1373,49 @@ static inline void leap_coast_contact(blind_driveline_Self *self, const blind_dr
         - (constant.b_w * at_w_w_4)) * constant.per_J_v;
     /* blind_driveline flow.w_s */
     const double rate_w_s_4 = (at_w_w_4 - at_w_s_4) * constant.per_tau_f;
-    const double end_w_em_now =
-        self->state.w_em + (0.00016666666666666666 * (rate_w_em_1 + (2.0 * rate_w_em_2)
+    const double at_w_em_end =
+        self->state.w_em + (0.00016666666666666666 * (rate_w_em_start + (2.0 * rate_w_em_2)
         + (2.0 * rate_w_em_3) + rate_w_em_4));
-    const double end_w_w_now =
-        self->state.w_w + (0.00016666666666666666 * (rate_w_w_1 + (2.0 * rate_w_w_2)
+    const double at_w_w_end =
+        self->state.w_w + (0.00016666666666666666 * (rate_w_w_start + (2.0 * rate_w_w_2)
         + (2.0 * rate_w_w_3) + rate_w_w_4));
-    const double end_theta_d_now =
+    const double at_theta_d_end =
         self->state.theta_d + (0.00016666666666666666 * (self->equation.w_d + (2.0 * at_w_d_2)
         + (2.0 * at_w_d_3) + at_w_d_4));
-    const double end_w_s_now =
-        self->state.w_s + (0.00016666666666666666 * (rate_w_s_1 + (2.0 * rate_w_s_2)
+    const double at_w_s_end =
+        self->state.w_s + (0.00016666666666666666 * (rate_w_s_start + (2.0 * rate_w_s_2)
         + (2.0 * rate_w_s_3) + rate_w_s_4));
     /* blind_driveline equations.w_d */
-    const double at_w_d_5 = (end_w_em_now * constant.per_R) - end_w_w_now;
+    const double at_w_d_end = (at_w_em_end * constant.per_R) - at_w_w_end;
     /* blind_driveline equations.w_free */
-    const double at_w_free_now = at_w_d_5 + (constant.k_per_c * (end_theta_d_now - at_theta_b_now));
+    const double at_w_free_end = at_w_d_end + (constant.k_per_c * (at_theta_d_end - at_theta_b_2));
     /* blind_driveline modes.coast_contact.transitions.no_contact.when */
-    const bool guard_0_now = at_w_free_now > 0.0;
-    if (guard_0_now == self->armed_0) {
-        self->state.w_em = end_w_em_now;
-        self->state.w_w = end_w_w_now;
-        self->state.theta_d = end_theta_d_now;
-        self->state.theta_b = at_theta_b_now;
-        self->state.w_s = end_w_s_now;
+    const bool guard_0_end = at_w_free_end > 0.0;
+    if (guard_0_end == self->armed_0) {
+        self->state.w_em = at_w_em_end;
+        self->state.w_w = at_w_w_end;
+        self->state.theta_d = at_theta_d_end;
+        self->state.theta_b = at_theta_b_2;
+        self->state.w_s = at_w_s_end;
         self->time = self->time + 0.001;
         self->before.T_em = in->T_em;
         self->before.T_br = in->T_br;
-        self->equation.w_d = at_w_d_5; /* blind_driveline equations.w_d */
+        self->equation.w_d = at_w_d_end; /* blind_driveline equations.w_d */
         /* theta_d - theta_b */
-        const double theta_d_minus_theta_b_now = end_theta_d_now - at_theta_b_now;
-        self->equation.w_free = at_w_free_now; /* blind_driveline equations.w_free */
+        const double theta_d_minus_theta_b_end = at_theta_d_end - at_theta_b_2;
+        self->equation.w_free = at_w_free_end; /* blind_driveline equations.w_free */
         /* blind_driveline equations.T_v */
-        self->equation.T_v = (constant.f0 * ha_tanh(end_w_w_now * constant.per_w_sm))
-            + (constant.cd2 * end_w_w_now * fabs(end_w_w_now));
+        self->equation.T_v = (constant.f0 * ha_tanh(at_w_w_end * constant.per_w_sm))
+            + (constant.cd2 * at_w_w_end * fabs(at_w_w_end));
         self->equation.w_b = 0.0; /* blind_driveline modes.coast_contact.equations.w_b */
         /* blind_driveline equations.T_hs */
         self->equation.T_hs =
-            (constant.k * theta_d_minus_theta_b_now) + (constant.c * (at_w_d_5 - 0.0));
+            (constant.k * theta_d_minus_theta_b_end) + (constant.c * (at_w_d_end - 0.0));
         self->is_done = true;
     }
 }
 
+/* The whole step, if nothing happens in it */
 static inline void leap(blind_driveline_Self *self, const blind_driveline_In *in)
 {
     switch (self->mode) {
@@ -1375,10 +1429,12 @@ static inline void leap(blind_driveline_Self *self, const blind_driveline_In *in
         leap_coast_contact(self, in);
         break;
     default:
+        /* there is no other */
         break;
     }
 }
 
+/* The step from event to event: taken where something happens in it */
 static RARELY void through_events(blind_driveline_Self *self, const blind_driveline_In *in)
 {
     blind_driveline_Work *const work = &self->work;
@@ -1386,7 +1442,10 @@ static RARELY void through_events(blind_driveline_Self *self, const blind_drivel
     if (self->started) {
         work->left = 0.001;
         work->event = false;
-        for (int32_t piece = 0; (piece < 101) && (work->left > 0.0); piece++) {
+        for (int32_t piece = 0; piece < 101; piece++) {
+            if (!(work->left > 0.0)) {
+                break;
+            }
             segment(self, work);
         }
         if (work->left > 0.0) {

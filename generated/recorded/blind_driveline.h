@@ -18,6 +18,12 @@ enum {
     blind_driveline_MODE_coast_contact = -1
 };
 
+/* Transitions, as `fired` tells them; 0U is none */
+#define blind_driveline_FIRED_drive_contact_no_contact 1U
+#define blind_driveline_FIRED_no_contact_drive_contact 2U
+#define blind_driveline_FIRED_no_contact_coast_contact 3U
+#define blind_driveline_FIRED_coast_contact_no_contact 4U
+
 /* Latched fault bits */
 #define blind_driveline_FAULT_zeno (1UL << 0)
 #define blind_driveline_FAULT_livelock (1UL << 1)
@@ -44,41 +50,41 @@ typedef struct {
 
 /* Values that live within one step */
 typedef struct {
-    double at_w_em;
-    double rate_w_em;
-    double at_w_w;
-    double rate_w_w;
-    double at_theta_d;
-    double rate_theta_d;
-    double at_theta_b;
-    double rate_theta_b;
-    double at_w_s;
-    double rate_w_s;
-    bool guard_0;
-    bool guard_1;
-    double merge;
-    double left;
-    bool is_wait;
-    bool event;
-    double h;
-    double elapsed;
-    bool crossed;
-    double s;
-    double end_w_em;
-    double series_w_em[3];
-    double end_w_w;
-    double series_w_w[3];
-    double end_theta_d;
-    double series_theta_d[3];
-    double end_theta_b;
-    double series_theta_b[3];
-    double end_w_s;
-    double series_w_s[3];
-    double k1_w_em;
-    double k1_w_w;
-    double k1_theta_d;
-    double k1_theta_b;
-    double k1_w_s;
+    double at_w_em; /* rad/s */
+    double rate_w_em; /* (rad/s)/s */
+    double at_w_w; /* rad/s */
+    double rate_w_w; /* (rad/s)/s */
+    double at_theta_d; /* rad */
+    double rate_theta_d; /* (rad)/s */
+    double at_theta_b; /* rad */
+    double rate_theta_b; /* (rad)/s */
+    double at_w_s; /* rad/s */
+    double rate_w_s; /* (rad/s)/s */
+    bool guard_0; /*  */
+    bool guard_1; /*  */
+    double merge; /* s; what crosses within it is one instant */
+    double left; /* s; rest of the major step */
+    bool is_wait; /* a wait ends with the segment */
+    bool event; /* a guard changed or a wait ended */
+    double h; /* s; step to flow over */
+    double elapsed; /* s; part of the step until a crossing */
+    bool crossed; /* a guard changed */
+    double s; /* s; time since the start of the step */
+    double end_w_em; /* rad/s */
+    double series_w_em[3]; /* rad/s */
+    double end_w_w; /* rad/s */
+    double series_w_w[3]; /* rad/s */
+    double end_theta_d; /* rad */
+    double series_theta_d[3]; /* rad */
+    double end_theta_b; /* rad */
+    double series_theta_b[3]; /* rad */
+    double end_w_s; /* rad/s */
+    double series_w_s[3]; /* rad/s */
+    double k1_w_em; /* (rad/s)/s */
+    double k1_w_w; /* (rad/s)/s */
+    double k1_theta_d; /* (rad)/s */
+    double k1_theta_b; /* (rad)/s */
+    double k1_w_s; /* (rad/s)/s */
 } blind_driveline_Work;
 
 /* One instance: allocated by the caller, written by this module alone */
@@ -89,18 +95,18 @@ typedef struct {
         double theta_d; /* rad */
         double theta_b; /* rad */
         double w_s; /* rad/s; filtered wheel speed */
-    } state;
+    } state; /* states */
     struct {
         double w_d; /* rad/s */
         double w_free; /* rad/s */
         double T_hs; /* N*m */
         double T_v; /* N*m */
         double w_b; /* rad/s */
-    } equation;
+    } equation; /* equations */
     struct {
         double T_em; /* N*m */
         double T_br; /* N*m */
-    } before;
+    } before; /* inputs of the tick before */
     int16_t mode; /* active mode */
     uint16_t fired; /* transition of this micro-step, 0: none */
     bool armed_0; /*  */
@@ -108,7 +114,7 @@ typedef struct {
     bool started; /* the first step is done */
     double time; /* s; time since the start: for tolerances only */
     uint32_t faults; /* latched fault bits */
-    bool is_done; /* nothing happened in this step */
+    bool is_done; /* the whole step is taken: nothing happened in it */
     blind_driveline_Derived derived;
     blind_driveline_Work work;
 } blind_driveline_Self;

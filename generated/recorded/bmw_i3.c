@@ -37,14 +37,16 @@ bmw_i3_CALIBRATION const volatile bmw_i3_Cal bmw_i3_default_cal = {
 
 /* Values that live within one step */
 typedef struct {
-    double at_v;
+    double at_v; /* m/s */
 } Work;
 
+/* Guards of mode always */
 static inline void guards_always(void)
 {
     /* nothing to do */
 }
 
+/* Takes the inputs of now, each within its range */
 static inline void latch(bmw_i3_Self *self, const bmw_i3_In *in)
 {
     self->before.T_em = in->T_em;
@@ -52,16 +54,19 @@ static inline void latch(bmw_i3_Self *self, const bmw_i3_In *in)
     self->before.eta_R_per_r_w_T_em = constant.eta_R_per_r_w * self->before.T_em;
 }
 
+/* Waits whose guard is false begin anew */
 static inline void load(void)
 {
     /* nothing to do */
 }
 
+/* Transitions of mode always: the first one that is due is taken */
 static inline void jump_always(void)
 {
     guards_always();
 }
 
+/* Transitions: the first one that is due is taken */
 static inline void jump(bmw_i3_Self *self, Work *work)
 {
     self->fired = 0U;
@@ -71,10 +76,12 @@ static inline void jump(bmw_i3_Self *self, Work *work)
         jump_always();
         break;
     default:
+        /* there is no other */
         break;
     }
 }
 
+/* What each guard is now */
 static inline void watch(const bmw_i3_Self *self, Work *work)
 {
     work->at_v = self->state.v;
@@ -83,11 +90,13 @@ static inline void watch(const bmw_i3_Self *self, Work *work)
         guards_always();
         break;
     default:
+        /* there is no other */
         break;
     }
     load();
 }
 
+/* Transitions until none is enabled */
 static inline void settle(bmw_i3_Self *self)
 {
     Work scratch;
@@ -96,7 +105,10 @@ static inline void settle(bmw_i3_Self *self)
     bool is_settling;
 
     is_settling = true;
-    for (int32_t micro_step = 0; (micro_step < 2) && (is_settling); micro_step++) {
+    for (int32_t micro_step = 0; micro_step < 2; micro_step++) {
+        if (!is_settling) {
+            break;
+        }
         jump(self, work);
         is_settling = self->fired != 0U;
     }
@@ -107,6 +119,7 @@ static inline void settle(bmw_i3_Self *self)
     watch(self, work);
 }
 
+/* Equations of mode always */
 static inline void equations_always(bmw_i3_Self *self)
 {
     self->equation.F_em = self->before.eta_R_per_r_w_T_em; /* bmw_i3 equations.F_em */
@@ -115,6 +128,7 @@ static inline void equations_always(bmw_i3_Self *self)
         + (constant.a_aer * self->state.v * fabs(self->state.v));
 }
 
+/* The first values, from the inputs of the first tick; nothing advances yet */
 static inline void start(bmw_i3_Self *self)
 {
     self->state.v = 0.0; /* bmw_i3 states.v.initial */
@@ -123,6 +137,7 @@ static inline void start(bmw_i3_Self *self)
     self->started = true;
 }
 
+/* Equations */
 static inline void equations(bmw_i3_Self *self)
 {
     switch (self->mode) {
@@ -130,15 +145,18 @@ static inline void equations(bmw_i3_Self *self)
         equations_always(self);
         break;
     default:
+        /* there is no other */
         break;
     }
 }
 
+/* The whole step in mode always, if nothing happens in it */
 static inline void leap_always(bmw_i3_Self *self, const bmw_i3_In *in)
 {
     /* bmw_i3 flow.v */
-    const double rate_v_1 = (self->before.eta_R_per_r_w_T_em - self->equation.F_v) * constant.per_m;
-    const double at_v_2 = self->state.v + (0.025 * rate_v_1);
+    const double rate_v_start =
+        (self->before.eta_R_per_r_w_T_em - self->equation.F_v) * constant.per_m;
+    const double at_v_2 = self->state.v + (0.025 * rate_v_start);
     /* bmw_i3 equations.F_v */
     const double at_F_v_2 = (constant.f0 * ha_tanh(at_v_2 * constant.per_v_sm))
         + (constant.a_aer * at_v_2 * fabs(at_v_2));
@@ -150,25 +168,26 @@ static inline void leap_always(bmw_i3_Self *self, const bmw_i3_In *in)
         + (constant.a_aer * at_v_3 * fabs(at_v_3));
     /* bmw_i3 flow.v */
     const double rate_v_3 = (self->before.eta_R_per_r_w_T_em - at_F_v_3) * constant.per_m;
-    const double at_v_4 = self->state.v + (0.05 * rate_v_3);
+    const double at_v_end_4 = self->state.v + (0.05 * rate_v_3);
     /* bmw_i3 equations.F_v */
-    const double at_F_v_4 = (constant.f0 * ha_tanh(at_v_4 * constant.per_v_sm))
-        + (constant.a_aer * at_v_4 * fabs(at_v_4));
+    const double at_F_v_end = (constant.f0 * ha_tanh(at_v_end_4 * constant.per_v_sm))
+        + (constant.a_aer * at_v_end_4 * fabs(at_v_end_4));
     /* bmw_i3 flow.v */
-    const double rate_v_4 = (self->before.eta_R_per_r_w_T_em - at_F_v_4) * constant.per_m;
-    const double end_v_now =
-        self->state.v + (0.008333333333333333 * (rate_v_1 + (2.0 * rate_v_2) + (2.0 * rate_v_3)
-        + rate_v_4));
-    self->state.v = end_v_now;
+    const double rate_v_end = (self->before.eta_R_per_r_w_T_em - at_F_v_end) * constant.per_m;
+    const double at_v_end_1 =
+        self->state.v + (0.008333333333333333 * (rate_v_start + (2.0 * rate_v_2)
+        + (2.0 * rate_v_3) + rate_v_end));
+    self->state.v = at_v_end_1;
     self->time = self->time + 0.05;
     self->before.T_em = in->T_em;
     self->before.eta_R_per_r_w_T_em = constant.eta_R_per_r_w * in->T_em; /* eta_R_per_r_w * T_em */
     self->equation.F_em = self->before.eta_R_per_r_w_T_em; /* bmw_i3 equations.F_em */
     /* bmw_i3 equations.F_v */
-    self->equation.F_v = (constant.f0 * ha_tanh(end_v_now * constant.per_v_sm))
-        + (constant.a_aer * end_v_now * fabs(end_v_now));
+    self->equation.F_v = (constant.f0 * ha_tanh(at_v_end_1 * constant.per_v_sm))
+        + (constant.a_aer * at_v_end_1 * fabs(at_v_end_1));
 }
 
+/* The whole step, if nothing happens in it */
 static inline void leap(bmw_i3_Self *self, const bmw_i3_In *in)
 {
     switch (self->mode) {
@@ -176,6 +195,7 @@ static inline void leap(bmw_i3_Self *self, const bmw_i3_In *in)
         leap_always(self, in);
         break;
     default:
+        /* there is no other */
         break;
     }
 }

@@ -42,15 +42,15 @@ typedef struct {
 typedef struct {
     struct {
         double v; /* m/s */
-    } state;
+    } state; /* states */
     struct {
         double F_em; /* N */
         double F_v; /* N */
-    } equation;
+    } equation; /* equations */
     struct {
         double T_em; /* N*m */
         double eta_R_per_r_w_T_em; /* 1; eta_R_per_r_w * T_em */
-    } before;
+    } before; /* inputs of the tick before */
     int16_t mode; /* active mode */
     uint16_t fired; /* transition of this micro-step, 0: none */
     bool started; /* the first step is done */

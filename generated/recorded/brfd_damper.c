@@ -28,7 +28,7 @@ static const struct {
     .c_b = 5000.0, /* kg/s; brfd_damper parameters.c_b; 1000.0 to 50000.0; damping of the band */
 };
 
-/* Kept out of the way of what a step does nearly always */
+/* Cold path, not inlined */
 #if defined(__GNUC__)
 #define RARELY __attribute__((noinline))
 #else
@@ -41,12 +41,14 @@ brfd_damper_CALIBRATION const volatile brfd_damper_Cal brfd_damper_default_cal =
     .reserved = 0U,
 };
 
+/* Rates of the states in mode stick */
 static inline void rates_stick(const brfd_damper_Self *self, brfd_damper_Work *work)
 {
     const double at_v_z = self->before.v; /* brfd_damper modes.stick.equations.v_z */
     work->rate_z = at_v_z; /* brfd_damper flow.z */
 }
 
+/* Guards of mode stick */
 static inline void guards_stick(const brfd_damper_Self *self, brfd_damper_Work *work)
 {
     const double at_v_z = self->before.v; /* brfd_damper modes.stick.equations.v_z */
@@ -58,28 +60,33 @@ static inline void guards_stick(const brfd_damper_Self *self, brfd_damper_Work *
     work->guard_1 = (at_F_b <= (-constant.F_lo)) && (self->before.v < 0.0);
 }
 
+/* Rates of the states in mode slip_up */
 static inline void rates_slip_up(brfd_damper_Work *work)
 {
     const double at_v_z = 0.0; /* brfd_damper modes.slip_up.equations.v_z */
     work->rate_z = at_v_z; /* brfd_damper flow.z */
 }
 
+/* Guards of mode slip_up */
 static inline void guards_slip_up(const brfd_damper_Self *self, brfd_damper_Work *work)
 {
     work->guard_0 = self->before.v < 0.0; /* brfd_damper modes.slip_up.transitions.stick.when */
 }
 
+/* Rates of the states in mode slip_lo */
 static inline void rates_slip_lo(brfd_damper_Work *work)
 {
     const double at_v_z = 0.0; /* brfd_damper modes.slip_lo.equations.v_z */
     work->rate_z = at_v_z; /* brfd_damper flow.z */
 }
 
+/* Guards of mode slip_lo */
 static inline void guards_slip_lo(const brfd_damper_Self *self, brfd_damper_Work *work)
 {
     work->guard_0 = self->before.v > 0.0; /* brfd_damper modes.slip_lo.transitions.stick.when */
 }
 
+/* One step of the method in mode stick: from the states to work->end_* */
 static inline void step_stick(const brfd_damper_Self *self, brfd_damper_Work *work)
 {
     work->at_z = self->state.z;
@@ -99,6 +106,7 @@ static inline void step_stick(const brfd_damper_Self *self, brfd_damper_Work *wo
         self->state.z + (work->h / 6.0 * (work->k1_z + (2.0 * k2_z) + (2.0 * k3_z) + k4_z));
 }
 
+/* Coefficients of the polynomial through the step in mode stick */
 static inline void series_stick(const brfd_damper_Self *self, brfd_damper_Work *work)
 {
     work->at_z = work->end_z;
@@ -109,6 +117,7 @@ static inline void series_stick(const brfd_damper_Self *self, brfd_damper_Work *
     work->series_z[2] = (work->k1_z + work->rate_z - (2.0 * slope_z)) / (work->h * work->h);
 }
 
+/* One step of the method in mode slip_up: from the states to work->end_* */
 static inline void step_slip_up(const brfd_damper_Self *self, brfd_damper_Work *work)
 {
     work->at_z = self->state.z;
@@ -128,6 +137,7 @@ static inline void step_slip_up(const brfd_damper_Self *self, brfd_damper_Work *
         self->state.z + (work->h / 6.0 * (work->k1_z + (2.0 * k2_z) + (2.0 * k3_z) + k4_z));
 }
 
+/* Coefficients of the polynomial through the step in mode slip_up */
 static inline void series_slip_up(const brfd_damper_Self *self, brfd_damper_Work *work)
 {
     work->at_z = work->end_z;
@@ -138,6 +148,7 @@ static inline void series_slip_up(const brfd_damper_Self *self, brfd_damper_Work
     work->series_z[2] = (work->k1_z + work->rate_z - (2.0 * slope_z)) / (work->h * work->h);
 }
 
+/* One step of the method in mode slip_lo: from the states to work->end_* */
 static inline void step_slip_lo(const brfd_damper_Self *self, brfd_damper_Work *work)
 {
     work->at_z = self->state.z;
@@ -157,6 +168,7 @@ static inline void step_slip_lo(const brfd_damper_Self *self, brfd_damper_Work *
         self->state.z + (work->h / 6.0 * (work->k1_z + (2.0 * k2_z) + (2.0 * k3_z) + k4_z));
 }
 
+/* Coefficients of the polynomial through the step in mode slip_lo */
 static inline void series_slip_lo(const brfd_damper_Self *self, brfd_damper_Work *work)
 {
     work->at_z = work->end_z;
@@ -167,18 +179,21 @@ static inline void series_slip_lo(const brfd_damper_Self *self, brfd_damper_Work
     work->series_z[2] = (work->k1_z + work->rate_z - (2.0 * slope_z)) / (work->h * work->h);
 }
 
+/* States at work->s after the start of the step: its polynomial */
 static inline void point(const brfd_damper_Self *self, brfd_damper_Work *work)
 {
     work->at_z = self->state.z + (work->s * ((((work->series_z[2] * work->s)
         + work->series_z[1]) * work->s) + work->series_z[0]));
 }
 
+/* Guards of mode stick at work->s after the start of the step */
 static inline void look_stick(const brfd_damper_Self *self, brfd_damper_Work *work)
 {
     point(self, work);
     guards_stick(self, work);
 }
 
+/* Halves the bracket in which a guard of mode stick changes; its upper end is kept */
 static inline void locate_stick(const brfd_damper_Self *self, brfd_damper_Work *work)
 {
     double high;
@@ -219,6 +234,7 @@ static inline void locate_stick(const brfd_damper_Self *self, brfd_damper_Work *
     work->elapsed = ha_min(high, work->h);
 }
 
+/* Flows in mode stick over work->h, or to the first change of a guard */
 static inline void move_stick(brfd_damper_Self *self, brfd_damper_Work *work)
 {
     step_stick(self, work);
@@ -244,11 +260,13 @@ static inline void move_stick(brfd_damper_Self *self, brfd_damper_Work *work)
     self->state.z = work->end_z;
 }
 
+/* Guards of mode slip_up at work->s after the start of the step */
 static inline void look_slip_up(const brfd_damper_Self *self, brfd_damper_Work *work)
 {
     guards_slip_up(self, work);
 }
 
+/* Halves the bracket in which a guard of mode slip_up changes; its upper end is kept */
 static inline void locate_slip_up(const brfd_damper_Self *self, brfd_damper_Work *work)
 {
     double high;
@@ -276,6 +294,7 @@ static inline void locate_slip_up(const brfd_damper_Self *self, brfd_damper_Work
     work->elapsed = ha_min(high, work->h);
 }
 
+/* Flows in mode slip_up over work->h, or to the first change of a guard */
 static inline void move_slip_up(brfd_damper_Self *self, brfd_damper_Work *work)
 {
     step_slip_up(self, work);
@@ -301,11 +320,13 @@ static inline void move_slip_up(brfd_damper_Self *self, brfd_damper_Work *work)
     self->state.z = work->end_z;
 }
 
+/* Guards of mode slip_lo at work->s after the start of the step */
 static inline void look_slip_lo(const brfd_damper_Self *self, brfd_damper_Work *work)
 {
     guards_slip_lo(self, work);
 }
 
+/* Halves the bracket in which a guard of mode slip_lo changes; its upper end is kept */
 static inline void locate_slip_lo(const brfd_damper_Self *self, brfd_damper_Work *work)
 {
     double high;
@@ -333,6 +354,7 @@ static inline void locate_slip_lo(const brfd_damper_Self *self, brfd_damper_Work
     work->elapsed = ha_min(high, work->h);
 }
 
+/* Flows in mode slip_lo over work->h, or to the first change of a guard */
 static inline void move_slip_lo(brfd_damper_Self *self, brfd_damper_Work *work)
 {
     step_slip_lo(self, work);
@@ -358,12 +380,14 @@ static inline void move_slip_lo(brfd_damper_Self *self, brfd_damper_Work *work)
     self->state.z = work->end_z;
 }
 
+/* Takes the inputs of now, each within its range */
 static inline void latch(brfd_damper_Self *self, const brfd_damper_In *in)
 {
     self->before.v = in->v;
     self->before.c_v_v = constant.c_v * self->before.v; /* c_v * v */
 }
 
+/* The next piece of the step: it ends where a wait does */
 static inline void limit(const brfd_damper_Self *self, brfd_damper_Work *work)
 {
     work->h = work->left;
@@ -371,6 +395,7 @@ static inline void limit(const brfd_damper_Self *self, brfd_damper_Work *work)
     work->is_wait = false;
 }
 
+/* Time passes: what is left of the step and of waits */
 static inline void elapse(brfd_damper_Self *self, brfd_damper_Work *work)
 {
     if (work->crossed && ((work->h - work->elapsed) <= work->merge)) {
@@ -384,43 +409,52 @@ static inline void elapse(brfd_damper_Self *self, brfd_damper_Work *work)
     self->time = self->time + work->elapsed;
 }
 
+/* Waits whose guard is false begin anew */
 static inline void load(void)
 {
     /* nothing to do */
 }
 
+/* Transitions of mode stick: the first one that is due is taken */
 static inline void jump_stick(brfd_damper_Self *self, brfd_damper_Work *work)
 {
     guards_stick(self, work);
     if (work->guard_0) {
         self->mode = brfd_damper_MODE_slip_up;
-        self->fired = 1U; /* brfd_damper modes.stick.transitions.slip_up */
+        /* brfd_damper modes.stick.transitions.slip_up */
+        self->fired = brfd_damper_FIRED_stick_slip_up;
     } else if (work->guard_1) {
         self->mode = brfd_damper_MODE_slip_lo;
-        self->fired = 2U; /* brfd_damper modes.stick.transitions.slip_lo */
+        /* brfd_damper modes.stick.transitions.slip_lo */
+        self->fired = brfd_damper_FIRED_stick_slip_lo;
     } else {
         /* nothing to do */
     }
 }
 
+/* Transitions of mode slip_up: the first one that is due is taken */
 static inline void jump_slip_up(brfd_damper_Self *self, brfd_damper_Work *work)
 {
     guards_slip_up(self, work);
     if (work->guard_0) {
         self->mode = brfd_damper_MODE_stick;
-        self->fired = 3U; /* brfd_damper modes.slip_up.transitions.stick */
+        /* brfd_damper modes.slip_up.transitions.stick */
+        self->fired = brfd_damper_FIRED_slip_up_stick;
     }
 }
 
+/* Transitions of mode slip_lo: the first one that is due is taken */
 static inline void jump_slip_lo(brfd_damper_Self *self, brfd_damper_Work *work)
 {
     guards_slip_lo(self, work);
     if (work->guard_0) {
         self->mode = brfd_damper_MODE_stick;
-        self->fired = 4U; /* brfd_damper modes.slip_lo.transitions.stick */
+        /* brfd_damper modes.slip_lo.transitions.stick */
+        self->fired = brfd_damper_FIRED_slip_lo_stick;
     }
 }
 
+/* Transitions: the first one that is due is taken */
 static inline void jump(brfd_damper_Self *self, brfd_damper_Work *work)
 {
     self->fired = 0U;
@@ -436,10 +470,12 @@ static inline void jump(brfd_damper_Self *self, brfd_damper_Work *work)
         jump_slip_lo(self, work);
         break;
     default:
+        /* there is no other */
         break;
     }
 }
 
+/* What each guard is now */
 static inline void watch(brfd_damper_Self *self, brfd_damper_Work *work)
 {
     work->at_z = self->state.z;
@@ -458,17 +494,22 @@ static inline void watch(brfd_damper_Self *self, brfd_damper_Work *work)
         self->armed_0 = work->guard_0;
         break;
     default:
+        /* there is no other */
         break;
     }
     load();
 }
 
+/* Transitions until none is enabled */
 static inline void settle(brfd_damper_Self *self, brfd_damper_Work *work)
 {
     bool is_settling;
 
     is_settling = true;
-    for (int32_t micro_step = 0; (micro_step < 4) && (is_settling); micro_step++) {
+    for (int32_t micro_step = 0; micro_step < 4; micro_step++) {
+        if (!is_settling) {
+            break;
+        }
         jump(self, work);
         is_settling = self->fired != 0U;
     }
@@ -479,6 +520,7 @@ static inline void settle(brfd_damper_Self *self, brfd_damper_Work *work)
     watch(self, work);
 }
 
+/* One piece of the step: flow, then what is due at its end */
 static inline void segment(brfd_damper_Self *self, brfd_damper_Work *work)
 {
     limit(self, work);
@@ -493,6 +535,7 @@ static inline void segment(brfd_damper_Self *self, brfd_damper_Work *work)
         move_slip_lo(self, work);
         break;
     default:
+        /* there is no other */
         break;
     }
     elapse(self, work);
@@ -501,6 +544,7 @@ static inline void segment(brfd_damper_Self *self, brfd_damper_Work *work)
     }
 }
 
+/* Equations of mode stick */
 static inline void equations_stick(brfd_damper_Self *self)
 {
     self->equation.v_z = self->before.v; /* brfd_damper modes.stick.equations.v_z */
@@ -509,6 +553,7 @@ static inline void equations_stick(brfd_damper_Self *self)
     self->equation.F = self->equation.F_b + self->before.c_v_v; /* brfd_damper equations.F */
 }
 
+/* Equations of mode slip_up */
 static inline void equations_slip_up(brfd_damper_Self *self)
 {
     self->equation.v_z = 0.0; /* brfd_damper modes.slip_up.equations.v_z */
@@ -517,6 +562,7 @@ static inline void equations_slip_up(brfd_damper_Self *self)
     self->equation.F = self->equation.F_b + self->before.c_v_v; /* brfd_damper equations.F */
 }
 
+/* Equations of mode slip_lo */
 static inline void equations_slip_lo(brfd_damper_Self *self)
 {
     self->equation.v_z = 0.0; /* brfd_damper modes.slip_lo.equations.v_z */
@@ -525,6 +571,7 @@ static inline void equations_slip_lo(brfd_damper_Self *self)
     self->equation.F = self->equation.F_b + self->before.c_v_v; /* brfd_damper equations.F */
 }
 
+/* The first values, from the inputs of the first tick; nothing advances yet */
 static inline void start(brfd_damper_Self *self)
 {
     self->state.z = 0.0; /* brfd_damper states.z.initial */
@@ -533,6 +580,7 @@ static inline void start(brfd_damper_Self *self)
     self->started = true;
 }
 
+/* Equations */
 static inline void equations(brfd_damper_Self *self)
 {
     switch (self->mode) {
@@ -546,35 +594,37 @@ static inline void equations(brfd_damper_Self *self)
         equations_slip_lo(self);
         break;
     default:
+        /* there is no other */
         break;
     }
 }
 
+/* The whole step in mode stick, if nothing happens in it */
 static inline void leap_stick(brfd_damper_Self *self, const brfd_damper_In *in,
     brfd_damper_Work *work)
 {
-    const double end_z_now =
+    const double at_z_end =
         self->state.z + (0.00016666666666666666 * (self->before.v + (2.0 * self->before.v)
         + (2.0 * self->before.v) + self->before.v));
     /* brfd_damper equations.F_b */
-    const double at_F_b_now = (constant.k_s * end_z_now) + (constant.c_b * self->before.v);
+    const double at_F_b_end = (constant.k_s * at_z_end) + (constant.c_b * self->before.v);
     /* brfd_damper modes.stick.transitions.slip_up.when */
-    const bool guard_0_now = (at_F_b_now >= constant.F_up) && (self->before.v > 0.0);
+    const bool guard_0_end = (at_F_b_end >= constant.F_up) && (self->before.v > 0.0);
     /* brfd_damper modes.stick.transitions.slip_lo.when */
-    const bool guard_1_now = (at_F_b_now <= (-constant.F_lo)) && (self->before.v < 0.0);
-    if (!((guard_0_now != self->armed_0) || (guard_1_now != self->armed_1))) {
-        self->state.z = end_z_now;
+    const bool guard_1_end = (at_F_b_end <= (-constant.F_lo)) && (self->before.v < 0.0);
+    if (!((guard_0_end != self->armed_0) || (guard_1_end != self->armed_1))) {
+        self->state.z = at_z_end;
         self->time = self->time + 0.001;
-        const bool event_now = in->v != self->before.v;
+        const bool event_end = in->v != self->before.v;
         self->before.v = in->v;
         self->before.c_v_v = constant.c_v * in->v; /* c_v * v */
-        if (event_now) {
+        if (event_end) {
             settle(self, work);
             equations(self);
         } else {
             self->equation.v_z = in->v; /* brfd_damper modes.stick.equations.v_z */
             /* brfd_damper equations.F_b */
-            self->equation.F_b = (constant.k_s * end_z_now) + (constant.c_b * in->v);
+            self->equation.F_b = (constant.k_s * at_z_end) + (constant.c_b * in->v);
             /* brfd_damper equations.F */
             self->equation.F = self->equation.F_b + self->before.c_v_v;
         }
@@ -582,25 +632,26 @@ static inline void leap_stick(brfd_damper_Self *self, const brfd_damper_In *in,
     }
 }
 
+/* The whole step in mode slip_up, if nothing happens in it */
 static inline void leap_slip_up(brfd_damper_Self *self, const brfd_damper_In *in,
     brfd_damper_Work *work)
 {
-    const double at_z_now = self->state.z + 0.0;
+    const double at_z_2 = self->state.z + 0.0;
     /* brfd_damper modes.slip_up.transitions.stick.when */
-    const bool guard_0_now = self->before.v < 0.0;
-    if (guard_0_now == self->armed_0) {
-        self->state.z = at_z_now;
+    const bool guard_0_end = self->before.v < 0.0;
+    if (guard_0_end == self->armed_0) {
+        self->state.z = at_z_2;
         self->time = self->time + 0.001;
-        const bool event_now = in->v != self->before.v;
+        const bool event_end = in->v != self->before.v;
         self->before.v = in->v;
         self->before.c_v_v = constant.c_v * in->v; /* c_v * v */
-        if (event_now) {
+        if (event_end) {
             settle(self, work);
             equations(self);
         } else {
             self->equation.v_z = 0.0; /* brfd_damper modes.slip_up.equations.v_z */
             /* brfd_damper equations.F_b */
-            self->equation.F_b = (constant.k_s * at_z_now) + (constant.c_b * 0.0);
+            self->equation.F_b = (constant.k_s * at_z_2) + (constant.c_b * 0.0);
             /* brfd_damper equations.F */
             self->equation.F = self->equation.F_b + self->before.c_v_v;
         }
@@ -608,25 +659,26 @@ static inline void leap_slip_up(brfd_damper_Self *self, const brfd_damper_In *in
     }
 }
 
+/* The whole step in mode slip_lo, if nothing happens in it */
 static inline void leap_slip_lo(brfd_damper_Self *self, const brfd_damper_In *in,
     brfd_damper_Work *work)
 {
-    const double at_z_now = self->state.z + 0.0;
+    const double at_z_2 = self->state.z + 0.0;
     /* brfd_damper modes.slip_lo.transitions.stick.when */
-    const bool guard_0_now = self->before.v > 0.0;
-    if (guard_0_now == self->armed_0) {
-        self->state.z = at_z_now;
+    const bool guard_0_end = self->before.v > 0.0;
+    if (guard_0_end == self->armed_0) {
+        self->state.z = at_z_2;
         self->time = self->time + 0.001;
-        const bool event_now = in->v != self->before.v;
+        const bool event_end = in->v != self->before.v;
         self->before.v = in->v;
         self->before.c_v_v = constant.c_v * in->v; /* c_v * v */
-        if (event_now) {
+        if (event_end) {
             settle(self, work);
             equations(self);
         } else {
             self->equation.v_z = 0.0; /* brfd_damper modes.slip_lo.equations.v_z */
             /* brfd_damper equations.F_b */
-            self->equation.F_b = (constant.k_s * at_z_now) + (constant.c_b * 0.0);
+            self->equation.F_b = (constant.k_s * at_z_2) + (constant.c_b * 0.0);
             /* brfd_damper equations.F */
             self->equation.F = self->equation.F_b + self->before.c_v_v;
         }
@@ -634,6 +686,7 @@ static inline void leap_slip_lo(brfd_damper_Self *self, const brfd_damper_In *in
     }
 }
 
+/* The whole step, if nothing happens in it */
 static inline void leap(brfd_damper_Self *self, const brfd_damper_In *in, brfd_damper_Work *work)
 {
     switch (self->mode) {
@@ -647,17 +700,22 @@ static inline void leap(brfd_damper_Self *self, const brfd_damper_In *in, brfd_d
         leap_slip_lo(self, in, work);
         break;
     default:
+        /* there is no other */
         break;
     }
 }
 
+/* The step from event to event: taken where something happens in it */
 static RARELY void through_events(brfd_damper_Self *self, const brfd_damper_In *in,
     brfd_damper_Work *work)
 {
     if (self->started) {
         work->left = 0.001;
         work->event = false;
-        for (int32_t piece = 0; (piece < 101) && (work->left > 0.0); piece++) {
+        for (int32_t piece = 0; piece < 101; piece++) {
+            if (!(work->left > 0.0)) {
+                break;
+            }
             segment(self, work);
         }
         if (work->left > 0.0) {

@@ -18,6 +18,12 @@ enum {
     brfd_damper_MODE_slip_lo = -1
 };
 
+/* Transitions, as `fired` tells them; 0U is none */
+#define brfd_damper_FIRED_stick_slip_up 1U
+#define brfd_damper_FIRED_stick_slip_lo 2U
+#define brfd_damper_FIRED_slip_up_stick 3U
+#define brfd_damper_FIRED_slip_lo_stick 4U
+
 /* Latched fault bits */
 #define brfd_damper_FAULT_zeno (1UL << 0)
 #define brfd_damper_FAULT_livelock (1UL << 1)
@@ -43,37 +49,37 @@ typedef struct {
 
 /* Values that live within one step */
 typedef struct {
-    double at_z;
-    double rate_z;
-    bool guard_0;
-    bool guard_1;
-    double merge;
-    double left;
-    bool is_wait;
-    bool event;
-    double h;
-    double elapsed;
-    bool crossed;
-    double s;
-    double end_z;
-    double series_z[3];
-    double k1_z;
+    double at_z; /* m */
+    double rate_z; /* (m)/s */
+    bool guard_0; /*  */
+    bool guard_1; /*  */
+    double merge; /* s; what crosses within it is one instant */
+    double left; /* s; rest of the major step */
+    bool is_wait; /* a wait ends with the segment */
+    bool event; /* a guard changed or a wait ended */
+    double h; /* s; step to flow over */
+    double elapsed; /* s; part of the step until a crossing */
+    bool crossed; /* a guard changed */
+    double s; /* s; time since the start of the step */
+    double end_z; /* m */
+    double series_z[3]; /* m */
+    double k1_z; /* (m)/s */
 } brfd_damper_Work;
 
 /* One instance: allocated by the caller, written by this module alone */
 typedef struct {
     struct {
         double z; /* m; stretch of the band */
-    } state;
+    } state; /* states */
     struct {
         double F_b; /* N */
         double F; /* N */
         double v_z; /* m/s */
-    } equation;
+    } equation; /* equations */
     struct {
         double v; /* m/s */
         double c_v_v; /* 1; c_v * v */
-    } before;
+    } before; /* inputs of the tick before */
     int16_t mode; /* active mode */
     uint16_t fired; /* transition of this micro-step, 0: none */
     bool armed_0; /*  */
@@ -81,7 +87,7 @@ typedef struct {
     bool started; /* the first step is done */
     double time; /* s; time since the start: for tolerances only */
     uint32_t faults; /* latched fault bits */
-    bool is_done; /* nothing happened in this step */
+    bool is_done; /* the whole step is taken: nothing happened in it */
     brfd_damper_Derived derived;
     brfd_damper_Work work;
 } brfd_damper_Self;

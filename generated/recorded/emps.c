@@ -36,31 +36,36 @@ emps_CALIBRATION const volatile emps_Cal emps_default_cal = {
 
 /* Values that live within one step */
 typedef struct {
-    double at_q;
-    double at_v;
-    double at_F_dr;
+    double at_q; /* m */
+    double at_v; /* m/s */
+    double at_F_dr; /* N */
 } Work;
 
+/* Guards of mode always */
 static inline void guards_always(void)
 {
     /* nothing to do */
 }
 
+/* Takes the inputs of now, each within its range */
 static inline void latch(emps_Self *self, const emps_In *in)
 {
     self->before.q_ref = in->q_ref;
 }
 
+/* Waits whose guard is false begin anew */
 static inline void load(void)
 {
     /* nothing to do */
 }
 
+/* Transitions of mode always: the first one that is due is taken */
 static inline void jump_always(void)
 {
     guards_always();
 }
 
+/* Transitions: the first one that is due is taken */
 static inline void jump(emps_Self *self, Work *work)
 {
     self->fired = 0U;
@@ -72,10 +77,12 @@ static inline void jump(emps_Self *self, Work *work)
         jump_always();
         break;
     default:
+        /* there is no other */
         break;
     }
 }
 
+/* What each guard is now */
 static inline void watch(const emps_Self *self, Work *work)
 {
     work->at_q = self->state.q;
@@ -86,11 +93,13 @@ static inline void watch(const emps_Self *self, Work *work)
         guards_always();
         break;
     default:
+        /* there is no other */
         break;
     }
     load();
 }
 
+/* Transitions until none is enabled */
 static inline void settle(emps_Self *self)
 {
     Work scratch;
@@ -99,7 +108,10 @@ static inline void settle(emps_Self *self)
     bool is_settling;
 
     is_settling = true;
-    for (int32_t micro_step = 0; (micro_step < 2) && (is_settling); micro_step++) {
+    for (int32_t micro_step = 0; micro_step < 2; micro_step++) {
+        if (!is_settling) {
+            break;
+        }
         jump(self, work);
         is_settling = self->fired != 0U;
     }
@@ -110,6 +122,7 @@ static inline void settle(emps_Self *self)
     watch(self, work);
 }
 
+/* Equations of mode always */
 static inline void equations_always(emps_Self *self)
 {
     /* emps equations.u_dr */
@@ -118,6 +131,7 @@ static inline void equations_always(emps_Self *self)
     self->equation.F_m = constant.G_f * self->equation.u_dr; /* emps equations.F_m */
 }
 
+/* The first values, from the inputs of the first tick; nothing advances yet */
 static inline void start(emps_Self *self)
 {
     self->state.q = self->before.q_ref; /* emps states.q.initial */
@@ -128,6 +142,7 @@ static inline void start(emps_Self *self)
     self->started = true;
 }
 
+/* Equations */
 static inline void equations(emps_Self *self)
 {
     switch (self->mode) {
@@ -135,19 +150,22 @@ static inline void equations(emps_Self *self)
         equations_always(self);
         break;
     default:
+        /* there is no other */
         break;
     }
 }
 
+/* The whole step in mode always, if nothing happens in it */
 static inline void leap_always(emps_Self *self, const emps_In *in)
 {
     /* emps flow.v */
-    const double rate_v_1 = (self->state.F_dr - (constant.F_v * self->state.v)) * constant.per_M;
+    const double rate_v_start =
+        (self->state.F_dr - (constant.F_v * self->state.v)) * constant.per_M;
     /* emps flow.F_dr */
-    const double rate_F_dr_1 = (self->equation.F_m - self->state.F_dr) * constant.per_T_dr;
+    const double rate_F_dr_start = (self->equation.F_m - self->state.F_dr) * constant.per_T_dr;
     const double at_q_2 = self->state.q + (0.0005 * self->state.v);
-    const double at_v_2 = self->state.v + (0.0005 * rate_v_1);
-    const double at_F_dr_2 = self->state.F_dr + (0.0005 * rate_F_dr_1);
+    const double at_v_2 = self->state.v + (0.0005 * rate_v_start);
+    const double at_F_dr_2 = self->state.F_dr + (0.0005 * rate_F_dr_start);
     /* emps equations.u_dr */
     const double at_u_dr_2 =
         (constant.k_p_k_v * (self->before.q_ref - at_q_2)) - (constant.k_v * at_v_2);
@@ -165,34 +183,38 @@ static inline void leap_always(emps_Self *self, const emps_In *in)
     /* emps flow.v */
     const double rate_v_3 = (at_F_dr_3 - (constant.F_v * at_v_3)) * constant.per_M;
     const double rate_F_dr_3 = (at_F_m_3 - at_F_dr_3) * constant.per_T_dr; /* emps flow.F_dr */
-    const double at_q_4 = self->state.q + (0.001 * at_v_3);
-    const double at_v_4 = self->state.v + (0.001 * rate_v_3);
-    const double at_F_dr_4 = self->state.F_dr + (0.001 * rate_F_dr_3);
+    const double at_q_end_4 = self->state.q + (0.001 * at_v_3);
+    const double at_v_end_4 = self->state.v + (0.001 * rate_v_3);
+    const double at_F_dr_end_4 = self->state.F_dr + (0.001 * rate_F_dr_3);
     /* emps equations.u_dr */
-    const double at_u_dr_4 =
-        (constant.k_p_k_v * (self->before.q_ref - at_q_4)) - (constant.k_v * at_v_4);
-    const double at_F_m_4 = constant.G_f * at_u_dr_4; /* emps equations.F_m */
+    const double at_u_dr_end =
+        (constant.k_p_k_v * (self->before.q_ref - at_q_end_4)) - (constant.k_v * at_v_end_4);
+    const double at_F_m_end = constant.G_f * at_u_dr_end; /* emps equations.F_m */
     /* emps flow.v */
-    const double rate_v_4 = (at_F_dr_4 - (constant.F_v * at_v_4)) * constant.per_M;
-    const double rate_F_dr_4 = (at_F_m_4 - at_F_dr_4) * constant.per_T_dr; /* emps flow.F_dr */
-    const double end_q_now =
+    const double rate_v_end = (at_F_dr_end_4 - (constant.F_v * at_v_end_4)) * constant.per_M;
+    /* emps flow.F_dr */
+    const double rate_F_dr_end = (at_F_m_end - at_F_dr_end_4) * constant.per_T_dr;
+    const double at_q_end_1 =
         self->state.q + (0.00016666666666666666 * (self->state.v + (2.0 * at_v_2)
-        + (2.0 * at_v_3) + at_v_4));
-    const double end_v_now = self->state.v + (0.00016666666666666666 * (rate_v_1 + (2.0 * rate_v_2)
-        + (2.0 * rate_v_3) + rate_v_4));
-    const double end_F_dr_now =
-        self->state.F_dr + (0.00016666666666666666 * (rate_F_dr_1 + (2.0 * rate_F_dr_2)
-        + (2.0 * rate_F_dr_3) + rate_F_dr_4));
-    self->state.q = end_q_now;
-    self->state.v = end_v_now;
-    self->state.F_dr = end_F_dr_now;
+        + (2.0 * at_v_3) + at_v_end_4));
+    const double at_v_end_1 =
+        self->state.v + (0.00016666666666666666 * (rate_v_start + (2.0 * rate_v_2)
+        + (2.0 * rate_v_3) + rate_v_end));
+    const double at_F_dr_end_1 =
+        self->state.F_dr + (0.00016666666666666666 * (rate_F_dr_start + (2.0 * rate_F_dr_2)
+        + (2.0 * rate_F_dr_3) + rate_F_dr_end));
+    self->state.q = at_q_end_1;
+    self->state.v = at_v_end_1;
+    self->state.F_dr = at_F_dr_end_1;
     self->time = self->time + 0.001;
     self->before.q_ref = in->q_ref;
     /* emps equations.u_dr */
-    self->equation.u_dr = (constant.k_p_k_v * (in->q_ref - end_q_now)) - (constant.k_v * end_v_now);
+    self->equation.u_dr =
+        (constant.k_p_k_v * (in->q_ref - at_q_end_1)) - (constant.k_v * at_v_end_1);
     self->equation.F_m = constant.G_f * self->equation.u_dr; /* emps equations.F_m */
 }
 
+/* The whole step, if nothing happens in it */
 static inline void leap(emps_Self *self, const emps_In *in)
 {
     switch (self->mode) {
@@ -200,6 +222,7 @@ static inline void leap(emps_Self *self, const emps_In *in)
         leap_always(self, in);
         break;
     default:
+        /* there is no other */
         break;
     }
 }

@@ -44,14 +44,14 @@ typedef struct {
         double q; /* m */
         double v; /* m/s */
         double F_dr; /* N */
-    } state;
+    } state; /* states */
     struct {
         double u_dr; /* V */
         double F_m; /* N */
-    } equation;
+    } equation; /* equations */
     struct {
         double q_ref; /* m */
-    } before;
+    } before; /* inputs of the tick before */
     int16_t mode; /* active mode */
     uint16_t fired; /* transition of this micro-step, 0: none */
     bool started; /* the first step is done */

@@ -40,15 +40,17 @@ leaf_motor_side_CALIBRATION const volatile leaf_motor_side_Cal leaf_motor_side_d
 
 /* Values that live within one step */
 typedef struct {
-    double at_w_em;
-    double at_theta_d;
+    double at_w_em; /* rad/s */
+    double at_theta_d; /* rad */
 } Work;
 
+/* Guards of mode always */
 static inline void guards_always(void)
 {
     /* nothing to do */
 }
 
+/* Takes the inputs of now, each within its range */
 static inline void latch(leaf_motor_side_Self *self, const leaf_motor_side_In *in)
 {
     self->before.T_em = in->T_em;
@@ -56,16 +58,19 @@ static inline void latch(leaf_motor_side_Self *self, const leaf_motor_side_In *i
     self->before.v_wh_per_r_w = self->before.v_wh * constant.per_r_w; /* v_wh * per_r_w */
 }
 
+/* Waits whose guard is false begin anew */
 static inline void load(void)
 {
     /* nothing to do */
 }
 
+/* Transitions of mode always: the first one that is due is taken */
 static inline void jump_always(void)
 {
     guards_always();
 }
 
+/* Transitions: the first one that is due is taken */
 static inline void jump(leaf_motor_side_Self *self, Work *work)
 {
     self->fired = 0U;
@@ -76,10 +81,12 @@ static inline void jump(leaf_motor_side_Self *self, Work *work)
         jump_always();
         break;
     default:
+        /* there is no other */
         break;
     }
 }
 
+/* What each guard is now */
 static inline void watch(const leaf_motor_side_Self *self, Work *work)
 {
     work->at_w_em = self->state.w_em;
@@ -89,11 +96,13 @@ static inline void watch(const leaf_motor_side_Self *self, Work *work)
         guards_always();
         break;
     default:
+        /* there is no other */
         break;
     }
     load();
 }
 
+/* Transitions until none is enabled */
 static inline void settle(leaf_motor_side_Self *self)
 {
     Work scratch;
@@ -102,7 +111,10 @@ static inline void settle(leaf_motor_side_Self *self)
     bool is_settling;
 
     is_settling = true;
-    for (int32_t micro_step = 0; (micro_step < 2) && (is_settling); micro_step++) {
+    for (int32_t micro_step = 0; micro_step < 2; micro_step++) {
+        if (!is_settling) {
+            break;
+        }
         jump(self, work);
         is_settling = self->fired != 0U;
     }
@@ -113,6 +125,7 @@ static inline void settle(leaf_motor_side_Self *self)
     watch(self, work);
 }
 
+/* Equations of mode always */
 static inline void equations_always(leaf_motor_side_Self *self)
 {
     /* leaf_motor_side equations.w_d */
@@ -122,6 +135,7 @@ static inline void equations_always(leaf_motor_side_Self *self)
         (constant.k_hs * self->state.theta_d) + (constant.c_hs * self->equation.w_d);
 }
 
+/* The first values, from the inputs of the first tick; nothing advances yet */
 static inline void start(leaf_motor_side_Self *self)
 {
     /* leaf_motor_side states.w_em.initial */
@@ -133,6 +147,7 @@ static inline void start(leaf_motor_side_Self *self)
     self->started = true;
 }
 
+/* Equations */
 static inline void equations(leaf_motor_side_Self *self)
 {
     switch (self->mode) {
@@ -140,16 +155,18 @@ static inline void equations(leaf_motor_side_Self *self)
         equations_always(self);
         break;
     default:
+        /* there is no other */
         break;
     }
 }
 
+/* The whole step in mode always, if nothing happens in it */
 static inline void leap_always(leaf_motor_side_Self *self, const leaf_motor_side_In *in)
 {
     /* leaf_motor_side flow.w_em */
-    const double rate_w_em_1 = (self->before.T_em - (self->equation.T_hs * constant.per_R)
+    const double rate_w_em_start = (self->before.T_em - (self->equation.T_hs * constant.per_R)
         - (constant.b_em * self->state.w_em)) * constant.per_J_em;
-    const double at_w_em_2 = self->state.w_em + (0.001 * rate_w_em_1);
+    const double at_w_em_2 = self->state.w_em + (0.001 * rate_w_em_start);
     const double at_theta_d_2 = self->state.theta_d + (0.001 * self->equation.w_d);
     /* leaf_motor_side equations.w_d */
     const double at_w_d_2 = (at_w_em_2 * constant.per_R) - self->before.v_wh_per_r_w;
@@ -167,33 +184,34 @@ static inline void leap_always(leaf_motor_side_Self *self, const leaf_motor_side
     /* leaf_motor_side flow.w_em */
     const double rate_w_em_3 = (self->before.T_em - (at_T_hs_3 * constant.per_R)
         - (constant.b_em * at_w_em_3)) * constant.per_J_em;
-    const double at_w_em_4 = self->state.w_em + (0.002 * rate_w_em_3);
-    const double at_theta_d_4 = self->state.theta_d + (0.002 * at_w_d_3);
+    const double at_w_em_end_4 = self->state.w_em + (0.002 * rate_w_em_3);
+    const double at_theta_d_end_4 = self->state.theta_d + (0.002 * at_w_d_3);
     /* leaf_motor_side equations.w_d */
-    const double at_w_d_4 = (at_w_em_4 * constant.per_R) - self->before.v_wh_per_r_w;
+    const double at_w_d_end = (at_w_em_end_4 * constant.per_R) - self->before.v_wh_per_r_w;
     /* leaf_motor_side equations.T_hs */
-    const double at_T_hs_4 = (constant.k_hs * at_theta_d_4) + (constant.c_hs * at_w_d_4);
+    const double at_T_hs_end = (constant.k_hs * at_theta_d_end_4) + (constant.c_hs * at_w_d_end);
     /* leaf_motor_side flow.w_em */
-    const double rate_w_em_4 = (self->before.T_em - (at_T_hs_4 * constant.per_R)
-        - (constant.b_em * at_w_em_4)) * constant.per_J_em;
-    const double end_w_em_now =
-        self->state.w_em + (0.0003333333333333333 * (rate_w_em_1 + (2.0 * rate_w_em_2)
-        + (2.0 * rate_w_em_3) + rate_w_em_4));
-    const double end_theta_d_now =
+    const double rate_w_em_end = (self->before.T_em - (at_T_hs_end * constant.per_R)
+        - (constant.b_em * at_w_em_end_4)) * constant.per_J_em;
+    const double at_w_em_end_1 =
+        self->state.w_em + (0.0003333333333333333 * (rate_w_em_start + (2.0 * rate_w_em_2)
+        + (2.0 * rate_w_em_3) + rate_w_em_end));
+    const double at_theta_d_end_1 =
         self->state.theta_d + (0.0003333333333333333 * (self->equation.w_d + (2.0 * at_w_d_2)
-        + (2.0 * at_w_d_3) + at_w_d_4));
-    self->state.w_em = end_w_em_now;
-    self->state.theta_d = end_theta_d_now;
+        + (2.0 * at_w_d_3) + at_w_d_end));
+    self->state.w_em = at_w_em_end_1;
+    self->state.theta_d = at_theta_d_end_1;
     self->time = self->time + 0.002;
     self->before.T_em = in->T_em;
     self->before.v_wh = in->v_wh;
     self->before.v_wh_per_r_w = in->v_wh * constant.per_r_w; /* v_wh * per_r_w */
     /* leaf_motor_side equations.w_d */
-    self->equation.w_d = (end_w_em_now * constant.per_R) - self->before.v_wh_per_r_w;
+    self->equation.w_d = (at_w_em_end_1 * constant.per_R) - self->before.v_wh_per_r_w;
     /* leaf_motor_side equations.T_hs */
-    self->equation.T_hs = (constant.k_hs * end_theta_d_now) + (constant.c_hs * self->equation.w_d);
+    self->equation.T_hs = (constant.k_hs * at_theta_d_end_1) + (constant.c_hs * self->equation.w_d);
 }
 
+/* The whole step, if nothing happens in it */
 static inline void leap(leaf_motor_side_Self *self, const leaf_motor_side_In *in)
 {
     switch (self->mode) {
@@ -201,6 +219,7 @@ static inline void leap(leaf_motor_side_Self *self, const leaf_motor_side_In *in
         leap_always(self, in);
         break;
     default:
+        /* there is no other */
         break;
     }
 }

@@ -45,16 +45,16 @@ typedef struct {
     struct {
         double w_em; /* rad/s */
         double theta_d; /* rad */
-    } state;
+    } state; /* states */
     struct {
         double w_d; /* rad/s */
         double T_hs; /* N*m */
-    } equation;
+    } equation; /* equations */
     struct {
         double T_em; /* N*m */
         double v_wh; /* m/s */
         double v_wh_per_r_w; /* 1; v_wh * per_r_w */
-    } before;
+    } before; /* inputs of the tick before */
     int16_t mode; /* active mode */
     uint16_t fired; /* transition of this micro-step, 0: none */
     bool started; /* the first step is done */

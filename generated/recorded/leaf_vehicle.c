@@ -47,31 +47,36 @@ leaf_vehicle_CALIBRATION const volatile leaf_vehicle_Cal leaf_vehicle_default_ca
 
 /* Values that live within one step */
 typedef struct {
-    double at_w_em;
-    double at_w_w;
-    double at_theta_d;
+    double at_w_em; /* rad/s */
+    double at_w_w; /* rad/s */
+    double at_theta_d; /* rad */
 } Work;
 
+/* Guards of mode always */
 static inline void guards_always(void)
 {
     /* nothing to do */
 }
 
+/* Takes the inputs of now, each within its range */
 static inline void latch(leaf_vehicle_Self *self, const leaf_vehicle_In *in)
 {
     self->before.T_em = in->T_em;
 }
 
+/* Waits whose guard is false begin anew */
 static inline void load(void)
 {
     /* nothing to do */
 }
 
+/* Transitions of mode always: the first one that is due is taken */
 static inline void jump_always(void)
 {
     guards_always();
 }
 
+/* Transitions: the first one that is due is taken */
 static inline void jump(leaf_vehicle_Self *self, Work *work)
 {
     self->fired = 0U;
@@ -83,10 +88,12 @@ static inline void jump(leaf_vehicle_Self *self, Work *work)
         jump_always();
         break;
     default:
+        /* there is no other */
         break;
     }
 }
 
+/* What each guard is now */
 static inline void watch(const leaf_vehicle_Self *self, Work *work)
 {
     work->at_w_em = self->state.w_em;
@@ -97,11 +104,13 @@ static inline void watch(const leaf_vehicle_Self *self, Work *work)
         guards_always();
         break;
     default:
+        /* there is no other */
         break;
     }
     load();
 }
 
+/* Transitions until none is enabled */
 static inline void settle(leaf_vehicle_Self *self)
 {
     Work scratch;
@@ -110,7 +119,10 @@ static inline void settle(leaf_vehicle_Self *self)
     bool is_settling;
 
     is_settling = true;
-    for (int32_t micro_step = 0; (micro_step < 2) && (is_settling); micro_step++) {
+    for (int32_t micro_step = 0; micro_step < 2; micro_step++) {
+        if (!is_settling) {
+            break;
+        }
         jump(self, work);
         is_settling = self->fired != 0U;
     }
@@ -121,6 +133,7 @@ static inline void settle(leaf_vehicle_Self *self)
     watch(self, work);
 }
 
+/* Equations of mode always */
 static inline void equations_always(leaf_vehicle_Self *self)
 {
     /* leaf_vehicle equations.w_d */
@@ -133,6 +146,7 @@ static inline void equations_always(leaf_vehicle_Self *self)
         + (constant.a_aer_r_w_cubed * self->state.w_w * fabs(self->state.w_w));
 }
 
+/* The first values, from the inputs of the first tick; nothing advances yet */
 static inline void start(leaf_vehicle_Self *self)
 {
     self->state.w_w = 0.0; /* leaf_vehicle states.w_w.initial */
@@ -144,6 +158,7 @@ static inline void start(leaf_vehicle_Self *self)
     self->started = true;
 }
 
+/* Equations */
 static inline void equations(leaf_vehicle_Self *self)
 {
     switch (self->mode) {
@@ -151,19 +166,21 @@ static inline void equations(leaf_vehicle_Self *self)
         equations_always(self);
         break;
     default:
+        /* there is no other */
         break;
     }
 }
 
+/* The whole step in mode always, if nothing happens in it */
 static inline void leap_always(leaf_vehicle_Self *self, const leaf_vehicle_In *in)
 {
     /* leaf_vehicle flow.w_em */
-    const double rate_w_em_1 = (self->before.T_em - (self->equation.T_hs * constant.per_R)
+    const double rate_w_em_start = (self->before.T_em - (self->equation.T_hs * constant.per_R)
         - (constant.b_em * self->state.w_em)) * constant.per_J_em;
     /* leaf_vehicle flow.w_w */
-    const double rate_w_w_1 = (self->equation.T_hs - self->equation.T_v) * constant.per_J_v;
-    const double at_w_em_2 = self->state.w_em + (0.001 * rate_w_em_1);
-    const double at_w_w_2 = self->state.w_w + (0.001 * rate_w_w_1);
+    const double rate_w_w_start = (self->equation.T_hs - self->equation.T_v) * constant.per_J_v;
+    const double at_w_em_2 = self->state.w_em + (0.001 * rate_w_em_start);
+    const double at_w_w_2 = self->state.w_w + (0.001 * rate_w_w_start);
     const double at_theta_d_2 = self->state.theta_d + (0.001 * self->equation.w_d);
     /* leaf_vehicle equations.w_d */
     const double at_w_d_2 = (at_w_em_2 * constant.per_R) - at_w_w_2;
@@ -190,43 +207,45 @@ static inline void leap_always(leaf_vehicle_Self *self, const leaf_vehicle_In *i
     const double rate_w_em_3 = (self->before.T_em - (at_T_hs_3 * constant.per_R)
         - (constant.b_em * at_w_em_3)) * constant.per_J_em;
     const double rate_w_w_3 = (at_T_hs_3 - at_T_v_3) * constant.per_J_v; /* leaf_vehicle flow.w_w */
-    const double at_w_em_4 = self->state.w_em + (0.002 * rate_w_em_3);
-    const double at_w_w_4 = self->state.w_w + (0.002 * rate_w_w_3);
-    const double at_theta_d_4 = self->state.theta_d + (0.002 * at_w_d_3);
+    const double at_w_em_end_4 = self->state.w_em + (0.002 * rate_w_em_3);
+    const double at_w_w_end_4 = self->state.w_w + (0.002 * rate_w_w_3);
+    const double at_theta_d_end_4 = self->state.theta_d + (0.002 * at_w_d_3);
     /* leaf_vehicle equations.w_d */
-    const double at_w_d_4 = (at_w_em_4 * constant.per_R) - at_w_w_4;
+    const double at_w_d_end = (at_w_em_end_4 * constant.per_R) - at_w_w_end_4;
     /* leaf_vehicle equations.T_hs */
-    const double at_T_hs_4 = (constant.k_hs * at_theta_d_4) + (constant.c_hs * at_w_d_4);
+    const double at_T_hs_end = (constant.k_hs * at_theta_d_end_4) + (constant.c_hs * at_w_d_end);
     /* leaf_vehicle equations.T_v */
-    const double at_T_v_4 = (constant.r_w_f0 * ha_tanh(at_w_w_4 * constant.per_w_sm))
-        + (constant.a_aer_r_w_cubed * at_w_w_4 * fabs(at_w_w_4));
+    const double at_T_v_end = (constant.r_w_f0 * ha_tanh(at_w_w_end_4 * constant.per_w_sm))
+        + (constant.a_aer_r_w_cubed * at_w_w_end_4 * fabs(at_w_w_end_4));
     /* leaf_vehicle flow.w_em */
-    const double rate_w_em_4 = (self->before.T_em - (at_T_hs_4 * constant.per_R)
-        - (constant.b_em * at_w_em_4)) * constant.per_J_em;
-    const double rate_w_w_4 = (at_T_hs_4 - at_T_v_4) * constant.per_J_v; /* leaf_vehicle flow.w_w */
-    const double end_w_em_now =
-        self->state.w_em + (0.0003333333333333333 * (rate_w_em_1 + (2.0 * rate_w_em_2)
-        + (2.0 * rate_w_em_3) + rate_w_em_4));
-    const double end_w_w_now =
-        self->state.w_w + (0.0003333333333333333 * (rate_w_w_1 + (2.0 * rate_w_w_2)
-        + (2.0 * rate_w_w_3) + rate_w_w_4));
-    const double end_theta_d_now =
+    const double rate_w_em_end = (self->before.T_em - (at_T_hs_end * constant.per_R)
+        - (constant.b_em * at_w_em_end_4)) * constant.per_J_em;
+    /* leaf_vehicle flow.w_w */
+    const double rate_w_w_end = (at_T_hs_end - at_T_v_end) * constant.per_J_v;
+    const double at_w_em_end_1 =
+        self->state.w_em + (0.0003333333333333333 * (rate_w_em_start + (2.0 * rate_w_em_2)
+        + (2.0 * rate_w_em_3) + rate_w_em_end));
+    const double at_w_w_end_1 =
+        self->state.w_w + (0.0003333333333333333 * (rate_w_w_start + (2.0 * rate_w_w_2)
+        + (2.0 * rate_w_w_3) + rate_w_w_end));
+    const double at_theta_d_end_1 =
         self->state.theta_d + (0.0003333333333333333 * (self->equation.w_d + (2.0 * at_w_d_2)
-        + (2.0 * at_w_d_3) + at_w_d_4));
-    self->state.w_em = end_w_em_now;
-    self->state.w_w = end_w_w_now;
-    self->state.theta_d = end_theta_d_now;
+        + (2.0 * at_w_d_3) + at_w_d_end));
+    self->state.w_em = at_w_em_end_1;
+    self->state.w_w = at_w_w_end_1;
+    self->state.theta_d = at_theta_d_end_1;
     self->time = self->time + 0.002;
     self->before.T_em = in->T_em;
     /* leaf_vehicle equations.w_d */
-    self->equation.w_d = (end_w_em_now * constant.per_R) - end_w_w_now;
+    self->equation.w_d = (at_w_em_end_1 * constant.per_R) - at_w_w_end_1;
     /* leaf_vehicle equations.T_hs */
-    self->equation.T_hs = (constant.k_hs * end_theta_d_now) + (constant.c_hs * self->equation.w_d);
+    self->equation.T_hs = (constant.k_hs * at_theta_d_end_1) + (constant.c_hs * self->equation.w_d);
     /* leaf_vehicle equations.T_v */
-    self->equation.T_v = (constant.r_w_f0 * ha_tanh(end_w_w_now * constant.per_w_sm))
-        + (constant.a_aer_r_w_cubed * end_w_w_now * fabs(end_w_w_now));
+    self->equation.T_v = (constant.r_w_f0 * ha_tanh(at_w_w_end_1 * constant.per_w_sm))
+        + (constant.a_aer_r_w_cubed * at_w_w_end_1 * fabs(at_w_w_end_1));
 }
 
+/* The whole step, if nothing happens in it */
 static inline void leap(leaf_vehicle_Self *self, const leaf_vehicle_In *in)
 {
     switch (self->mode) {
@@ -234,6 +253,7 @@ static inline void leap(leaf_vehicle_Self *self, const leaf_vehicle_In *in)
         leap_always(self, in);
         break;
     default:
+        /* there is no other */
         break;
     }
 }

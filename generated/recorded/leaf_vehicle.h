@@ -45,15 +45,15 @@ typedef struct {
         double w_em; /* rad/s */
         double w_w; /* rad/s */
         double theta_d; /* rad */
-    } state;
+    } state; /* states */
     struct {
         double w_d; /* rad/s */
         double T_hs; /* N*m */
         double T_v; /* N*m */
-    } equation;
+    } equation; /* equations */
     struct {
         double T_em; /* N*m */
-    } before;
+    } before; /* inputs of the tick before */
     int16_t mode; /* active mode */
     uint16_t fired; /* transition of this micro-step, 0: none */
     bool started; /* the first step is done */

@@ -113,7 +113,9 @@ def test_the_default_page_holds_the_values_of_the_spec(tmp_path: Path) -> None:
     assert size == 8
     solved = {c.name: c.value for c in used.constants if c.kind == "solved"}
     for name, value in solved.items():
-        offset, _ = where.page.members[f"solved.{name.partition('.')[2].replace('.', '_')}"]
+        matrix, _, entry = name.partition(".")[2].partition(".")
+        member = f"{matrix}_{entry.replace('.', '__')}" if entry else matrix
+        offset, _ = where.page.members[f"solved.{member}"]
         assert struct.unpack_from("<d", raw, offset) == (value,), name
 
 

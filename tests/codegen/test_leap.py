@@ -88,8 +88,8 @@ def test_only_inputs_that_guards_read_are_looked_at(when: str, event: set[str]) 
     assert compare(tape).is_equal
     assert len(set(column(tape, "memory.mode"))) == 2
     text = c_files(made)["cart.c"]
-    assert set(re.findall(r"event_now = in->(\w+) != self", text)) == event
-    assert set(re.findall(r"changed_\w+_now = in->(\w+) != self", text)) == {"F", "slope"}
+    assert set(re.findall(r"event_end = in->(\w+) != self", text)) == event
+    assert set(re.findall(r"changed_\w+_end = in->(\w+) != self", text)) == {"F", "slope"}
 
 
 def test_a_mode_that_waits_takes_the_general_path() -> None:

@@ -10,8 +10,9 @@ from pathlib import Path
 import pytest
 from hypothesis import given, strategies as st
 
-from language.exponential import LARGEST_NORM, taylor_terms
+from language.exponential import LARGEST_NORM
 from language.program import Program
+from language.taylor import taylor_terms
 from tests.language.flowing import Flow
 from tests.language.making import program, project_of, refusal, told
 

@@ -126,7 +126,7 @@ def test_a_dropped_reset_is_found_where_it_would_be_made(tape: Tape, change: Cha
 
 
 def test_a_mode_or_fired_transition_alone_is_found(tape: Tape, change: Change) -> None:
-    change("self->fired = 2U;", "self->fired = 1U;")
+    change("self->fired = heater_FIRED_heating_rest;", "self->fired = 1U;")
     found = first_difference(tape)
     assert found.signal == "fired"
     assert (found.engine, found.compiled) == (shown_whole(2), shown_whole(1))
@@ -164,7 +164,7 @@ def test_a_difference_reads_as_one_line(tape: Tape, change: Change) -> None:
 
 
 def test_time_counts_from_the_start_of_the_tape(tape: Tape, change: Change) -> None:
-    change("self->fired = 2U;", "self->fired = 1U;")
+    change("self->fired = heater_FIRED_heating_rest;", "self->fired = 1U;")
     tape.start = 17.5
     found = first_difference(tape)
     assert found.time == pytest.approx(17.5 + found.tick * PERIOD)

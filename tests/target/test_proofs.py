@@ -79,8 +79,12 @@ def test_what_guards_may_do_is_proven_of_each_mode() -> None:
 @pytest.mark.parametrize(
     ("right", "wrong", "goal"),
     [
-        ("self->fired = 1U;", "self->fired = 2U;", "jump_open_ensures"),
-        ("self->fired = 2U;", "self->fired = 2U;\n        self->faults = 1U;", "jump_shut_assigns"),
+        ("self->fired = contactor_FIRED_open_shut;", "self->fired = 2U;", "jump_open_ensures"),
+        (
+            "self->fired = contactor_FIRED_shut_open;",
+            "self->fired = 2U;\n        self->faults = 1U;",
+            "jump_shut_assigns",
+        ),
     ],
 )
 def test_a_mode_that_breaks_its_contract_is_found(
@@ -146,7 +150,7 @@ def test_a_state_without_its_range_is_found(monkeypatch: pytest.MonkeyPatch) -> 
         text, end, product = (
             files["estimator_simple.c"],
             "w_em <= 2400.0)",
-            "drive_Phi_w_em_w_em * ",
+            "drive_Phi_w_em__w_em * ",
         )
         assert end in text
         assert product in text

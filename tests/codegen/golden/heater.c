@@ -31,18 +31,27 @@ static const struct {
     .P_loss_t_tick = 0.7000000000000001, /* P_loss * t_tick */
 };
 
+/* Computes much: its values are on the stack only while it runs */
+#if defined(__GNUC__)
+#define APART __attribute__((noinline))
+#else
+#define APART
+#endif
+
 const char heater_Version[] = heater_DIGEST;
 
 heater_CALIBRATION const volatile heater_Cal heater_default_cal = {
     .P_max = 200.0,
 };
 
+/* Equations of mode rest */
 static inline void equations_rest(heater_Self *self)
 {
     self->equation.low = self->latched.T < constant.T_on; /* heater equations.low */
     self->equation.P = 0.0; /* heater modes.rest.equations.P */
 }
 
+/* Transitions of mode rest: the first one that is due is taken */
 static inline void jump_rest(heater_Self *self, const heater_In *in)
 {
     if (!(self->equation.low && in->request)) { /* heater modes.rest.transitions.heating.when */
@@ -62,11 +71,12 @@ static inline void jump_rest(heater_Self *self, const heater_In *in)
         }
         self->timer.rest_heating = 0U;
         self->mode = heater_MODE_heating;
-        self->fired = 1U; /* heater modes.rest.transitions.heating */
+        self->fired = heater_FIRED_rest_heating; /* heater modes.rest.transitions.heating */
     }
 }
 
-static inline void equations_heating(heater_Self *self, const volatile heater_Cal *cal)
+/* Equations of mode heating */
+static APART void equations_heating(heater_Self *self, const volatile heater_Cal *cal)
 {
     self->equation.low = self->latched.T < constant.T_on; /* heater equations.low */
     /* heater modes.heating.equations.P */
@@ -74,15 +84,17 @@ static inline void equations_heating(heater_Self *self, const volatile heater_Ca
         cal->P_max) * sqrt(fabs(ha_sin(self->latched.T * constant.per_T_on * 1.0)));
 }
 
+/* Transitions of mode heating: the first one that is due is taken */
 static inline void jump_heating(heater_Self *self, const heater_In *in)
 {
     if ((self->latched.T >= constant.T_off) || (!in->request)) {
         self->mode = heater_MODE_rest;
-        self->fired = 2U; /* heater modes.heating.transitions.rest */
+        self->fired = heater_FIRED_heating_rest; /* heater modes.heating.transitions.rest */
     }
 }
 
-static inline void update_heating(heater_Self *self)
+/* Updates of mode heating, from the values of this tick */
+static APART void update_heating(heater_Self *self)
 {
     /* heater modes.heating.update.heat */
     const double next_heat =
@@ -95,6 +107,7 @@ static inline void update_heating(heater_Self *self)
     }
 }
 
+/* Takes the inputs of now, each within its range */
 static inline void latch(heater_Self *self, const heater_In *in)
 {
     if ((in->T >= 200.0) && (in->T <= 500.0)) {
@@ -107,11 +120,13 @@ static inline void latch(heater_Self *self, const heater_In *in)
     }
 }
 
+/* Keeps the inputs of this tick for the next one */
 static inline void remember(void)
 {
     /* nothing to do */
 }
 
+/* The first values, from the inputs of the first tick; nothing advances yet */
 static inline void start(heater_Self *self)
 {
     const double new_heat = 0.3; /* heater states.heat.initial */
@@ -166,6 +181,7 @@ void heater_Step(heater_Self *self, const volatile heater_Cal *cal,
         equations_heating(self, cal);
         break;
     default:
+        /* there is no other */
         break;
     }
     switch (self->mode) {
@@ -176,6 +192,7 @@ void heater_Step(heater_Self *self, const volatile heater_Cal *cal,
         jump_heating(self, in);
         break;
     default:
+        /* there is no other */
         break;
     }
     if (self->fired != 0U) {
@@ -187,6 +204,7 @@ void heater_Step(heater_Self *self, const volatile heater_Cal *cal,
             equations_heating(self, cal);
             break;
         default:
+            /* there is no other */
             break;
         }
     }
@@ -195,6 +213,7 @@ void heater_Step(heater_Self *self, const volatile heater_Cal *cal,
         update_heating(self);
         break;
     default:
+        /* there is no other */
         break;
     }
     remember();

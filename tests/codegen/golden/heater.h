@@ -17,6 +17,10 @@ enum {
     heater_MODE_heating = 1
 };
 
+/* Transitions, as `fired` tells them; 0U is none */
+#define heater_FIRED_rest_heating 1U
+#define heater_FIRED_heating_rest 2U
+
 /* Latched fault bits */
 #define heater_FAULT_range_T (1UL << 0)
 #define heater_FAULT_range_heat (1UL << 1)
@@ -46,17 +50,17 @@ typedef struct {
 typedef struct {
     struct {
         double heat; /* N*m */
-    } state;
+    } state; /* states */
     struct {
         double T; /* K; inputs.T within its range */
-    } latched;
+    } latched; /* inputs of this tick */
     struct {
         bool low; /*  */
         double P; /* W */
-    } equation;
+    } equation; /* equations */
     struct {
         uint16_t rest_heating; /* ticks that the guard has been true, at most 4 */
-    } timer;
+    } timer; /* ticks that a guard was true */
     int16_t mode; /* active mode */
     uint16_t fired; /* transition of this tick, 0: none */
     bool started; /* the first tick is done */
