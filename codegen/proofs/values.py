@@ -16,7 +16,9 @@ from codegen.rendering import render
 from codegen.source import c_files, stepped
 from codegen.tool import told
 from language.number import LARGEST
+from language.operation import Loop
 from language.program import Constant, Program, Variable
+from language.traversal import walk
 
 KERNEL = (
     *("-machdep", "gcc_x86_32", "-cpp-extra-args=-I. -Dvolatile="),
@@ -37,7 +39,8 @@ def values(program: Program, folder: Path) -> Proof:
     for name, text in files.items():
         (folder / name).write_text(text)
     sources = [name for name in files if name.endswith(".c")]
-    done = told(["frama-c", *KERNEL, *ANALYSIS, *sources], folder)
+    unrolled = ("-eva-min-loop-unroll", str(_turns(program)))
+    done = told(["frama-c", *KERNEL, *ANALYSIS, *unrolled, *sources], folder)
     tool = f"Frama-C {version_of('frama-c', folder)}"
     alarms = {
         f"{m['file']}:{m['line']}: {m['what'] or m['more']}" for m in ALARM.finditer(done.stdout)
@@ -48,6 +51,16 @@ def values(program: Program, folder: Path) -> Proof:
         return Proof("values", tool, "no result", tuple(last) or ("no result",))
     about = f"{reached[1]} of {reached[2]} statements reached; any number of steps"
     return Proof("values", tool, about, tuple(sorted(alarms)))
+
+
+def _turns(program: Program) -> int:
+    """Return how often loops are followed turn by turn: as often as one of a run turns at most, for
+    what it computes grows from turn to turn, and has no bound that the analysis finds.
+    """
+    if not program.run_modes:
+        return 0
+    loops = (op for block in program.blocks.values() for op in walk(block) if isinstance(op, Loop))
+    return max((loop.count for loop in loops), default=0)
 
 
 def _main(program: Program) -> str:
