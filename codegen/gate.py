@@ -18,7 +18,7 @@ from language.substitution import with_expressions
 LATCH = "latch"
 WITHIN = "within"
 """A function of C alone."""
-APART = "latch_apart"
+LATCH_APART = "latch_apart"
 """What takes the inputs one by one."""
 
 
@@ -41,7 +41,11 @@ def gated(program: Program, by_amount: bool = True) -> Program:
     if len(held) == len(taken) > 1:
         inside = reduce(_both, (part for branch in held for part in _parts(branch.condition)))
         together = tuple(op for branch in held for op in branch.then)
-        blocks = {APART: taken, **blocks, LATCH: (Branch(inside, together, (Run(APART),)),)}
+        blocks = {
+            LATCH_APART: taken,
+            **blocks,
+            LATCH: (Branch(inside, together, (Run(LATCH_APART),)),),
+        }
     return dataclasses.replace(program, blocks=blocks)
 
 

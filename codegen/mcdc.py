@@ -23,14 +23,14 @@ from codegen.harness import fed, tunable, write_harness
 from codegen.machine import HOST
 from codegen.proofs.infeasible import never, places_of
 from codegen.proofs.terms import Range
-from codegen.source import c_program
+from codegen.source import STATIC, c_program
 from codegen.tool import output_of
 from language.program import Program
 
 COMPILER, MERGER, EXPORTER = "clang-19", "llvm-profdata-19", "llvm-cov-19"
 COVERED = ("-fprofile-instr-generate", "-fcoverage-mapping", "-fcoverage-mcdc")
 APP, POOL, MERGED = "app", "counts_%1m.profraw", "counts.profdata"
-FUNCTION = re.compile(r"(?:static (?:inline|RARELY|APART) )?void (\w+)\(")
+FUNCTION = re.compile(rf"(?:{STATIC})?void (\w+)\(")
 Key = tuple[str, str]
 """The block and the text of a decision."""
 CASE = re.compile(r"case\b|default\b")

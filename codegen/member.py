@@ -14,10 +14,10 @@ from language.program import Constant, Program, Variable
 from language.units import shown_unit
 
 GROUPS = {
-    "state": "states",
+    "state": "",
     "discrete": "discrete variables",
     "latched": "inputs of this tick",
-    "equation": "equations",
+    "equation": "",
     "before": "inputs of the tick before",
     "innovation": "measurements less what was predicted",
     "timer": "ticks that a guard was true",

@@ -108,8 +108,7 @@ class CNames:
 def c_member(name: str) -> str:
     """Return the name of a struct member or local: the name without its group.
 
-    >>> c_member("solved.drive_L.w_em.y_w")
-    'drive_L_w_em__y_w'
+    Row and column of a solved matrix are apart by two underscores: `drive_L_w_em__y_w`.
     """
     matrix, *entry = short(name).split(".")
     apart = "__" if name.startswith("solved.") else "_"

@@ -2,77 +2,70 @@
 
 from __future__ import annotations
 
+import re
+
 PURPOSES = {
-    "back": "Goes back to the tick in which `until` turned true, for transition {}",
-    "choose": "The transition that mode {} wishes for",
+    "back": "Goes back to the tick in which `until` turned true[, for transition {}]",
+    "choose": "The transition that mode[ {}] wishes for",
     "commit": "Leaves, resets and enters what the chosen transitions say",
     "compare_stamps": "Sets a fault where solved numbers belong to another calibration",
-    "correct": "Innovations and correction of the observer in mode {}",
-    "count": "Counts the ticks that guards of mode {} were true, and its time",
-    "cover": "The covariance with which mode {} begins",
+    "correct": "Innovations and correction of the observer[ in mode {}]",
+    "count": "Counts the ticks that guards[ of mode {}] were true, and its time",
+    "cover": "The covariance with which mode[ {}] begins",
     "decide": "The truth tables",
     "elapse": "Time passes: what is left of the step and of waits",
-    "equations": "Equations of mode {}",
-    "guards": "Guards of mode {}",
-    "half": "States in the middle of a whole step in mode {}: x = Eh x + Fh pull",
-    "hear": "Decides between the wishes of regions: {}",
-    "jump": "Transitions of mode {}: the first one that is due is taken",
+    "equations": "Equations[ of mode {}]",
+    "guards": "Guards[ of mode {}]",
+    "half": "States in the middle of a whole step[ in mode {}]: x = Eh x + Fh pull",
+    "hear": "Decides between the wishes of regions[: {}]",
+    "jump": "Transitions[ of mode {}]: the first one that is due is taken",
     "keep": "Keeps the values that are read later: delays, and ticks that are looked back to",
     "latch": "Takes the inputs of now, each within its range",
     "latch_apart": "Inputs one by one: a fault bit for each that is not within its range",
-    "leap": "The whole step in mode {}, if nothing happens in it",
-    "leave": "What is forgotten where {} is left",
+    "leap": "The whole step[ in mode {}], if nothing happens in it",
+    "leave": "What is forgotten where[ {}] is left",
     "limit": "The next piece of the step: it ends where a wait does",
     "load": "Waits whose guard is false begin anew",
-    "locate": "Halves the bracket in which a guard of mode {} changes; its upper end is kept",
-    "look": "Guards of mode {} at work->s after the start of the step",
+    "locate": "Halves the bracket in which a guard[ of mode {}] changes; its upper end is kept",
+    "look": "Guards[ of mode {}] at work->s after the start of the step",
     "micro_step": "One micro-step: choose, leave, reset, enter",
-    "move": "Flows in mode {} over work->h, or to the first change of a guard",
+    "move": "Flows[ in mode {}] over work->h, or to the first change of a guard",
     "point": "States at work->s after the start of the step: its polynomial",
-    "predict": "Prediction of the observer in mode {} over one period",
-    "pull": "What of the rates in mode {} is not linear in the states: pull = rate - A x",
-    "quit": "Leaves region {} with all that is active in it",
-    "rates": "Rates of the states in mode {}",
+    "predict": "Prediction of the observer[ in mode {}] over one period",
+    "pull": "What of the rates[ in mode {}] is not linear in the states: pull = rate - A x",
+    "quit": "Leaves region[ {}] with all that is active in it",
+    "rates": "Rates of the states[ in mode {}]",
     "remember": "Keeps the inputs of this tick for the next one",
-    "rest": "The model over work->rest: the rest of a tick, in mode {}",
-    "run": "The model over one tick, in mode {}",
+    "rest": "The model over work->rest: the rest of a tick[, in mode {}]",
+    "run": "The model over one tick[, in mode {}]",
     "segment": "One piece of the step: flow, then what is due at its end",
     "select_transitions": "The transitions of one micro-step",
-    "series": "Coefficients of the polynomial through the step in mode {}",
+    "series": "Coefficients of the polynomial through the step[ in mode {}]",
     "settle": "Transitions until none is enabled",
-    "spread": "The covariance over one period: {}",
+    "spread": "The covariance over one period[: {}]",
+    "late": "What a change of an input at an unknown instant has done[: {}]",
     "start": "The first values, from the inputs of the first tick; nothing advances yet",
-    "step": "One step of the method in mode {}: from the states to work->end_*",
-    "store": "What updates of mode {} found, stored together",
+    "step": "One step of the method[ in mode {}]: from the states to work->end_*",
+    "store": "What updates[ of mode {}] found, stored together",
     "switch": "The transition of the model out of mode {}",
     "through_events": "The step from event to event: taken where something happens in it",
-    "until": "Whether `until` holds, for transition {}",
-    "update": "Updates of mode {}, from the values of this tick",
+    "until": "Whether `until` holds[, for transition {}]",
+    "update": "Updates[ of mode {}], from the values of this tick",
     "watch": "What each guard is now",
-    "whole": "States at the end of a whole step in mode {}: x = E x + F pull",
+    "whole": "States at the end of a whole step[ in mode {}]: x = E x + F pull",
 }
-"""By the word that the name of a block begins with; `{}` is what follows it."""
+"""By the words that the name of a block begins with; `{}` is what follows them, and what stands in
+brackets is said where something does.
+"""
+OPTIONAL = re.compile(r"\[(.*?)\]")
 
 
 def purpose(block: str) -> str:
-    """Return what a block is for; nothing where its name begins with no such word.
-
-    >>> purpose("rates_no_contact")
-    'Rates of the states in mode no_contact'
-    >>> purpose("equations")
-    'Equations'
-    """
+    """Return what a block is for; nothing where its name begins with no such words."""
     words = block.split("_")
     for count in range(len(words), 0, -1):
         text = PURPOSES.get("_".join(words[:count]))
         if text:
             rest = "_".join(words[count:])
-            return text.format(rest) if rest or "{}" not in text else _bare(text)
+            return OPTIONAL.sub(r"\1" if rest else "", text).replace("{}", rest)
     return ""
-
-
-def _bare(text: str) -> str:
-    """Return a purpose without the phrase that names whose it is."""
-    for phrase in (" of mode {}", " in mode {}", ": {}", ", for transition {}", " {}"):
-        text = text.replace(phrase, "")
-    return text

@@ -8,7 +8,7 @@ from typing import Any
 
 from codegen.expression import SUFFIX, literal
 from codegen.frame import apart
-from codegen.gate import APART, gated
+from codegen.gate import LATCH_APART, gated
 from codegen.leap import THROUGH, leaping
 from codegen.mathematics import math_files
 from codegen.member import CONSTANTS, PAGE, Page, field_of, members
@@ -42,8 +42,15 @@ from language.traversal import reads, walk
 from language.wiring import finished
 
 ENTRIES = ("init", "derive", "step")
-RARE = (APART, THROUGH)
+RARE = (LATCH_APART, THROUGH)
 """Blocks that are kept out of the way of what a step does nearly always."""
+NOT_INLINED = {
+    "RARELY": "Cold path, not inlined",
+    "APART": "Computes much: its values are on the stack only while it runs",
+}
+"""Keywords of functions of a module, with why."""
+STATIC = rf"static (?:{'|'.join(('inline', *NOT_INLINED))}) "
+"""How the definition of such a function begins, as a pattern."""
 INLINE = ("min", "max", "clip", "sign", "pow2", "whole", "within", "lookup", "lookup2")
 
 
@@ -99,7 +106,7 @@ def module_context(program: Program, page: Page = CONSTANTS) -> dict[str, Any]:
         {
             **_block(program, name, local[name], turned[name], used, kinds, page, scratch),
             "purpose": purpose(name),
-            "keyword": "RARELY" if name.startswith(RARE) else "APART" if name in own else "inline",
+            "keyword": _keyword(name, own),
         }
         for name in _callees_first(program)
     ]
@@ -111,7 +118,11 @@ def module_context(program: Program, page: Page = CONSTANTS) -> dict[str, Any]:
         "work_type": _work_type(program, page, scratch),
         "blocks": [block for block in blocks if block["name"] not in ENTRIES],
         "entries": {block["name"]: block for block in blocks if block["name"] in ENTRIES},
-        "keywords": {block["keyword"] for block in blocks},
+        "keywords": [
+            (word, why)
+            for word, why in NOT_INLINED.items()
+            if any(block["keyword"] == word for block in blocks)
+        ],
         "has_stamps": "compare_stamps" in program.blocks,
         "uses_math": bool(called & {*FUNCTIONS_OF[number], *INLINE}),
         "uses_libm": bool(called & {"abs", "sqrt", "floor"}),
@@ -224,6 +235,12 @@ def _block(
             *(_in_derive(name, line) for line in writer.lines(program.blocks[name])),
         ],
     }
+
+
+def _keyword(name: str, own: frozenset[str]) -> str:
+    if name.startswith(RARE):
+        return "RARELY"
+    return "APART" if name in own else "inline"
 
 
 def _listed(opening: str, parameters: Sequence[str]) -> str:

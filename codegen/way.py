@@ -31,8 +31,6 @@ from language.substitution import parts, with_expressions, with_parts
 from language.traversal import block_reads, block_writes, expr_names
 
 WORK, LEFT, CROSSED = "work.", "work.left", "work.crossed"
-
-
 LOOKS, PLACE = ("rates_", "guards_"), "work.at_"
 """Blocks that look at a point of the step, and how the states there are called."""
 

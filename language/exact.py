@@ -6,6 +6,8 @@ Control 23, 395-404). Only for flows that are affine in the states with constant
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from language.exponential import Solved, closing, linear_motion, opening
 from language.field import Field
 from language.motion import Method
@@ -26,5 +28,5 @@ def exact(field: Field, solved: Solved, span: Span, problems: Problems) -> Metho
     return linear_motion(field, solved, _step, span, problems)
 
 
-def _step(field: Field, mode: str, solved: Solved) -> Block:
-    return (*opening(field, mode), *closing(field, mode, solved))
+def _step(field: Field, mode: str, solved: Solved) -> Mapping[str, Block]:
+    return {f"step_{mode}": (*opening(field, mode), *closing(field, mode, solved))}

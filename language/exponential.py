@@ -6,7 +6,6 @@ Inside a step the solution of x' = A x + pull is a Taylor sum of a fixed number 
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -88,23 +87,17 @@ class Solved:
 
 def exponential(field: Field, solved: Solved, span: Span, problems: Problems) -> Method:
     """Return the method for a field."""
-    made = linear_motion(field, solved, _step, span, problems)
-    halves = {
-        f"half_{name}": _moved(field, name, ("at", "Eh", "Fh"), solved)
-        for name in field.automaton.modes
-        if f"step_{name}" in made.blocks
-    }
-    return dataclasses.replace(made, blocks={**made.blocks, **halves})
+    return linear_motion(field, solved, _step, span, problems)
 
 
 def linear_motion(
     field: Field,
     solved: Solved,
-    step: Callable[[Field, str, Solved], Block],
+    step: Callable[[Field, str, Solved], Mapping[str, Block]],
     span: Span,
     problems: Problems,
 ) -> Method:
-    """Return a method that has the linear part solved; `step` makes the step of a mode."""
+    """Return a method that has the linear part solved; `step` makes the blocks of a mode's."""
     made: dict[str, Block] = {}
     constants: list[Constant] = []
     norms: dict[str, float] = {}
@@ -119,7 +112,7 @@ def linear_motion(
             problems.error("step", span, label, f"{needed} times as many `substeps` are enough")
             continue
         constants += _constants(field, name, solved)
-        made[f"step_{name}"] = step(field, name, solved)
+        made.update(step(field, name, solved))
         made[f"pull_{name}"] = _pull(field, name, solved)
         made[f"whole_{name}"] = _moved(field, name, ("end", "E", "F"), solved)
     bounded = [step for name, norm in norms.items() if norm <= LARGEST_NORM for step in steps[name]]
@@ -225,17 +218,19 @@ def _moved(field: Field, mode: str, letters: tuple[str, str, str], solved: Solve
     return tuple(ops)
 
 
-def _step(field: Field, mode: str, solved: Solved) -> Block:
+def _step(field: Field, mode: str, solved: Solved) -> Mapping[str, Block]:
     half = multiply(real(0.5), Ref("work.h"))
     middle = Assign("work.s", half)
     part: Block = (Run(f"series_{mode}"), middle, Run("point"))
-    return (
+    step = (
         *opening(field, mode),
         Branch(_is_whole(solved), (Run(f"half_{mode}"),), part),
         *at_time(field, half),
         Run(f"pull_{mode}"),
         *closing(field, mode, solved),
     )
+    moved = _moved(field, mode, ("at", "Eh", "Fh"), solved)
+    return {f"half_{mode}": moved, f"step_{mode}": step}
 
 
 def _series(field: Field, mode: str, solved: Solved, terms: int) -> Block:

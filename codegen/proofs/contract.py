@@ -16,7 +16,7 @@ from pathlib import Path
 
 from codegen.names import SOLVED_ON_PAGE, CNames, mode_constant
 from codegen.proofs.proof import Proof, version_of
-from codegen.source import c_files, c_program
+from codegen.source import STATIC, c_files, c_program
 from codegen.tool import needed, told
 from codegen.usage import locals_of
 from language.operation import Count
@@ -103,9 +103,7 @@ class _Mode:
 
     def annotated(self, text: str) -> str:
         """Return C with the contract before its function."""
-        head = re.compile(
-            rf"^static (?:inline|RARELY|APART) void jump_{self.mode.name}\(([^)]*)\)", re.M
-        )
+        head = re.compile(rf"^{STATIC}void jump_{self.mode.name}\(([^)]*)\)", re.M)
         found = head.search(text)
         assert found, self.mode.name
         pointers = re.findall(r"(const [^,*]*)?\*(\w+)", found[1])

@@ -67,8 +67,8 @@ typedef struct {
     double rate_theta_b; /* (rad)/s */
     double at_T_l; /* N*m */
     double rate_T_l; /* (N*m)/s */
-    bool guard_0; /*  */
-    bool guard_1; /*  */
+    bool guard_0;
+    bool guard_1;
     double merge; /* s; what crosses within it is one instant */
     double left; /* s; rest of the major step */
     bool is_wait; /* a wait ends with the segment */
@@ -102,7 +102,7 @@ typedef struct {
         double theta_d; /* rad */
         double theta_b; /* rad */
         double T_l; /* N*m */
-    } state; /* states */
+    } state;
     struct {
         double w_d; /* rad/s */
         double w_free; /* rad/s */
@@ -111,7 +111,7 @@ typedef struct {
         double T_rr; /* N*m */
         double T_v; /* N*m */
         double w_b; /* rad/s */
-    } equation; /* equations */
+    } equation;
     struct {
         double T_em; /* N*m */
         double T_br; /* N*m */
@@ -120,8 +120,8 @@ typedef struct {
     } before; /* inputs of the tick before */
     int16_t mode; /* active mode */
     uint16_t fired; /* transition of this micro-step, 0: none */
-    bool armed_0; /*  */
-    bool armed_1; /*  */
+    bool armed_0;
+    bool armed_1;
     bool started; /* the first step is done */
     double time; /* s; time since the start: for tolerances only */
     uint32_t faults; /* latched fault bits */

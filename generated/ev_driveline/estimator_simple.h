@@ -133,7 +133,7 @@ typedef struct {
         double w_em; /* rad/s */
         double w_w; /* rad/s */
         double theta_b; /* rad */
-    } state; /* states */
+    } state;
     struct {
         double y_em; /* rad/s; inputs.y_em within its range */
         double y_w; /* rad/s; inputs.y_w within its range */
@@ -145,7 +145,7 @@ typedef struct {
         double w_d; /* rad/s */
         double T_hs; /* N*m */
         double w_b; /* rad/s */
-    } equation; /* equations */
+    } equation;
     struct {
         double T_em; /* N*m */
         double T_br; /* N*m */

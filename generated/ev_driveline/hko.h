@@ -244,7 +244,7 @@ typedef struct {
     double gain_T_l; /* 1 */
     double spread; /* 1 */
     double residual; /* 1 */
-    int32_t place; /*  */
+    int32_t place;
     double after_w_w; /* rad/s */
     double after_w_em; /* rad/s */
     double after_theta_d; /* rad */
@@ -252,8 +252,8 @@ typedef struct {
     double after_T_l; /* N*m */
     double after_T_em; /* N*m */
     double after_T_br; /* N*m */
-    int32_t back; /*  */
-    bool until; /*  */
+    int32_t back;
+    bool until;
     double rest; /* s; from the crossing to the end of its tick */
     double reset_theta_b; /* rad */
     double new_theta_d; /* rad */
@@ -271,8 +271,8 @@ typedef struct {
     double rate_theta_b; /* (rad)/s */
     double at_T_l; /* N*m */
     double rate_T_l; /* (N*m)/s */
-    bool guard_0; /*  */
-    bool guard_1; /*  */
+    bool guard_0;
+    bool guard_1;
     double h; /* s; step to flow over */
     double elapsed; /* s; part of the step until a crossing */
     bool crossed; /* a guard changed */
@@ -302,7 +302,7 @@ typedef struct {
         double w_em; /* rad/s */
         double w_w; /* rad/s */
         double T_l; /* N*m */
-    } state; /* states */
+    } state;
     struct {
         double y_em; /* rad/s; inputs.y_em within its range */
         double y_w; /* rad/s; inputs.y_w within its range */
@@ -316,7 +316,7 @@ typedef struct {
         double T_acc; /* N*m */
         double T_sum; /* N*m */
         double w_b; /* rad/s */
-    } equation; /* equations */
+    } equation;
     struct {
         double T_em; /* N*m */
         double T_br; /* N*m */

@@ -42,8 +42,8 @@ typedef struct {
 /* One instance: allocated by the caller, written by this module alone */
 typedef struct {
     struct {
-        bool closed; /*  */
-    } equation; /* equations */
+        bool closed;
+    } equation;
     struct {
         uint16_t open_shut; /* ticks that the guard has been true, at most 5 */
     } timer; /* ticks that a guard was true */

@@ -126,53 +126,53 @@ typedef struct {
 
 /* Values that live within one step */
 typedef struct {
-    bool level_1; /*  */
-    bool edge_1; /*  */
-    uint16_t wish_chart; /*  */
-    uint16_t takes_chart; /*  */
-    int32_t low_chart; /*  */
-    int32_t high_chart; /*  */
-    bool heard_chart; /*  */
-    uint16_t wish_operation_drive_torque; /*  */
-    uint16_t takes_operation_drive_torque; /*  */
-    int32_t low_operation_drive_torque; /*  */
-    int32_t high_operation_drive_torque; /*  */
-    bool heard_operation_drive_torque; /*  */
-    uint16_t wish_operation_drive_derating; /*  */
-    uint16_t takes_operation_drive_derating; /*  */
-    int32_t low_operation_drive_derating; /*  */
-    int32_t high_operation_drive_derating; /*  */
-    bool heard_operation_drive_derating; /*  */
-    uint16_t wish_main; /*  */
-    uint16_t takes_main; /*  */
-    int32_t low_main; /*  */
-    int32_t high_main; /*  */
-    bool heard_main; /*  */
-    uint16_t wish_pre; /*  */
-    uint16_t takes_pre; /*  */
-    int32_t low_pre; /*  */
-    int32_t high_pre; /*  */
-    bool heard_pre; /*  */
-    bool keeps; /*  */
-    bool is_first; /*  */
-    bool is_over; /*  */
-    int32_t head; /*  */
-    int32_t tail; /*  */
-    int32_t event; /*  */
+    bool level_1;
+    bool edge_1;
+    uint16_t wish_chart;
+    uint16_t takes_chart;
+    int32_t low_chart;
+    int32_t high_chart;
+    bool heard_chart;
+    uint16_t wish_operation_drive_torque;
+    uint16_t takes_operation_drive_torque;
+    int32_t low_operation_drive_torque;
+    int32_t high_operation_drive_torque;
+    bool heard_operation_drive_torque;
+    uint16_t wish_operation_drive_derating;
+    uint16_t takes_operation_drive_derating;
+    int32_t low_operation_drive_derating;
+    int32_t high_operation_drive_derating;
+    bool heard_operation_drive_derating;
+    uint16_t wish_main;
+    uint16_t takes_main;
+    int32_t low_main;
+    int32_t high_main;
+    bool heard_main;
+    uint16_t wish_pre;
+    uint16_t takes_pre;
+    int32_t low_pre;
+    int32_t high_pre;
+    bool heard_pre;
+    bool keeps;
+    bool is_first;
+    bool is_over;
+    int32_t head;
+    int32_t tail;
+    int32_t event;
     int32_t queue[5]; /* events that wait */
-    bool enter_operation_standby; /*  */
-    bool enter_operation_precharge; /*  */
-    bool enter_operation_ready; /*  */
-    bool exit_operation_drive; /*  */
-    bool enter_fault; /*  */
-    int32_t steps; /*  */
-    bool is_busy; /*  */
+    bool enter_operation_standby;
+    bool enter_operation_precharge;
+    bool enter_operation_ready;
+    bool exit_operation_drive;
+    bool enter_fault;
+    int32_t steps;
+    bool is_busy;
     float reset_T_cmd; /* N*m */
-    bool reset_main_cmd; /*  */
-    bool reset_pre_cmd; /*  */
+    bool reset_main_cmd;
+    bool reset_pre_cmd;
     float next_T_cmd; /* N*m */
     float next_share; /* 1 */
-    bool decided_permit; /*  */
+    bool decided_permit;
 } supervisor_Work;
 
 /* One instance: allocated by the caller, written by this module alone */
@@ -193,11 +193,11 @@ typedef struct {
         float temp; /* K; inputs.temp within its range */
     } latched; /* inputs of this tick */
     struct {
-        bool main_command; /*  */
-        bool pre_command; /*  */
-        bool main_closed; /*  */
-        bool pre_closed; /*  */
-    } equation; /* equations */
+        bool main_command;
+        bool pre_command;
+        bool main_closed;
+        bool pre_closed;
+    } equation;
     struct {
         uint16_t operation_precharge_ready; /* ticks that the guard has been true, at most 6 */
         uint16_t operation_drive_torque_regen_creep; /* ticks that the guard has been true, at most 3 */

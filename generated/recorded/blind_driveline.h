@@ -60,8 +60,8 @@ typedef struct {
     double rate_theta_b; /* (rad)/s */
     double at_w_s; /* rad/s */
     double rate_w_s; /* (rad/s)/s */
-    bool guard_0; /*  */
-    bool guard_1; /*  */
+    bool guard_0;
+    bool guard_1;
     double merge; /* s; what crosses within it is one instant */
     double left; /* s; rest of the major step */
     bool is_wait; /* a wait ends with the segment */
@@ -95,22 +95,22 @@ typedef struct {
         double theta_d; /* rad */
         double theta_b; /* rad */
         double w_s; /* rad/s; filtered wheel speed */
-    } state; /* states */
+    } state;
     struct {
         double w_d; /* rad/s */
         double w_free; /* rad/s */
         double T_hs; /* N*m */
         double T_v; /* N*m */
         double w_b; /* rad/s */
-    } equation; /* equations */
+    } equation;
     struct {
         double T_em; /* N*m */
         double T_br; /* N*m */
     } before; /* inputs of the tick before */
     int16_t mode; /* active mode */
     uint16_t fired; /* transition of this micro-step, 0: none */
-    bool armed_0; /*  */
-    bool armed_1; /*  */
+    bool armed_0;
+    bool armed_1;
     bool started; /* the first step is done */
     double time; /* s; time since the start: for tolerances only */
     uint32_t faults; /* latched fault bits */

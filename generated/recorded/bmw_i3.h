@@ -42,11 +42,11 @@ typedef struct {
 typedef struct {
     struct {
         double v; /* m/s */
-    } state; /* states */
+    } state;
     struct {
         double F_em; /* N */
         double F_v; /* N */
-    } equation; /* equations */
+    } equation;
     struct {
         double T_em; /* N*m */
         double eta_R_per_r_w_T_em; /* 1; eta_R_per_r_w * T_em */

@@ -51,8 +51,8 @@ typedef struct {
 typedef struct {
     double at_z; /* m */
     double rate_z; /* (m)/s */
-    bool guard_0; /*  */
-    bool guard_1; /*  */
+    bool guard_0;
+    bool guard_1;
     double merge; /* s; what crosses within it is one instant */
     double left; /* s; rest of the major step */
     bool is_wait; /* a wait ends with the segment */
@@ -70,20 +70,20 @@ typedef struct {
 typedef struct {
     struct {
         double z; /* m; stretch of the band */
-    } state; /* states */
+    } state;
     struct {
         double F_b; /* N */
         double F; /* N */
         double v_z; /* m/s */
-    } equation; /* equations */
+    } equation;
     struct {
         double v; /* m/s */
         double c_v_v; /* 1; c_v * v */
     } before; /* inputs of the tick before */
     int16_t mode; /* active mode */
     uint16_t fired; /* transition of this micro-step, 0: none */
-    bool armed_0; /*  */
-    bool armed_1; /*  */
+    bool armed_0;
+    bool armed_1;
     bool started; /* the first step is done */
     double time; /* s; time since the start: for tolerances only */
     uint32_t faults; /* latched fault bits */

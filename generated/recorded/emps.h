@@ -44,11 +44,11 @@ typedef struct {
         double q; /* m */
         double v; /* m/s */
         double F_dr; /* N */
-    } state; /* states */
+    } state;
     struct {
         double u_dr; /* V */
         double F_m; /* N */
-    } equation; /* equations */
+    } equation;
     struct {
         double q_ref; /* m */
     } before; /* inputs of the tick before */

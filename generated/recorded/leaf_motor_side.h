@@ -45,11 +45,11 @@ typedef struct {
     struct {
         double w_em; /* rad/s */
         double theta_d; /* rad */
-    } state; /* states */
+    } state;
     struct {
         double w_d; /* rad/s */
         double T_hs; /* N*m */
-    } equation; /* equations */
+    } equation;
     struct {
         double T_em; /* N*m */
         double v_wh; /* m/s */

@@ -45,12 +45,12 @@ typedef struct {
         double w_em; /* rad/s */
         double w_w; /* rad/s */
         double theta_d; /* rad */
-    } state; /* states */
+    } state;
     struct {
         double w_d; /* rad/s */
         double T_hs; /* N*m */
         double T_v; /* N*m */
-    } equation; /* equations */
+    } equation;
     struct {
         double T_em; /* N*m */
     } before; /* inputs of the tick before */

@@ -71,4 +71,4 @@ def test_without_noise_nothing_is_corrected(predictor: Predictor) -> None:
 
 def test_a_gain_without_bounds_is_none(predictor: Predictor) -> None:
     phi, c, q, r = system(len(predictor.states))
-    assert predictor.gains(1e3 * phi, 1e-9 * c, q, r, np.eye(len(phi)), 0) is None
+    assert predictor.gains(1e3 * phi, 1e-160 * c, q, r, np.eye(len(phi)), 0) is None

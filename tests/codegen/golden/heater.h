@@ -50,14 +50,14 @@ typedef struct {
 typedef struct {
     struct {
         double heat; /* N*m */
-    } state; /* states */
+    } state;
     struct {
         double T; /* K; inputs.T within its range */
     } latched; /* inputs of this tick */
     struct {
-        bool low; /*  */
+        bool low;
         double P; /* W */
-    } equation; /* equations */
+    } equation;
     struct {
         uint16_t rest_heating; /* ticks that the guard has been true, at most 4 */
     } timer; /* ticks that a guard was true */
