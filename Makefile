@@ -23,7 +23,7 @@ for python in $(PYTHON) python3 python3.14 python3.13 python3.12 python3.11 ""; 
 done
 endef
 
-.PHONY: help setup system-packages demo test target-test prove verify verify-part prove-diagnosis bench check
+.PHONY: help setup system-packages demo test target-test prove verify verify-part prove-diagnosis paper bench check
 .PHONY: format generate lock clean
 .PHONY: check-lock check-format check-lint check-types check-floors check-specs check-tests check-generated
 
@@ -76,6 +76,9 @@ verify-part: setup ## measure a fixed part of the figures, as CI does
 
 prove-diagnosis: setup ## diagnose the sealed cases blind, write docs/proof.md (hours; resumable)
 	$(BIN)/python -m tests.proof $(ARGS)
+
+paper: setup ## reproduce the reference paper from specs: docs/paper, build/paper.json (minutes; resumable)
+	$(BIN)/python -m tests.paper $(ARGS)
 
 bench: setup ## measure speed against rivals; with ARGS="--peers diffrax,pathsim" those too
 	$(BIN)/python tests/bench/run.py $(ARGS)

@@ -31,6 +31,7 @@ def check_observer(
         label = f"`correct` names an input of type bool, `{observer.correct}` is none"
         truths = [name for name, thing in automaton.inputs.items() if thing.truth]
         problems.error("name", observer.span, label, nearest(observer.correct, truths))
+    _check_instants(automaton, observer, check)
     equations = _equations(automaton, observer)
     for measure, state in observer.measures.items():
         if state not in observer.states and state not in equations:
@@ -67,6 +68,15 @@ def _check_reads(
             if read.path in kinds and read.path not in held:
                 label = f"`{read.path}` is an equation: an observer reads states and inputs"
                 problems.error("observer", read.span, label)
+
+
+def _check_instants(automaton: Automaton, observer: Observer, check: DimensionCheck) -> None:
+    known = [name for name, thing in automaton.inputs.items() if thing.type == "real"]
+    for name, formula in observer.unknown_instant.items():
+        if name not in known:
+            label = f"`unknown_instant` is of real inputs, `{name}` is none"
+            check.problems.error("name", formula.span, label, nearest(name, known))
+        check.quantity(formula.tree, SECOND, "unknown_instant")
 
 
 def _equations(automaton: Automaton, observer: Observer) -> dict[str, Dimension]:

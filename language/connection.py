@@ -43,6 +43,7 @@ class ConnectionReader(Reader):
         for instance in instances.values():
             self.parts.update(output_kinds(instance))
         self.known.update(self.parts)
+        self.measurable = {n: k for n, k in self.known.items() if isinstance(k, Dimension)}
 
     # Sensors.
 
@@ -61,11 +62,10 @@ class ConnectionReader(Reader):
     def _sensor(self, entry: Entry) -> Sensor:
         table = self.table(entry.node, f"sensors.{entry.key}", SENSOR_KEYS)
         source = self.scalar(table.get("of"), "of", entry.span)
-        kind = self.parts.get(source.text) if source else NUMBER
-        if source and not isinstance(kind, Dimension):
-            label = f"`{source.text}` is not an output of an instance with a real value"
-            self.problems.error("name", source.span, label, nearest(source.text, self.parts))
-        dimension = kind if isinstance(kind, Dimension) else NUMBER
+        dimension = self.measurable.get(source.text, NUMBER) if source else NUMBER
+        if source and source.text not in self.measurable:
+            label = f"`{source.text}` is not an input or an output of an instance with a real value"
+            self.problems.error("name", source.span, label, nearest(source.text, self.measurable))
         unit = Unit(str(dimension), Fraction(1), dimension)
         lag = self._part(table, "filter", "lag", None)
         noise = self._part(table, "noise", "sd", unit)
@@ -83,6 +83,10 @@ class ConnectionReader(Reader):
             offset=offset,
             span=entry.span,
         )
+        if lag and source and source.text in self.inputs:
+            label = "a sensor of an input of the system has no `filter`"
+            hint = "filter it in an automaton: `update: {y: previous(y) + ...}`"
+            self.problems.error("connection", table.entries["filter"].span, label, hint)
         for stage in ("delay", "noise"):
             if period is None and stage in table.entries:
                 label = f"a sensor with `{stage}` has a `sample`"

@@ -275,5 +275,5 @@ def is_fresh(observer: Observer, measure: str) -> Expr:
 def solved_formulas(observer: Observer) -> list[Formula]:
     """Return the formulas that the solved numbers of an observer come from."""
     rows = [*observer.a.values(), *observer.b.values(), *observer.c.values()]
-    noise = [observer.process_noise, observer.measurement_noise]
+    noise = [observer.process_noise, observer.measurement_noise, observer.unknown_instant]
     return [formula for row in [*rows, *noise] for formula in row.values()]

@@ -47,11 +47,15 @@ class Invariant:
 
 @dataclass(frozen=True)
 class Rewind:
-    """Back to where `until` turned true, at most `within` [s] ago (language/rewind.py)."""
+    """Back to where `until` turned true, at most `within` [s] ago (language/rewind.py).
+
+    Where that is not found it fires as without it: a fault bit is set if that `is_fault`.
+    """
 
     until: Formula
     within: Formula
     span: Span
+    is_fault: bool = True
 
 
 @dataclass(frozen=True)
@@ -92,6 +96,7 @@ class Observer:
     `of` is the mode of the model that A, B, f, C and g are taken from, at the point `at`; f and g
     read `constants` by their names. Where it `runs`, the run of its mode predicts the states.
     `limits` are those of the variances; `correct` is an input: whether a tick has measurements.
+    A new value of an input in `unknown_instant` was taken at some instant of that time before.
     """
 
     states: tuple[str, ...]
@@ -114,6 +119,7 @@ class Observer:
     covariance: str = "steady"
     correct: str | None = None
     limits: Mapping[str, tuple[Formula, Formula]] = field(default_factory=dict)
+    unknown_instant: Mapping[str, Formula] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

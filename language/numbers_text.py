@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from language.longest import most_operations
 from language.motion import RUN_HALVINGS
 from language.program import MotionInfo, ObserverInfo, Program
 
@@ -18,6 +19,9 @@ def numbers_text(program: Program) -> str:
         lines += motion_lines(program.motion)
         lines += _work_lines(program, program.motion)
         lines += _rewind_lines(program)
+    if program.period is not None:
+        most = most_operations(program.blocks, "step")
+        lines.append(f"longest tick: at most {most} operations, every loop to its end")
     for observer in program.observers:
         lines += _observer_lines(program, observer)
     return "\n".join(lines) + "\n"

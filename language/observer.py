@@ -13,7 +13,16 @@ if TYPE_CHECKING:
     from language.reader import Reader
 
 WRITTEN_KEYS = ("inputs", "A", "B", "C", "f")
-OBSERVER_KEYS = ("kalman", "of", "at", *WRITTEN_KEYS, "measures", "predict", "correct")
+OBSERVER_KEYS = (
+    "kalman",
+    "of",
+    "at",
+    *WRITTEN_KEYS,
+    "measures",
+    "predict",
+    "correct",
+    "unknown_instant",
+)
 KALMAN_KEYS = ("states", "gain", "covariance", "covariance_range")
 NOISE_KEYS = ("process_noise", "measurement_noise")
 RUN_KEYS = ("of", "method", "substeps", "events", "follow", "linearise")
@@ -34,6 +43,7 @@ def read_observer(reader: Reader, node: Node, key: str, model: Automaton | None)
     _complete(reader, table, node.span)
     if gain == "steady":
         _without_covariance(reader, table, kalman, runs)
+    instants = _instants(reader, table.get("unknown_instant"), f"{key}.unknown_instant")
     states = tuple(item.text for item in reader.items(kalman.get("states"), "states"))
     measures = _measures(reader, table.get("measures"), f"{key}.measures")
     of_node = table.get("of")
@@ -63,6 +73,7 @@ def read_observer(reader: Reader, node: Node, key: str, model: Automaton | None)
         covariance=reader.choice(kalman.get("covariance"), "covariance", KEEPING, "steady"),
         correct=reader.text(correct, "correct", node.span) if correct else None,
         limits=_limits(reader, kalman.get("covariance_range"), f"{key}.covariance_range", rows),
+        unknown_instant=instants,
     )
 
 
@@ -83,13 +94,24 @@ def _complete(reader: Reader, table: Table, span: Span) -> None:
 
 def _without_covariance(reader: Reader, table: Table, kalman: Table, runs: bool) -> None:
     """A steady gain has no covariance that anything could change."""
-    for name in ("covariance", "covariance_range"):
-        if name in kalman.entries:
+    for name in ("covariance", "covariance_range", "unknown_instant"):
+        found = kalman.entries.get(name) or table.entries.get(name)
+        if found:
             label = f"`{name}` belongs to `gain: recursive`"
-            reader.problems.error("observer", kalman.entries[name].span, label)
+            reader.problems.error("observer", found.span, label)
     if runs:
         label = "`predict: runs` needs `gain: recursive`: the run's mode changes the covariance"
         reader.problems.error("observer", table.entries["predict"].span, label)
+
+
+def _instants(reader: Reader, node: Node | None, key: str) -> dict[str, Formula]:
+    """Read within what time the new value of an input was taken: `{T_em: 10 ms}`."""
+    found = {}
+    for entry in reader.named(node, key):
+        formula = reader.expression(entry.node, f"{key}.{entry.key}", entry.span)
+        if formula:
+            found[entry.key] = formula
+    return found
 
 
 def _limits(

@@ -14,8 +14,16 @@ Change = Callable[[Path, Scalar], Scalar]
 EVERY = "every scalar below"
 TEXTS = frozenset({"about", "req", "kind"})
 """Keys inside whose values are no expressions."""
-OBSERVER = {key: EVERY for key in ("A", "B", "C", "f", "process_noise", "measurement_noise", "at")}
-TRANSITION = {"when": EVERY, "wait": EVERY, "reset": EVERY, "rewind": EVERY}
+OBSERVER = {
+    key: EVERY
+    for key in ("A", "B", "C", "f", "process_noise", "measurement_noise", "at", "unknown_instant")
+}
+TRANSITION = {
+    "when": EVERY,
+    "wait": EVERY,
+    "reset": EVERY,
+    "rewind": {"until": EVERY, "within": EVERY},
+}
 FORMULAS = ("equations", "flow", "terms", "update", "entry", "exit", "invariant")
 MODE: dict[str, Any] = {
     **dict.fromkeys(FORMULAS, EVERY),

@@ -13,10 +13,11 @@ from collections.abc import Mapping
 
 from language.constants import constant_value
 from language.covariance import Ahead, bounded, corrected, entry, pairs, spread
-from language.declaration import Formula
+from language.density import at_rest, varies
 from language.derived import with_model
 from language.entries import number_diagonal, number_matrix, output_matrix
-from language.evaluate import Scalar, evaluate
+from language.evaluate import Scalar
+from language.instant import changed
 from language.kalman import (
     Kalman,
     SolvedNames,
@@ -34,7 +35,7 @@ from language.matrix import (
     multiply,
     subtract as less,
 )
-from language.model import Automaton, Mode, Observer
+from language.model import Automaton, Mode, Observer, Run as ModelRun
 from language.operation import (
     Assign,
     Block,
@@ -48,11 +49,10 @@ from language.operation import (
     subtract,
     total,
 )
-from language.parameter import constant_names, tunables_of
+from language.parameter import tunables_of
 from language.problem import Problems
 from language.program import Constant, ObserverInfo
 from language.riccati import discrete_noise, steady_gain
-from language.syntax import Application, memory_key, names as names_of, walk
 
 
 def recursive(
@@ -88,7 +88,7 @@ class _Recursive:
         self.period = float(automaton.period or 0)
         self.states = mode.observer.states
         noise = mode.observer.process_noise
-        self.varying = {n: f for n, f in noise.items() if _varies(automaton, f)}
+        self.varying = {n: f for n, f in noise.items() if varies(automaton, f)}
         self.depends_on: tuple[str, ...] = ()
 
     def kalman(self) -> Kalman | None:
@@ -115,8 +115,9 @@ class _Recursive:
         else:
             mean, extra = self._mean(observer, own)
             spreads = {f"spread_{self.mode.name}": self._spread(observer, own)}
-            predict = (*map(Run, spreads), *mean)
-            constants += extra
+            late, more = self._late(observer, self.mode.name)
+            predict = (*map(Run, spreads), *mean, *late)
+            constants += extra + more
         info = ObserverInfo(
             self.mode.name, self.states, observer.inputs, measured, own.a, (), c,
             (), r, self.period, {}, "recursive",
@@ -169,7 +170,7 @@ class _Recursive:
         """
         noise = own.numbers["Qd"]
         for name, formula in self.varying.items():
-            size = _at_rest(formula, self.automaton, self.values)
+            size = at_rest(formula, self.automaton, self.values)
             part = own.numbers[f"N_{name}"]
             noise = tuple(
                 tuple(x + size * y for x, y in zip(p, q, strict=True))
@@ -218,6 +219,7 @@ class _Recursive:
         assert run and model
         modes = model.modes.values() if run.follow else [model.modes[run.mode]]
         cases: list[tuple[int, Block]] = []
+        after: list[tuple[int, Block]] = []
         spreads: dict[str, Block] = {}
         constants: tuple[Constant, ...] = ()
         for mode in modes:
@@ -231,10 +233,26 @@ class _Recursive:
                 constants += solved.constants(ahead.numbers, depends_on)
                 spreads[f"spread_{tag}"] = self._spread(observer, ahead)
                 cases.append((mode.number, (Run(f"spread_{tag}"),)))
-        chosen: Block = (Choose("memory.run_mode", tuple(cases)),)
-        if not run.follow:
-            chosen = cases[0][1] if cases else ()
-        return (*chosen, Run(f"run_{self.mode.name}")), constants, spreads
+                late, more = self._late(observer, tag)
+                constants += more
+                if late:
+                    spreads[f"late_{tag}"] = late
+                    after.append((mode.number, (Run(f"late_{tag}"),)))
+        chosen = self._chosen(run, cases)
+        predict = (*chosen, Run(f"run_{self.mode.name}"), *self._chosen(run, after))
+        return predict, constants, spreads
+
+    def _chosen(self, run: ModelRun, cases: list[tuple[int, Block]]) -> Block:
+        """The block of the mode in which the model is; a run that keeps its flow has one."""
+        if run.follow and cases:
+            return (Choose("memory.run_mode", tuple(cases)),)
+        return cases[0][1] if cases else ()
+
+    def _late(self, observer: Observer, tag: str) -> tuple[Block, tuple[Constant, ...]]:
+        """What inputs do that changed within this tick, at an instant that is not known."""
+        solved, known = SolvedNames(tag, observer), (self.before, self.now)
+        ops, constants = changed(self.automaton, solved, known, self.values, self.problems)
+        return (*ops, *(self._bounded(observer) if ops else ())), constants
 
     def _spread(self, observer: Observer, ahead: Ahead) -> Block:
         """The densities of now, then the covariance over the period."""
@@ -278,20 +296,3 @@ class _Recursive:
         if name in observer.g:
             parts.append(expression(observer.g[name].tree, known))
         return total(parts)
-
-
-def _varies(automaton: Automaton, formula: Formula) -> bool:
-    memory = any(isinstance(part, Application) and part.function == "previous"
-                 for part in walk(formula.tree))  # fmt: skip
-    reads = {read.path for read in names_of(formula.tree)}
-    return memory or not reads <= set(automaton.parameters)
-
-
-def _at_rest(formula: Formula, automaton: Automaton, values: Mapping[str, Scalar]) -> float:
-    """Return a density while all inputs and states are 0."""
-    known: dict[str, Expr] = {n: real(0.0) for n in (*automaton.inputs, *automaton.states)}
-    known.update(constant_names(automaton))
-    for part in walk(formula.tree):
-        if isinstance(part, Application) and part.function == "previous":
-            known[memory_key(part)] = real(0.0)
-    return float(evaluate(expression(formula.tree, known), values))

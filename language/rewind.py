@@ -4,7 +4,8 @@
 false: the crossing lies in the tick after it, on the flow of the source from the states and inputs
 that were kept then, located by halvings. The micro-step is made there; the run of the target
 carries the states over the rest of that tick and over each later one. Where `until` was true as far
-back as is kept, or is false now, nothing is taken back and a fault bit is set.
+back as is kept, or is false now, nothing is taken back and, unless it says otherwise, a fault bit
+is set.
 """
 
 from __future__ import annotations
@@ -140,7 +141,8 @@ def _until(rewinding: Rewinding, now: Names) -> Block:
 def _back(rewinding: Rewinding, now: Names) -> Block:
     """Go back to where the micro-step is made, and evaluate what its exit and reset read there."""
     automaton = rewinding.automaton
-    limit: Block = (FaultBit(REWIND_LIMIT), *inputs_as_now(automaton, "past"))
+    told: Block = (FaultBit(REWIND_LIMIT),) if rewinding.rewind.is_fault else ()
+    limit: Block = (*told, *inputs_as_now(automaton, "past"))
     known, prefix = known_there(automaton, now), f"{automaton.name} "
     there = equations(rewinding.source, known, "work.past_", prefix, rewinding.read_by_jump)
     return (

@@ -9,6 +9,7 @@ from language.action import (
 from language.activation import activation_variables
 from language.covariance import covariance_variables
 from language.decision import decision_variables
+from language.instant import instant_variables
 from language.invariant import invariant_variables
 from language.kalman import observer_variables
 from language.limit import (
@@ -49,6 +50,7 @@ def sampled_variables(
             found.append(Variable(info.timer, "whole", about=about))
     found += observer_variables(automaton)
     found += covariance_variables(automaton)
+    found += instant_variables(automaton)
     found += memory_variables(automaton, delays)
     found += activation_variables(automaton)
     found += rewind_variables(automaton)

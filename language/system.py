@@ -199,8 +199,9 @@ class _SystemReader(Reader):
         instances = wires.instances
         edges: dict[str, list[str]] = {name: [] for name in (*instances, *wires.sensors)}
         for sensor in wires.sensors.values():
-            if not sensor.delay:
-                edges[sensor.source.partition(".")[0]].append(sensor.name)
+            owner = sensor.source.partition(".")[0]
+            if not sensor.delay and owner in instances:
+                edges[owner].append(sensor.name)
         for connection in connections.values():
             target = instances[connection.target[0]]
             for read in connection.reads:

@@ -143,9 +143,12 @@ class TransitionReader(Reader):
         """Read how far back a transition reaches, and to what."""
         if node is None:
             return None
-        table = self.table(node, key, ("until", "within"))
+        table = self.table(node, key, ("until", "within", "beyond"))
         parts = [
             self.expression(table.get(part), f"{key}.{part}", node.span)
             for part in ("until", "within")
         ]
-        return Rewind(parts[0], parts[1], node.span) if parts[0] and parts[1] else None
+        beyond = self.choice(table.get("beyond"), "beyond", ("fault", "fire"), "fault")
+        if not (parts[0] and parts[1]):
+            return None
+        return Rewind(parts[0], parts[1], node.span, is_fault=beyond == "fault")

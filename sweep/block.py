@@ -102,9 +102,17 @@ def _groups(study: Study, cases: Sequence[Case], rows: dict[int, Row]) -> Iterab
 
 
 def _shape(scenario: Scenario) -> object:
-    """Return what scenarios of one batch have in common: inputs that vary inside steps."""
-    inputs = scenario.inputs.items()
-    return repr([(name, stimulus) for name, stimulus in inputs if stimulus.varies])
+    """Return what scenarios of one batch have in common: the formulas of inputs in time.
+
+    Lines between points are numbers of a plan, as steps are; a formula is compiled.
+    """
+    return repr(
+        [
+            (name, [(k, piece.formula) for k, piece in enumerate(stimulus.pieces) if piece.formula])
+            for name, stimulus in scenario.inputs.items()
+            if stimulus.varies
+        ]
+    )
 
 
 def _parts(study: Study, group: _Group) -> Iterable[_Group]:
@@ -177,10 +185,11 @@ def _tables(group: _Group) -> dict[str, InputTable]:
 
 
 def _step_together(group: _Group) -> bool:
-    """Tell whether the inputs of all cases step at the same times."""
+    """Tell whether the inputs of all cases step at the same times, and vary alike in between."""
     return all(
         [piece.start for piece in scenario.inputs[name].pieces]
         == [piece.start for piece in stimulus.pieces]
+        and (scenario.inputs[name] == stimulus or not stimulus.varies)
         for scenario in group.steps
         for name, stimulus in group.scenario.inputs.items()
     )

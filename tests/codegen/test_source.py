@@ -108,7 +108,7 @@ def test_every_key_of_an_assignment_stands_beside_its_target(name: str) -> None:
     used = program(name)
     text = files_of(name)[f"{used.name}.c"]
     cited, lines = cited_lines(text), text.splitlines()
-    pairs = {(line.split(" = ")[0].split()[-1], cited[k]) for k, line in enumerate(lines)
+    pairs = {(line.partition(" =")[0].split()[-1], cited[k]) for k, line in enumerate(lines)
              if k in cited and " =" in line}  # fmt: skip
     for block in used.blocks.values():
         for op in walk(block):

@@ -130,10 +130,11 @@ def test_the_numbers_of_a_run_and_its_observers_are_printed() -> None:
 
 
 def test_what_a_rewind_does_at_most_is_printed() -> None:
-    """8 ticks back: one look at each and now, one at the end of a step, 24 halvings."""
+    """3 ticks back: one look at each and now, one at the end of a step, 24 halvings."""
     text = explained("hko", "numbers", {}, ROOT)
-    assert "rewind drive -> gap: at most 34 looks at `until` and 8 runs" in text
-    assert "transition 1 gap: 1 -> 0 rewind 8 ticks" in explained("hko", "program", {}, ROOT)
+    assert "rewind drive -> gap: at most 29 looks at `until` and 3 runs" in text
+    assert "longest tick: at most 32132 operations" in text
+    assert "transition 1 gap: 1 -> 0 rewind 3 ticks" in explained("hko", "program", {}, ROOT)
 
 
 def test_the_largest_stable_step_is_printed_where_it_holds(

@@ -129,6 +129,21 @@ def test_compiled_blocks_have_the_rows_of_the_interpreter_at_other_times_of_step
     assert notes == [(6, 6, "compiled")]
 
 
+def test_ramps_that_differ_are_one_compiled_batch() -> None:
+    ramp = ("inputs.push.times.1: [1 s, 0.7003 s]", "inputs.push.ramp.from: [1 s, 0.7003 s]")
+    made, notes = study("seen", ("[pushed]", "[ramped]"), ramp), []
+
+    def run(batch: Batch) -> BatchResult:
+        result = run_batch(batch, threads=1)
+        notes.append((batch.count, len(batch.courses), result.note))
+        return result
+
+    rows = block_rows(made, Block(2, 8), run)
+    assert rows == block_rows(made, Block(2, 8), run_variants)
+    assert notes == [(6, 6, "compiled")]
+    assert len({row.measures["final"] for row in rows}) == 3
+
+
 def test_few_steps_are_not_compiled_for() -> None:
     made, notes = study("seen"), set()
 
