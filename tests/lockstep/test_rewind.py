@@ -88,7 +88,12 @@ SPECS = {
 }
 """What advances the source, the method of the runs, guard and `until`."""
 RUN = {"on a tick"}
-LACKING = {"standing": {"inside a tick"}, "by_rk4": RUN, "by_exponential": RUN, "hko": {"more ticks"}}
+LACKING = {
+    "standing": {"inside a tick"},
+    "by_rk4": RUN,
+    "by_exponential": RUN,
+    "hko": {"more ticks"},
+}
 """What one tick back cannot bring about: without a flow, or without corrections."""
 SEEN = {"limit", "one tick", "more ticks", "on a tick", "inside a tick"}
 

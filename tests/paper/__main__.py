@@ -10,10 +10,10 @@ from collections.abc import Sequence
 from tests.paper.claims import claims
 from tests.paper.manoeuvre import table_1
 from tests.paper.observers import better_observer, studied
-from tests.paper.page import FOLDER, publish
+from tests.paper.page import FOLDER, SPECS, publish
 from tests.paper.pareto import pareto, picture
 from tests.paper.pictures import draw
-from tests.verify.store import ROOT
+from tests.verify.store import ROOT, code_digest
 
 SEED, SAMPLES = 2018, 200
 """Manoeuvres that nothing was tuned on."""
@@ -33,8 +33,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         )
     if given.seed == SEED and given.samples == SAMPLES:
         draw(FOLDER)
-    folder = ROOT / "build" / "paper" / f"{given.seed}_{given.samples}"
-    rows = studied(folder, given.seed, given.samples)
+    folder = ROOT / "build" / "paper" / code_digest(("language", *SPECS))[:12]
+    rows = studied(folder / f"{given.seed}_{given.samples}", given.seed, given.samples)
     for row in rows:
         print(
             f"{row.scheme} {row.rate} Hz {'matched' if row.is_matched else 'mismatch'}: first gap "
@@ -45,7 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "better_observer": better_observer(rows),
         "better_observer_mismatch": better_observer(rows, is_matched=False),
     }
-    points = pareto(ROOT / "build" / "paper")
+    points = pareto(folder)
     publish(given.seed, table, found, rows, points, figures)
     picture(points).savefig(FOLDER / "pareto.png", dpi=110, metadata={"Software": None})
     print("wrote build/paper.json and docs/paper")
