@@ -5,6 +5,7 @@ To load this module is to load our packages, whatever folders of their names are
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
@@ -26,3 +27,8 @@ def own_fingerprint() -> Mapping[str, str]:
     from sweep.fingerprint import fingerprint
 
     return fingerprint()
+
+
+def dask_setup(worker: object) -> None:
+    """Leave Ctrl-C to who started this worker: it ends us. Called by Dask."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -78,14 +78,15 @@ def _on_cluster(place: Address, credentials: Credentials) -> Iterator[Executor]:
     """Yield the executor of a cluster whose workers have our code. Raises ClusterError."""
     try:
         from sweep.cluster import Cluster
-        from sweep.clustering import connected
+        from sweep.clustering import Staff, connected
     except ImportError:
         advice = "pip install 'modewright[cluster]'"
         raise ToolMissing(f"a cluster needs the package `distributed`: {advice}") from None
-    from modewright.cluster_worker import compute, own_fingerprint
+    from modewright import cluster_worker
 
-    with connected(place, credentials, own_fingerprint) as client:
-        yield Cluster(client, compute)
+    staff = Staff(cluster_worker.own_fingerprint, cluster_worker.__name__)
+    with connected(place, credentials, staff) as client:
+        yield Cluster(client, cluster_worker.compute)
 
 
 def study_summary(out: str | Path) -> Summary:

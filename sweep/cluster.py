@@ -7,10 +7,10 @@ computed again at the end, alone; where that ends workers too, it is left out, a
 from __future__ import annotations
 
 import itertools
-import queue
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from queue import Empty, SimpleQueue
 from typing import Any
 
 from distributed import Client, Future, KilledWorker
@@ -24,7 +24,7 @@ from sweep.processes import WorkerError
 from sweep.study import Study
 
 Task = Callable[[Mapping[str, str], bytes, int, int], Answer]
-"""What a worker does: with the client's fingerprint, a packed study, first number and end of a block.
+"""What a worker does: with the client's fingerprint, a packed study, the ends of a block.
 
 It is sent by its name, so workers have it from their own installation.
 """
@@ -69,7 +69,7 @@ class _Flight:
     cluster: Cluster
     held: Any = None
     under_way: dict[Future, Block] = field(default_factory=dict)
-    ended: queue.SimpleQueue[Future] = field(default_factory=queue.SimpleQueue)
+    ended: SimpleQueue[Future] = field(default_factory=lambda: SimpleQueue())
     looked: float = float("-inf")
     seen: float = field(default_factory=time.monotonic)
     threads: int = 0
@@ -86,7 +86,7 @@ class _Flight:
                 return
             try:
                 future = self.ended.get(timeout=LOOK)
-            except queue.Empty:
+            except Empty:
                 continue
             yield self._result(future)
 
@@ -123,10 +123,12 @@ class _Flight:
     def _result(self, future: Future) -> Finished:
         block = self.under_way.pop(future)
         if future.cancelled():
-            raise ClusterError("the scheduler has dropped what it was given: it ended, or restarted")
+            raise ClusterError(
+                "the scheduler has dropped what it was given: it ended, or restarted"
+            )
         error = future.exception()
         if isinstance(error, KilledWorker):
-            return Finished(block, lost=f"{_deaths(error)} workers died while they computed it")
+            return Finished(block, lost=_blame(error))
         if isinstance(error, ImportError):
             raise ClusterError(f"a worker cannot import modewright: {error}")
         if error is not None:
@@ -139,5 +141,6 @@ class _Flight:
         return Finished(block, file=answer.file)
 
 
-def _deaths(error: KilledWorker) -> int:
-    return int(error.allowed_failures) + 1
+def _blame(error: KilledWorker) -> str:
+    deaths = int(error.allowed_failures) + 1
+    return f"{deaths} worker{'s' * (deaths > 1)} died while it was computed alone"
