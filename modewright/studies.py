@@ -26,6 +26,7 @@ from sweep.summary import Summary, summary_of
 
 if TYPE_CHECKING:
     from engine.plot import Picture
+    from sweep.sensitivity import Sensitivity
 
 WORKER = (sys.executable, "-P", "-m", "modewright.worker")
 """What starts a process that computes blocks."""
@@ -99,3 +100,17 @@ def study_pictures(out: str | Path) -> dict[str, Picture]:
     from sweep.picture import pictures
 
     return pictures(read_store(Path(out)))
+
+
+def sensitivity(out: str | Path) -> Sensitivity:
+    """Return which of the things that a study draws move its measures. Raises SpecError."""
+    from sweep.sensitivity import sensitivity_of
+
+    return sensitivity_of(read_store(Path(out)))
+
+
+def study_report(out: str | Path) -> bytes:
+    """Return the results in a folder as one HTML page that needs nothing else. Raises SpecError."""
+    from modewright.study_report import report_page
+
+    return report_page(read_store(Path(out)))

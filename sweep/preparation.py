@@ -12,6 +12,7 @@ from engine.starting import programs_of
 from engine.stimulus import resolved
 from language.experiment import Scenario
 from language.printing import digest as program_digest
+from sweep.design import points_each
 from sweep.study import Course, Kind, Study
 from sweep.study_reader import signals_of
 
@@ -55,7 +56,8 @@ def resampled(study: Study, samples: int | None = None, seed: int | None = None)
     old = study.sampling
     if (samples is not None or seed is not None) and not old.count:
         raise ValueError(f"`{study.name}` draws nothing: it has no samples and no seed")
-    count = old.count if samples is None else samples
+    each = points_each(old.method, len(study.drawn))
+    count = old.count if samples is None else samples * each
     new = dataclasses.replace(old, count=count, seed=old.seed if seed is None else seed)
     return dataclasses.replace(study, sampling=new)
 

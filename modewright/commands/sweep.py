@@ -11,7 +11,7 @@ import typer
 from modewright.commands.options import Json, Sets, usage_errors, values_of
 from modewright.console import announce, console, counted, counting
 from modewright.exits import PROBLEMS
-from modewright.files import OutputError, make_folder, write_files
+from modewright.files import OutputError, make_folder, require_writable, write_files
 from sweep.cluster_error import ClusterError
 
 if TYPE_CHECKING:
@@ -58,6 +58,9 @@ def sweep(
     table: Annotated[
         Path | None, typer.Option("--csv", help="write the summary as CSV, numbers in SI")
     ] = None,
+    report: Annotated[
+        Path | None, typer.Option("--report", help="write one HTML page of all that came out")
+    ] = None,
     form: Annotated[str, typer.Option("--format", help="of the pictures: svg, png or pdf")] = "svg",
     as_json: Json = False,
 ) -> None:
@@ -70,8 +73,9 @@ def sweep(
     modewright sweep my_study.yaml --out results --workers 4 --set 'c_hs=20 N*m*s/rad'
     modewright sweep random_tip_outs --out held_out --samples 200 --seed 7
     modewright sweep my_study.yaml --out results --cluster tls://head:8786 --tls-ca ca.pem
-    modewright sweep --summary results --csv summary.csv
+    modewright sweep --summary results --csv summary.csv --report results.html
     """
+    require_writable(report)
     folder = _checked_folder(study, out, summary, form)
     lost = 0
     if study is not None:
@@ -79,7 +83,7 @@ def sweep(
         options["workers"] = workers or None
         options |= _cluster_options(cluster, workers, (tls_ca, tls_cert, tls_key))
         lost = _run(study, folder, values_of(sets), options, as_json)
-    _show(folder, table, form, as_json)
+    _show(folder, table, report, form, as_json)
     if lost:
         raise typer.Exit(PROBLEMS)
 
@@ -171,7 +175,7 @@ def console_error(text: str) -> None:
     print(text, file=sys.stderr)
 
 
-def _show(folder: Path, table: Path | None, form: str, as_json: bool) -> None:
+def _show(folder: Path, table: Path | None, report: Path | None, form: str, as_json: bool) -> None:
     from modewright import show_study, studies
     from modewright.show import print_json
 
@@ -182,6 +186,8 @@ def _show(folder: Path, table: Path | None, form: str, as_json: bool) -> None:
         make_folder(folder / PLOTS)
     if table:
         files[table] = found.csv().encode()
+    if report:
+        files[report] = studies.study_report(folder)
     write_files(files)
     if as_json:
         print_json(show_study.summary_json(found))
