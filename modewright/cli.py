@@ -56,9 +56,9 @@ COMPLETION = "_MODEWRIGHT_COMPLETE"
 YOUNG_OBJECTS = 100_000
 """New objects after which garbage is looked for: trees of expressions have no circles."""
 COMMANDS = (
-    new, check, test, trace, diagnose, fit, effects, simulate, sweep, sensitivity, lockstep, replay, plot,
-    compare, graph, generate, a2l, dbc, fmu, metrics, prove, fuzz, mcdc, explain, diff, format,
-    schema, lsp, demo, doctor,
+    new, check, test, trace, diagnose, fit, effects, simulate, sweep, sensitivity,
+    lockstep, replay, plot, compare, graph, generate, a2l, dbc, fmu, metrics, prove, fuzz, mcdc,
+    explain, diff, format, schema, lsp, demo, doctor,
 )  # fmt: skip
 
 

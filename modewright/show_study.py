@@ -56,8 +56,8 @@ def _cells(line: Line) -> list[str]:
     mean, deviation, p95, low, high = (short(number) for number in numbers)
     return [
         line.measure, escape(line.unit), str(line.count), short(line.median),
-        interval_text(line.median_interval), mean, interval_text(line.mean_interval), deviation, p95, low,
-        high,
+        interval_text(line.median_interval), mean, interval_text(line.mean_interval), deviation,
+        p95, low, high,
     ]  # fmt: skip
 
 

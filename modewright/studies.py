@@ -111,6 +111,6 @@ def sensitivity(out: str | Path) -> Sensitivity:
 
 def study_report(out: str | Path) -> bytes:
     """Return the results in a folder as one HTML page that needs nothing else. Raises SpecError."""
-    from modewright.study_report import report_page
+    from modewright.study_page import report_page
 
     return report_page(read_store(Path(out)))

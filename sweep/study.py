@@ -94,7 +94,7 @@ class Setting:
 class Sampling:
     """How many points are drawn, how, and from which seed; 0 points: nothing is drawn.
 
-    Of a design (`saltelli`, `morris`) `count` are all its points, several for each thing that is drawn.
+    Of a design (`saltelli`, `morris`) `count` are all its points, several a block or path.
 
     `one_at_a_time`: instead of the product of the axes, each value with all others left alone.
     """

@@ -1,7 +1,8 @@
-"""Study report: the results of a study as one HTML page that needs no other file."""
+"""Study page: the results of a study as one HTML page that needs no other file."""
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Mapping, Sequence
 from importlib import metadata, resources
@@ -87,13 +88,11 @@ def _sensitivity(store: Store) -> dict[str, Any]:
         return {"indices": [], "index_heads": []}
     heads = [*found[0].group, "measure", "of"]
     heads += [text for name in found[0].values for text in (name, "interval")]
-    rows = [
-        [
-            *one.group.values(), one.measure, one.name,
-            *(t for n, v in one.values.items() for t in (short(v), interval_text(one.intervals[n]))),
-        ]
-        for one in found[:MOST_INDICES]
-    ]  # fmt: skip
+    rows = []
+    for one in found[:MOST_INDICES]:
+        ends = (interval_text(one.intervals[name]) for name in one.values)
+        cells = zip(map(short, one.values.values()), ends, strict=True)
+        rows.append([*one.group.values(), one.measure, one.name, *itertools.chain(*cells)])
     return {"indices": rows, "index_heads": heads}
 
 
@@ -126,7 +125,8 @@ def _rows(table: Table, places: Sequence[int], last: Sequence[str]) -> list[list
     manifest = table.store.manifest
     units = {column.name: column.unit for column in manifest.varied}
     names = ["number", "variant", "scenario", *units, *last]
-    parquet, found, first = arrow_module().parquet, {}, 0
+    parquet, first = arrow_module().parquet, 0
+    found: dict[int, dict[str, Any]] = {}
     for path in table.store.paths():
         count = parquet.read_metadata(path).num_rows
         own = [place for place in places if first <= place < first + count]
