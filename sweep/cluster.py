@@ -9,6 +9,7 @@ from __future__ import annotations
 import itertools
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import CancelledError
 from dataclasses import dataclass, field
 from queue import Empty, SimpleQueue
 from typing import Any
@@ -122,18 +123,14 @@ class _Flight:
 
     def _result(self, future: Future) -> Finished:
         block = self.under_way.pop(future)
-        if future.cancelled():
-            raise ClusterError(
-                "the scheduler has dropped what it was given: it ended, or restarted"
-            )
-        error = future.exception()
-        if isinstance(error, KilledWorker):
+        try:
+            answer: Answer = future.result()  # may be lost with its worker, and made again
+        except KilledWorker as error:
             return Finished(block, lost=_blame(error))
-        if isinstance(error, ImportError):
-            raise ClusterError(f"a worker cannot import modewright: {error}")
-        if error is not None:
-            raise error
-        answer: Answer = future.result()
+        except ImportError as error:
+            raise ClusterError(f"a worker cannot import modewright: {error}") from None
+        except CancelledError:
+            raise ClusterError("the scheduler has dropped what it was given: it ended") from None
         if answer.refusal:
             raise ClusterError(f"a worker {answer.refusal}")
         if answer.defect:

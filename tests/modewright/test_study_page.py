@@ -36,7 +36,12 @@ def test_a_study_is_one_page_that_asks_for_no_other_file(
     ids = re.findall(r' id="([^"]+)"', text)
     assert len(ids) == len(set(ids))
     assert read_store(out).manifest.digest in text
-    for part in ("mu_star", "peak [m]: the largest magnitudes", "None of those", "system of variant"):
+    for part in (
+        "mu_star",
+        "peak [m]: the largest magnitudes",
+        "None of those",
+        "system of variant",
+    ):
         assert part in text
     assert study_page.report_page(read_store(out)).decode() == text
 
