@@ -32,7 +32,13 @@ if TYPE_CHECKING:
     from modewright.diagram import Diagram, graph
     from modewright.recordings import CheckedRecordings, check_recordings
     from modewright.runs import compare, plot, read, save
-    from modewright.studies import study_pictures, study_summary, sweep
+    from modewright.studies import (
+        sensitivity,
+        study_pictures,
+        study_report,
+        study_summary,
+        sweep,
+    )
     from modewright.tests import run_tests
     from modewright.traces import trace
 
@@ -79,8 +85,10 @@ __all__ = [
     "run_tests",
     "save",
     "save_diagnosis",
+    "sensitivity",
     "simulate",
     "study_pictures",
+    "study_report",
     "study_summary",
     "sweep",
     "trace",
@@ -124,7 +132,9 @@ PLACES = {
     "save": "modewright.runs",
     "save_diagnosis": "modewright.diagnoses",
     "run_tests": "modewright.tests",
+    "sensitivity": "modewright.studies",
     "study_pictures": "modewright.studies",
+    "study_report": "modewright.studies",
     "study_summary": "modewright.studies",
     "sweep": "modewright.studies",
     "trace": "modewright.traces",

@@ -41,6 +41,7 @@ from modewright.commands.prove import prove
 from modewright.commands.recording import recording
 from modewright.commands.replay import replay
 from modewright.commands.schema import schema
+from modewright.commands.sensitivity import sensitivity
 from modewright.commands.simulate import simulate
 from modewright.commands.sweep import sweep
 from modewright.commands.test import test
@@ -55,9 +56,9 @@ COMPLETION = "_MODEWRIGHT_COMPLETE"
 YOUNG_OBJECTS = 100_000
 """New objects after which garbage is looked for: trees of expressions have no circles."""
 COMMANDS = (
-    new, check, test, trace, diagnose, fit, effects, simulate, sweep, lockstep, replay, plot,
-    compare, graph, generate, a2l, dbc, fmu, metrics, prove, fuzz, mcdc, explain, diff, format,
-    schema, lsp, demo, doctor,
+    new, check, test, trace, diagnose, fit, effects, simulate, sweep, sensitivity,
+    lockstep, replay, plot, compare, graph, generate, a2l, dbc, fmu, metrics, prove, fuzz, mcdc,
+    explain, diff, format, schema, lsp, demo, doctor,
 )  # fmt: skip
 
 

@@ -17,6 +17,7 @@ from language.missing import ToolMissing
 from language.problem import SpecError, ordered, render_all
 from language.text import shortened, visible
 from modewright.files import OutputError
+from sweep.cluster_error import ClusterError
 
 DONE, PROBLEMS, USAGE, TOOL, DEFECT, INTERRUPTED = 0, 1, 2, 3, 4, 130
 MOST_SHOWN = 100
@@ -45,7 +46,7 @@ def exit_code(run: Callable[[], object]) -> int:
     except SpecError as error:
         report(error)
         return PROBLEMS
-    except OutputError as error:
+    except (OutputError, ClusterError) as error:
         print(f"error: {error}", file=sys.stderr)
         return PROBLEMS
     except ToolMissing as error:

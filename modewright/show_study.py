@@ -53,11 +53,11 @@ def _lines(summary: Summary) -> Table:
 
 def _cells(line: Line) -> list[str]:
     numbers = (line.mean, line.deviation, line.p95, line.low, line.high)
-    mean, deviation, p95, low, high = (_short(number) for number in numbers)
+    mean, deviation, p95, low, high = (short(number) for number in numbers)
     return [
-        line.measure, escape(line.unit), str(line.count), _short(line.median),
-        _interval(line.median_interval), mean, _interval(line.mean_interval), deviation, p95, low,
-        high,
+        line.measure, escape(line.unit), str(line.count), short(line.median),
+        interval_text(line.median_interval), mean, interval_text(line.mean_interval), deviation,
+        p95, low, high,
     ]  # fmt: skip
 
 
@@ -73,12 +73,20 @@ def _rates(summary: Summary) -> Table:
 
 def _rate_cells(rate: Rate) -> list[str]:
     share = rate.hits / rate.count if rate.count else math.nan
-    return [rate.measure, str(rate.hits), str(rate.count), _short(share), _interval(rate.interval)]
+    return [
+        rate.measure,
+        str(rate.hits),
+        str(rate.count),
+        short(share),
+        interval_text(rate.interval),
+    ]
 
 
-def _interval(interval: tuple[float, float] | None) -> str:
-    return f"{_short(interval[0])} .. {_short(interval[1])}" if interval else "-"
+def interval_text(interval: tuple[float, float] | None) -> str:
+    """Return the ends of an interval as text."""
+    return f"{short(interval[0])} .. {short(interval[1])}" if interval else "-"
 
 
-def _short(number: float) -> str:
+def short(number: float) -> str:
+    """Return a number to five digits; what is not there as a dash."""
     return "-" if math.isnan(number) else f"{number:.5g}"

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from language.document import Scalar
 from language.load import command_line_value
+from language.missing import ToolMissing
 from language.project import Project, read_document
 from modewright.compiled import run_block
 from modewright.files import OutputError
+from sweep.address import Address, Credentials, address_of
 from sweep.executor import Executor, InProcess
 from sweep.preparation import prepared, resampled
 from sweep.processes import Processes
@@ -23,6 +26,7 @@ from sweep.summary import Summary, summary_of
 
 if TYPE_CHECKING:
     from engine.plot import Picture
+    from sweep.sensitivity import Sensitivity
 
 WORKER = (sys.executable, "-P", "-m", "modewright.worker")
 """What starts a process that computes blocks."""
@@ -40,13 +44,18 @@ def sweep(
     seed: int | None = None,
     progress: Progress | None = None,
     executor: Executor | None = None,
+    cluster: str | None = None,
+    credentials: Credentials | None = None,
 ) -> StudyRun:
     """Run a study into a folder, or go on with it there; what is finished is never lost.
 
-    `workers` processes (all cores), 1: in this process; `block` variants are kept at once;
-    `samples` and `seed` replace those of the study.
-    Raises SpecError, OutputError (a full disk: what is finished is kept), ToolMissing, ValueError.
+    `workers` processes (all cores), 1: in this process; `cluster`: on the workers of a Dask
+    cluster, `local:4` or the address of a scheduler, with `credentials` of TLS. `block` variants
+    are kept at once; `samples` and `seed` replace those of the study.
+    Raises SpecError, OutputError (a full disk: what is finished is kept), ClusterError,
+    ToolMissing, ValueError.
     """
+    place = address_of(cluster) if cluster else None
     project = Project(root or Path())
     document = read_document(project.path_of(study))
     scalars: dict[str, Scalar] = {
@@ -56,10 +65,29 @@ def sweep(
     count = workers or os.cpu_count() or 1
     local: Executor = Processes(count, WORKER) if count > 1 else InProcess(run_block)
     try:
-        return run_study(ready, Path(out), executor or local, block, progress)
+        if place is None:
+            return run_study(ready, Path(out), executor or local, block, progress)
+        with _on_cluster(place, credentials or Credentials()) as remote:
+            return run_study(ready, Path(out), remote, block, progress)
     except OSError as error:
         where = f" {error.filename}" if error.filename else ""
         raise OutputError(f"{out}: cannot write{where}: {error.strerror}") from None
+
+
+@contextmanager
+def _on_cluster(place: Address, credentials: Credentials) -> Iterator[Executor]:
+    """Yield the executor of a cluster whose workers have our code. Raises ClusterError."""
+    try:
+        from sweep.cluster import Cluster
+        from sweep.clustering import Staff, connected
+    except ImportError:
+        advice = "pip install 'modewright[cluster]'"
+        raise ToolMissing(f"a cluster needs the package `distributed`: {advice}") from None
+    from modewright import cluster_worker
+
+    staff = Staff(cluster_worker.own_fingerprint, cluster_worker.__name__)
+    with connected(place, credentials, staff) as client:
+        yield Cluster(client, cluster_worker.compute)
 
 
 def study_summary(out: str | Path) -> Summary:
@@ -72,3 +100,17 @@ def study_pictures(out: str | Path) -> dict[str, Picture]:
     from sweep.picture import pictures
 
     return pictures(read_store(Path(out)))
+
+
+def sensitivity(out: str | Path) -> Sensitivity:
+    """Return which of the things that a study draws move its measures. Raises SpecError."""
+    from sweep.sensitivity import sensitivity_of
+
+    return sensitivity_of(read_store(Path(out)))
+
+
+def study_report(out: str | Path) -> bytes:
+    """Return the results in a folder as one HTML page that needs nothing else. Raises SpecError."""
+    from modewright.study_page import report_page
+
+    return report_page(read_store(Path(out)))

@@ -15,6 +15,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from sweep.design import morris_shares, points_each, saltelli_shares
 from sweep.study import NANOSECONDS, Distribution, Study
 
 Reals = NDArray[np.float64]
@@ -72,6 +73,13 @@ def _shares(study: Study, samples: NDArray[np.int64]) -> Reals:
     sampling = study.sampling
     if sampling.method == "latin_hypercube":
         return _hypercube(len(names), sampling.count, sampling.seed)[samples]
+    if sampling.method == "morris":
+        return morris_shares(len(names), samples, sampling.seed)
+    if sampling.method == "saltelli":
+        rows = samples // points_each(sampling.method, len(names))
+        first = int(rows.min())
+        both = _sobol(2 * len(names), sampling.seed, first, int(rows.max()) - first + 1)
+        return saltelli_shares(len(names), samples, lambda row: np.asarray(both[row - first]))
     unique, places = np.unique(samples, return_inverse=True)
     ends = [0, *(np.flatnonzero(np.diff(unique) > 1) + 1).tolist(), len(unique)]
     parts = []

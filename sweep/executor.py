@@ -13,11 +13,15 @@ from sweep.study import Study
 
 @dataclass(frozen=True)
 class Finished:
-    """The rows of a block in the order of their numbers; `lost` says why there are none."""
+    """The rows of a block in the order of their numbers, or its `file` as another process made it.
+
+    `lost` says why there is neither.
+    """
 
     block: Block
-    rows: Sequence[Row]
+    rows: Sequence[Row] = ()
     lost: str = ""
+    file: bytes = b""
 
 
 class Executor(Protocol):

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from language.problem import Problems, Source, Span, SpecError
 from sweep.block import Block
+from sweep.design import points_each
 from sweep.measure import Column, columns_of
 from sweep.preparation import FORMAT, digest_of
 from sweep.study import Presentation, Study
@@ -18,6 +19,14 @@ MOST_BLOCKS = 100
 FEWEST_BLOCKS = 8
 MOST_IN_BLOCK = 5000
 LEAST_IN_BATCH = 200
+
+
+@dataclass(frozen=True)
+class Design:
+    """A sampling of which indices are made: `names` are what is drawn, in its order."""
+
+    method: str
+    names: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -33,6 +42,7 @@ class Manifest:
     words: Mapping[str, Sequence[str]]
     measures: tuple[Column, ...]
     presentation: Presentation
+    design: Design | None = None
 
     @property
     def blocks(self) -> list[Block]:
@@ -53,7 +63,14 @@ def manifest_of(study: Study, block: int | None = None) -> Manifest:
         words={varied.name: varied.words for varied in study.varied if varied.words},
         measures=tuple(column for measure in study.measures for column in columns_of(measure)),
         presentation=study.presentation,
+        design=_design_of(study),
     )
+
+
+def _design_of(study: Study) -> Design | None:
+    names = tuple(varied.name for varied in study.drawn)
+    method = study.sampling.method
+    return Design(method, names) if points_each(method, len(names)) > 1 else None
 
 
 def block_size(study: Study) -> int:
@@ -86,6 +103,8 @@ def manifest_json(manifest: Manifest) -> bytes:
             "by": list(shown.by), "confidence": shown.confidence, "plots": dict(shown.plots),
         },
     }  # fmt: skip
+    if manifest.design:
+        data["design"] = {"method": manifest.design.method, "names": list(manifest.design.names)}
     return (json.dumps(data, indent=1) + "\n").encode()
 
 
@@ -97,7 +116,7 @@ def read_manifest(folder: Path) -> Manifest:
         if data["modewright"] != FORMAT:
             label = "these results are in a form that is not known here"
             raise refused(folder, "store", label, "run the study into another folder")
-        shown = data["presentation"]
+        shown, drawn = data["presentation"], data.get("design")
         return Manifest(
             study=data["study"],
             digest=data["digest"],
@@ -108,6 +127,7 @@ def read_manifest(folder: Path) -> Manifest:
             words=data["words"],
             measures=tuple(Column(**column) for column in data["measures"]),
             presentation=Presentation(tuple(shown["by"]), shown["confidence"], shown["plots"]),
+            design=Design(drawn["method"], tuple(drawn["names"])) if drawn else None,
         )
     except FileNotFoundError:
         label = "there are no results of a study here"

@@ -12,6 +12,7 @@ from engine.starting import programs_of
 from engine.stimulus import resolved
 from language.experiment import Scenario
 from language.printing import digest as program_digest
+from sweep.design import points_each
 from sweep.study import Course, Kind, Study
 from sweep.study_reader import signals_of
 
@@ -33,9 +34,21 @@ def prepared(study: Study) -> Study:
         for name, course in kind.courses.items():
             scenario = _rows(study, resolved(kind.system, course.scenario))
             courses[name] = Course(scenario, course.document)
-            identity |= _identity(kind, name, scenario)
+            identity |= _recording_digest(name, scenario)
         kinds.append(Kind(kind.name, kind.system, courses))
-    return dataclasses.replace(study, kinds=tuple(kinds), identity=identity)
+    made = dataclasses.replace(study, kinds=tuple(kinds))
+    return dataclasses.replace(made, identity={**identity, **program_digests(made)})
+
+
+def program_digests(study: Study) -> dict[str, str]:
+    """Return the digest of every Program of a prepared study, by what it is of."""
+    found = {}
+    for kind in study.kinds:
+        for name, course in kind.courses.items():
+            for instance, program in programs_of(kind.system, course.scenario).items():
+                key = f"Program of `{instance}` in variant `{kind.name}`, scenario `{name}`"
+                found[key] = program_digest(program)
+    return found
 
 
 def resampled(study: Study, samples: int | None = None, seed: int | None = None) -> Study:
@@ -43,7 +56,8 @@ def resampled(study: Study, samples: int | None = None, seed: int | None = None)
     old = study.sampling
     if (samples is not None or seed is not None) and not old.count:
         raise ValueError(f"`{study.name}` draws nothing: it has no samples and no seed")
-    count = old.count if samples is None else samples
+    each = points_each(old.method, len(study.drawn))
+    count = old.count if samples is None else samples * each
     new = dataclasses.replace(old, count=count, seed=old.seed if seed is None else seed)
     return dataclasses.replace(study, sampling=new)
 
@@ -62,13 +76,8 @@ def _rows(study: Study, scenario: Scenario) -> Scenario:
     return dataclasses.replace(scenario, every=Fraction(every))
 
 
-def _identity(kind: Kind, name: str, scenario: Scenario) -> dict[str, str]:
-    found = {}
-    for instance, program in programs_of(kind.system, scenario).items():
-        key = f"Program of `{instance}` in variant `{kind.name}`, scenario `{name}`"
-        found[key] = program_digest(program)
-    if any(stimulus.column for stimulus in scenario.inputs.values()):
-        found[f"recording of scenario `{name}`"] = hashlib.sha256(
-            repr(sorted(scenario.inputs.items())).encode()
-        ).hexdigest()
-    return found
+def _recording_digest(name: str, scenario: Scenario) -> dict[str, str]:
+    if not any(stimulus.column for stimulus in scenario.inputs.values()):
+        return {}
+    inputs = repr(sorted(scenario.inputs.items())).encode()
+    return {f"recording of scenario `{name}`": hashlib.sha256(inputs).hexdigest()}

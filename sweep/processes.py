@@ -124,7 +124,7 @@ class _Pool:
         answer = receive(process.stdout)
         if isinstance(answer, str):
             raise WorkerError(answer)
-        self.answers.put(Finished(block, answer))
+        self.answers.put(Finished(block, file=answer))
 
     def _died(self, block: Block) -> None:
         """Give the block to another worker, at most three times."""
@@ -136,7 +136,7 @@ class _Pool:
                 self.waiting.append(block)
                 return
         reason = f"{MOST_DEATHS} worker processes died while they computed it"
-        self.answers.put(Finished(block, (), reason))
+        self.answers.put(Finished(block, lost=reason))
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:

@@ -8,8 +8,18 @@ from types import ModuleType
 from typing import Any
 
 from engine.arrow import arrow_for
-from sweep.block import Row
+from sweep.block import Block, Row
 from sweep.manifest import Manifest
+
+
+def block_file(manifest: Manifest, block: Block, rows: Sequence[Row]) -> bytes:
+    """Return the rows of a block as the file that the store keeps of it."""
+    return parquet_of(manifest, rows, mark_of(manifest, block))
+
+
+def mark_of(manifest: Manifest, block: Block) -> bytes:
+    """Return what the file of a block carries: of what study it is, and which block."""
+    return f"{manifest.digest} {block.start}-{block.stop}".encode()
 
 
 def parquet_of(manifest: Manifest, rows: Sequence[Row], mark: bytes) -> bytes:

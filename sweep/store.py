@@ -18,7 +18,7 @@ from pathlib import Path
 from language.problem import SpecError
 from sweep.block import Block, Row
 from sweep.manifest import MANIFEST, Manifest, manifest_json, read_manifest, refused
-from sweep.rows_file import arrow_module, parquet_of
+from sweep.rows_file import arrow_module, block_file, mark_of
 
 BLOCKS = "blocks"
 LOCK = ".lock"
@@ -39,7 +39,7 @@ class Store:
         for path, block in self._files():
             try:
                 kept = arrow.parquet.read_metadata(path)
-                mine = (kept.metadata or {}).get(b"modewright") == self._mark(block)
+                mine = (kept.metadata or {}).get(b"modewright") == mark_of(self.manifest, block)
                 fine = mine and kept.num_rows == block.stop - block.start
             except (OSError, arrow.ArrowException):
                 fine = False
@@ -48,9 +48,6 @@ class Store:
             else:
                 path.unlink(missing_ok=True)
         return found
-
-    def _mark(self, block: Block) -> bytes:
-        return f"{self.manifest.digest} {block.start}-{block.stop}".encode()
 
     @property
     def _known(self) -> set[Block]:
@@ -67,8 +64,11 @@ class Store:
         return [path for path, _ in self._files()]
 
     def write(self, block: Block, rows: Sequence[Row]) -> None:
-        """Keep a block, whole or not at all. Raises OSError."""
-        data = parquet_of(self.manifest, rows, self._mark(block))
+        """Keep the rows of a block, whole or not at all. Raises OSError."""
+        self.keep(block, block_file(self.manifest, block, rows))
+
+    def keep(self, block: Block, data: bytes) -> None:
+        """Keep the file of a block, whole or not at all. Raises OSError."""
         path = self.folder / BLOCKS / f"{block.start:010d}-{block.stop:010d}.parquet"
         write_whole(path, data)
 

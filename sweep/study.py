@@ -13,7 +13,7 @@ from language.experiment import Scenario, System
 from language.problem import Span
 from sweep.measure import Measure
 
-Method = Literal["random", "latin_hypercube", "sobol"]
+Method = Literal["random", "latin_hypercube", "sobol", "saltelli", "morris"]
 TargetKind = Literal["parameter", "initial", "input", "sensor", "clock"]
 Shape = Literal["uniform", "log_uniform", "normal", "lognormal", "choice"]
 
@@ -93,6 +93,8 @@ class Setting:
 @dataclass(frozen=True)
 class Sampling:
     """How many points are drawn, how, and from which seed; 0 points: nothing is drawn.
+
+    Of a design (`saltelli`, `morris`) `count` are all its points, several a block or path.
 
     `one_at_a_time`: instead of the product of the axes, each value with all others left alone.
     """

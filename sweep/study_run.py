@@ -66,8 +66,11 @@ def fill(
                 if part.lost:
                     lost.append((part.block, part.lost))
                     continue
-                store.write(part.block, part.rows)
-                done += len(part.rows)
+                if part.file:
+                    store.keep(part.block, part.file)
+                else:
+                    store.write(part.block, part.rows)
+                done += part.block.stop - part.block.start
                 tell(done, before, total)
         finally:
             close = getattr(finished, "close", None)

@@ -15,13 +15,14 @@ from language.problem import Problems, Span, nearest
 from language.reader import Reader
 from language.scope import Scope
 from language.units import NO_UNIT, Unit
+from sweep.design import points_each
 from sweep.study import Axis, Distribution, Sampling, Setting, Shape, Target, Varied
 from sweep.target import Place
 
 LISTS = ("values", "linspace", "logspace")
 SHAPES: tuple[Shape, ...] = ("uniform", "log_uniform", "normal", "lognormal", "choice")
 OPTIONS = ("within", "weights")
-METHODS = ("random", "latin_hypercube", "sobol")
+METHODS = ("random", "latin_hypercube", "sobol", "saltelli", "morris")
 MOST_POINTS = 10_000_000
 """Most variants of a study: at 10 000 per second a quarter of an hour, 2 GB of results."""
 MOST_ON_AXIS = 100_000
@@ -277,11 +278,12 @@ class VaryReader(Reader):
         if not drawn and not self.problems.has_errors:
             label = "nothing in `vary` is drawn: `sampling` has no work"
             self.problems.error("form", place.span, label, "`replicates` repeats with other noise")
-        if method == "sobol" and count & (count - 1):
+        if method in ("sobol", "saltelli") and count & (count - 1):
             label = f"{count} is no power of 2: a Sobol sequence loses its balance"
             near = 1 << round(math.log2(count))
             self.problems.warning("sampling", place.node.span, label, f"like {near}")
         seed = self.whole(table.get("seed"), "seed", 0, 0, LARGEST_SEED)
+        count *= points_each(method, len(drawn))
         return Sampling(method, count, seed)  # type: ignore[arg-type]
 
 

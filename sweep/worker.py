@@ -1,7 +1,8 @@
 """Worker: a process that computes blocks, told by messages through its standard streams.
 
-A message is its length (8 bytes, big-endian) and a pickle: first the study, then blocks; each block
-is answered. Where who started it is gone, it ends at once, also inside a block.
+A message is its length (8 bytes, big-endian) and a pickle: first the study, then blocks; each is
+answered by its file, or by the traceback of a defect (text). Where who started it is gone, it ends
+at once, also inside a block.
 """
 
 from __future__ import annotations
@@ -18,6 +19,8 @@ from typing import IO, Any
 
 from engine.batch import Runner
 from sweep.block import Block, block_rows
+from sweep.manifest import manifest_of
+from sweep.rows_file import block_file
 
 LENGTH = struct.Struct(">Q")
 
@@ -50,10 +53,11 @@ def serve(run: Runner) -> None:
     messages: queue.Queue[Any] = queue.Queue()
     threading.Thread(target=_listen, args=(source, messages), daemon=True).start()
     study = messages.get()
+    manifest = manifest_of(study)
     while True:
         block: Block = messages.get()
         try:
-            answer: object = block_rows(study, block, run)
+            answer: object = block_file(manifest, block, block_rows(study, block, run))
         except Exception:
             answer = traceback.format_exc()
         send(target, answer)

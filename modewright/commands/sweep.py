@@ -11,13 +11,21 @@ import typer
 from modewright.commands.options import Json, Sets, usage_errors, values_of
 from modewright.console import announce, console, counted, counting
 from modewright.exits import PROBLEMS
-from modewright.files import OutputError, make_folder, write_files
+from modewright.files import OutputError, make_folder, require_writable, write_files
+from sweep.cluster_error import ClusterError
 
 if TYPE_CHECKING:
     from sweep.study_run import StudyRun
 
 PLOTS = "plots"
 FORMATS = ("svg", "png", "pdf")
+OPEN_WARNING = (
+    "warning: {} is not encrypted, and workers run whatever reaches their scheduler (pickles): "
+    "use tls:// wherever others share the network"
+)
+TlsFile = Annotated[
+    Path | None, typer.Option(help="PEM, for tls://; without it what Dask's configuration says")
+]
 
 
 def sweep(
@@ -28,6 +36,12 @@ def sweep(
     workers: Annotated[
         int, typer.Option("--workers", "-j", min=0, help="processes; 0: one for each core")
     ] = 0,
+    cluster: Annotated[
+        str | None, typer.Option(help="Dask's workers: local:4, tcp://host:8786, tls://host:8786")
+    ] = None,
+    tls_ca: TlsFile = None,
+    tls_cert: TlsFile = None,
+    tls_key: TlsFile = None,
     sets: Sets = None,
     summary: Annotated[
         Path | None, typer.Option("--summary", help="sum up a folder, run nothing")
@@ -44,6 +58,9 @@ def sweep(
     table: Annotated[
         Path | None, typer.Option("--csv", help="write the summary as CSV, numbers in SI")
     ] = None,
+    report: Annotated[
+        Path | None, typer.Option("--report", help="write one HTML page of all that came out")
+    ] = None,
     form: Annotated[str, typer.Option("--format", help="of the pictures: svg, png or pdf")] = "svg",
     as_json: Json = False,
 ) -> None:
@@ -55,15 +72,18 @@ def sweep(
     modewright sweep tip_out_stiffness_and_gap --out build/tip_out
     modewright sweep my_study.yaml --out results --workers 4 --set 'c_hs=20 N*m*s/rad'
     modewright sweep random_tip_outs --out held_out --samples 200 --seed 7
-    modewright sweep --summary results --csv summary.csv
+    modewright sweep my_study.yaml --out results --cluster tls://head:8786 --tls-ca ca.pem
+    modewright sweep --summary results --csv summary.csv --report results.html
     """
+    require_writable(report)
     folder = _checked_folder(study, out, summary, form)
     lost = 0
     if study is not None:
         options: dict[str, Any] = {"block": block, "samples": samples, "seed": seed}
         options["workers"] = workers or None
+        options |= _cluster_options(cluster, workers, (tls_ca, tls_cert, tls_key))
         lost = _run(study, folder, values_of(sets), options, as_json)
-    _show(folder, table, form, as_json)
+    _show(folder, table, report, form, as_json)
     if lost:
         raise typer.Exit(PROBLEMS)
 
@@ -79,6 +99,31 @@ def _checked_folder(study: str | None, out: Path | None, summary: Path | None, f
     folder = out or summary
     assert folder is not None
     return folder
+
+
+def _cluster_options(
+    cluster: str | None, workers: int, files: tuple[Path | None, ...]
+) -> dict[str, Any]:
+    """Return where the study is computed; warn of a connection that others can read."""
+    from sweep.address import Credentials, address_of
+
+    if cluster is None:
+        if any(files):
+            raise typer.BadParameter("files of TLS are for a cluster", param_hint="--cluster")
+        return {}
+    if workers:
+        label = "a cluster says itself how many workers it has: `local:4`"
+        raise typer.BadParameter(label, param_hint="--workers")
+    with usage_errors():
+        address = address_of(cluster)
+    for path in files:
+        if path and not address.url.startswith("tls:"):
+            raise typer.BadParameter("files of TLS are for tls://", param_hint="--cluster")
+        if path and not path.is_file():
+            raise OutputError(f"{path}: there is no such file")
+    if address.is_open:
+        console_error(OPEN_WARNING.format(cluster))
+    return {"cluster": cluster, "credentials": Credentials(*files)}
 
 
 def _run(
@@ -103,7 +148,7 @@ def _run(
     except KeyboardInterrupt:
         _tell_kept(out, *done)
         raise
-    except OutputError as error:
+    except (OutputError, ClusterError) as error:
         kept = f"{done[0]} of {done[1]} variants are kept; the same command goes on"
         raise OutputError(f"{error}; {kept}" if done[1] else str(error)) from None
     if not as_json:
@@ -130,7 +175,7 @@ def console_error(text: str) -> None:
     print(text, file=sys.stderr)
 
 
-def _show(folder: Path, table: Path | None, form: str, as_json: bool) -> None:
+def _show(folder: Path, table: Path | None, report: Path | None, form: str, as_json: bool) -> None:
     from modewright import show_study, studies
     from modewright.show import print_json
 
@@ -141,6 +186,8 @@ def _show(folder: Path, table: Path | None, form: str, as_json: bool) -> None:
         make_folder(folder / PLOTS)
     if table:
         files[table] = found.csv().encode()
+    if report:
+        files[report] = studies.study_report(folder)
     write_files(files)
     if as_json:
         print_json(show_study.summary_json(found))

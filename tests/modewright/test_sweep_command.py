@@ -14,6 +14,7 @@ from modewright.cli import app
 from modewright.console import counting
 from modewright.exits import exit_code
 from sweep import store as store_module
+from sweep.cluster_error import ClusterError
 from sweep.store import read_store
 from tests.sweep.laying import STUDIES, quick
 
@@ -140,3 +141,40 @@ def test_progress_has_a_rate_on_a_terminal_and_nothing_elsewhere(
         tell(5, 2, 10)
     shown = capsys.readouterr().err
     assert "5/10" in shown and "variants/s" in shown
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "told"),
+    [
+        (("--cluster", "here"), 2, "is no cluster"),
+        (("--cluster", "local:2", "-j", "2"), 2, "says itself how many"),
+        (("--tls-ca", "ca.pem"), 2, "are for a cluster"),
+        (("--cluster", "tcp://localhost:1", "--tls-ca", "ca.pem"), 2, "are for tls"),
+        (("--cluster", "tls://localhost:1", "--tls-ca", "ca.pem"), 1, "ca.pem: there is no such"),
+        (("--cluster", "tls://localhost:1"), 1, "TLS takes an authority"),
+    ],
+)
+def test_a_cluster_that_cannot_be_is_told_and_nothing_is_stored(
+    arguments: tuple[str, ...], code: int, told: str, tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    out = tmp_path / "out"
+    given = ["sweep", "alone", "--out", str(out), *arguments]
+    assert exit_code(lambda: app(given, standalone_mode=False)) == code
+    assert told in " ".join(capsys.readouterr().err.replace("│", " ").split())
+    assert not out.exists()
+
+
+def test_a_connection_that_others_can_read_is_warned_of(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def refuse(*arguments: object) -> None:
+        raise ClusterError("nobody answers")
+
+    monkeypatch.setattr(studies, "_on_cluster", refuse)
+    for cluster, is_open in (("tcp://head:8786", True), ("tcp://127.0.0.1:8786", False)):
+        given = ["sweep", "alone", "--out", str(tmp_path / "out"), "--cluster", cluster]
+        assert exit_code(lambda: app(given, standalone_mode=False)) == 1  # noqa: B023
+        told = capsys.readouterr().err
+        assert ("is not encrypted" in told) == is_open
+        assert "error: nobody answers" in told

@@ -16,7 +16,7 @@ WHOLE = (
     *("first_drive", "complete", "lockstep_bits", "random_specs", "random_charts"),
     *("command_line", "editor", "static_checks", "charts", "studies", "fast", "open_cases"),
     *("variants", "tip_out", "kept_stages", "target_bits", "machines", "proofs", "fuzzing"),
-    *("twins", "mcdc", "paper"),
+    *("twins", "mcdc", "paper", "cluster"),
 )
 PART = (
     "first_drive",

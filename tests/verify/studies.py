@@ -81,7 +81,7 @@ def killed_at_random_instants() -> Figure:
         last = _sweep(killed)
         code = last.wait()
         count = len(_blocks(undisturbed))
-        same = _digest(killed) == _digest(undisturbed)
+        same = bytes_digest(killed) == bytes_digest(undisturbed)
         left = [path.name for path in killed.rglob("*.part")]
         rises = finished == sorted(finished)
     is_inside = 0 < finished[-1] < count and len(set(finished)) > KILLS // 3
@@ -123,7 +123,8 @@ def _blocks(folder: Path) -> list[Path]:
     return sorted((folder / "blocks").glob("[0-9]*.parquet"))
 
 
-def _digest(folder: Path) -> str:
+def bytes_digest(folder: Path) -> str:
+    """Return the digest of all blocks of a store, with their names."""
     total = hashlib.sha256()
     for path in _blocks(folder):
         total.update(path.name.encode() + b"\0" + path.read_bytes())

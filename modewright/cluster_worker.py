@@ -1,0 +1,34 @@
+"""Cluster worker: what a worker of a Dask cluster finds here by name, and does with a block.
+
+To load this module is to load our packages, whatever folders of their names are around.
+"""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from sweep.cluster_worker import Answer
+
+
+def compute(wanted: Mapping[str, str], held: bytes, start: int, stop: int) -> Answer:
+    """Return the answer of this worker about the variants from `start` to before `stop`."""
+    from modewright.compiled import run_block
+    from sweep.block import Block
+    from sweep.cluster_worker import answer
+
+    return answer(wanted, held, Block(start, stop), run_block)
+
+
+def own_fingerprint() -> Mapping[str, str]:
+    """Return the fingerprint of this worker."""
+    from sweep.fingerprint import fingerprint
+
+    return fingerprint()
+
+
+def dask_setup(worker: object) -> None:
+    """Leave Ctrl-C to who started this worker: it ends us. Called by Dask."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)

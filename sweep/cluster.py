@@ -1,0 +1,143 @@
+"""Cluster: an executor on the workers of a Dask cluster, here or elsewhere.
+
+A worker that dies is survived: its blocks are given to others. A block that several have died of is
+computed again at the end, alone; where that ends workers too, it is left out, and said to be.
+"""
+
+from __future__ import annotations
+
+import itertools
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import CancelledError
+from dataclasses import dataclass, field
+from queue import Empty, SimpleQueue
+from typing import Any
+
+from distributed import Client, Future, KilledWorker
+
+from sweep.block import Block
+from sweep.cluster_error import ClusterError
+from sweep.cluster_worker import Answer, packed
+from sweep.executor import Finished
+from sweep.fingerprint import fingerprint
+from sweep.processes import WorkerError
+from sweep.study import Study
+
+Task = Callable[[Mapping[str, str], bytes, int, int], Answer]
+"""What a worker does: with the client's fingerprint, a packed study, the ends of a block.
+
+It is sent by its name, so workers have it from their own installation.
+"""
+
+IN_FLIGHT = 2
+"""Blocks that each thread of a worker has at most: one that is computed, one to go on with."""
+LOOK = 5.0
+"""Time [s] between two looks at how many workers there are."""
+PATIENCE = 60.0
+"""Time [s] without any worker after which a cluster is given up."""
+
+
+@dataclass(frozen=True)
+class Cluster:
+    """The workers of a client; each does `task`."""
+
+    client: Client
+    task: Task
+    patience: float = PATIENCE
+
+    def __call__(self, study: Study, blocks: Iterable[Block]) -> Iterator[Finished]:
+        """Yield each block as it is finished; closing the iterator ends the work."""
+        flight = _Flight(self)
+        try:
+            flight.held = self.client.submit(bytes, packed(study), pure=False)
+            suspects = []
+            for finished in flight.finished(blocks):
+                if finished.lost:
+                    suspects.append(finished.block)
+                else:
+                    yield finished
+            for block in suspects:
+                yield from flight.finished([block])
+        finally:
+            flight.end()
+
+
+@dataclass
+class _Flight:
+    """What is under way: the study that workers hold, and the blocks that they have."""
+
+    cluster: Cluster
+    held: Any = None
+    under_way: dict[Future, Block] = field(default_factory=dict)
+    ended: SimpleQueue[Future] = field(default_factory=lambda: SimpleQueue())
+    looked: float = float("-inf")
+    seen: float = field(default_factory=time.monotonic)
+    threads: int = 0
+
+    def finished(self, blocks: Iterable[Block]) -> Iterator[Finished]:
+        """Yield blocks as they are finished; those that workers died of are lost."""
+        waiting = iter(blocks)
+        while True:
+            self._look()
+            room = max(1, IN_FLIGHT * self.threads) - len(self.under_way)
+            for block in itertools.islice(waiting, max(0, room)):
+                self._submit(block)
+            if not self.under_way:
+                return
+            try:
+                future = self.ended.get(timeout=LOOK)
+            except Empty:
+                continue
+            yield self._result(future)
+
+    def end(self) -> None:
+        """Take back what is under way."""
+        client = self.cluster.client
+        if client.status == "running":
+            client.cancel([*self.under_way, *([self.held] if self.held else [])], force=True)
+        self.under_way.clear()
+
+    def _submit(self, block: Block) -> None:
+        future = self.cluster.client.submit(
+            self.cluster.task, fingerprint(), self.held, block.start, block.stop, pure=False
+        )
+        self.under_way[future] = block
+        future.add_done_callback(self.ended.put)
+
+    def _look(self) -> None:
+        """See how many threads there are. Raises ClusterError where nobody is left to compute."""
+        now = time.monotonic()
+        if now < self.looked + LOOK:
+            return
+        client = self.cluster.client
+        try:
+            self.threads = sum(client.nthreads().values())
+        except OSError as error:
+            raise ClusterError(f"the scheduler does not answer any more: {error}") from None
+        self.looked = time.monotonic()
+        if self.threads:
+            self.seen = self.looked
+        elif self.looked > self.seen + self.cluster.patience:
+            raise ClusterError(f"there is no worker any more for {self.cluster.patience:g} s")
+
+    def _result(self, future: Future) -> Finished:
+        block = self.under_way.pop(future)
+        try:
+            answer: Answer = future.result()  # may be lost with its worker, and made again
+        except KilledWorker as error:
+            return Finished(block, lost=_blame(error))
+        except ImportError as error:
+            raise ClusterError(f"a worker cannot import modewright: {error}") from None
+        except CancelledError:
+            raise ClusterError("the scheduler has dropped what it was given: it ended") from None
+        if answer.refusal:
+            raise ClusterError(f"a worker {answer.refusal}")
+        if answer.defect:
+            raise WorkerError(answer.defect)
+        return Finished(block, file=answer.file)
+
+
+def _blame(error: KilledWorker) -> str:
+    deaths = int(error.allowed_failures) + 1
+    return f"{deaths} worker{'s' * (deaths > 1)} died while it was computed alone"

@@ -1,0 +1,66 @@
+"""Cluster worker: what a process of a cluster does with a block - checks, computes, answers.
+
+It computes for a client with the same fingerprint alone, and what it keeps of a study (Programs,
+compiled libraries) is made once in a process.
+"""
+
+from __future__ import annotations
+
+import pickle
+import threading
+import traceback
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+
+from engine.batch import Runner
+from sweep.block import Block, block_rows
+from sweep.fingerprint import differences, fingerprint
+from sweep.manifest import Manifest, manifest_of
+from sweep.preparation import program_digests
+from sweep.rows_file import block_file
+from sweep.study import Study
+
+ONE_AT_A_TIME = threading.Lock()
+"""A process computes one block at a time, however many threads its worker has."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The file of a block; or why the worker computes none; or the traceback of a defect."""
+
+    file: bytes = b""
+    refusal: str = ""
+    defect: str = ""
+
+
+def packed(study: Study) -> bytes:
+    """Return a prepared study as bytes that a worker takes."""
+    return zlib.compress(pickle.dumps(study, protocol=pickle.HIGHEST_PROTOCOL))
+
+
+def answer(wanted: Mapping[str, str], held: bytes, block: Block, run: Runner) -> Answer:
+    """Return the file of a block of a packed study, for a client with a fingerprint."""
+    refusal = differences(wanted, fingerprint())
+    if refusal:  # before anything is unpickled: other code may have other classes
+        return Answer(refusal=f"has other code: {refusal}")
+    try:
+        with ONE_AT_A_TIME:
+            study, manifest, refusal = _known(held)
+            if refusal:
+                return Answer(refusal=refusal)
+            return Answer(block_file(manifest, block, block_rows(study, block, run)))
+    except Exception:
+        return Answer(defect=traceback.format_exc())
+
+
+@lru_cache(maxsize=2)
+def _known(held: bytes) -> tuple[Study, Manifest, str]:
+    """Return a study, and why it must not be computed: its Programs are others here."""
+    study: Study = pickle.loads(zlib.decompress(held))
+    other = [
+        name for name, own in program_digests(study).items() if study.identity.get(name) != own
+    ]
+    refusal = f"makes another {other[0]}" if other else ""
+    return study, manifest_of(study), refusal

@@ -1,0 +1,117 @@
+"""Clustering: a client of a Dask cluster, started here or reached, whose workers have our code."""
+
+from __future__ import annotations
+
+import logging
+import os
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import dask.config
+from distributed import Client, LocalCluster, Security
+
+from sweep.address import Address, Credentials
+from sweep.cluster_error import ClusterError
+from sweep.fingerprint import differences, fingerprint
+from sweep.processes import MOST_DEATHS
+
+SECONDS = 30.0
+"""How long [s] a scheduler may take to answer, and the first worker to join."""
+NOWHERE = "127.0.0.1:0"
+"""Dask serves its own pages on any free port of this machine alone."""
+NO_CREDENTIALS = (
+    "TLS takes an authority, a certificate and its key: --tls-ca, --tls-cert and --tls-key, or "
+    "distributed.comm.tls in the configuration of Dask"
+)
+LARGE_GRAPH = "distributed.admin.large-graph-warning-threshold"
+DEATHS = "distributed.scheduler.allowed-failures"
+
+
+@dataclass(frozen=True)
+class Staff:
+    """What workers have: `fingerprint` is a function that tells theirs.
+
+    `preload` is a module whose `dask_setup` each that is started here does first.
+    """
+
+    fingerprint: Callable[[], Mapping[str, str]]
+    preload: str = ""
+
+
+@contextmanager
+def connected(
+    address: Address,
+    credentials: Credentials,
+    staff: Staff,
+    seconds: float = SECONDS,
+    deaths: int = MOST_DEATHS,
+) -> Iterator[Client]:
+    """Yield a client of a cluster; what was started for it ends with it.
+
+    `deaths` workers started here may die of a block before it is told.
+    Raises ClusterError where nobody answers, no worker is there, or one has other code.
+    """
+    with ExitStack() as stack, dask.config.set({DEATHS: deaths - 1, LARGE_GRAPH: "1 GB"}):
+        where: Any = address.url
+        if address.count:
+            where = stack.enter_context(_local(address.count, staff.preload))
+        security = _security(address, credentials)
+        try:
+            client = stack.enter_context(Client(where, security=security, timeout=seconds))
+        except (OSError, ValueError, RuntimeError) as error:
+            reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+            raise ClusterError(f"{address.url}: no scheduler answers: {reason}") from None
+        _require_workers(client, staff, seconds)
+        yield client
+
+
+@contextmanager
+def _local(count: int, preload: str) -> Iterator[LocalCluster]:
+    """Yield a cluster of processes of this machine, which tell nothing of their own."""
+    with LocalCluster(
+        n_workers=count,
+        threads_per_worker=1,
+        processes=True,
+        dashboard_address=NOWHERE,
+        silence_logs=logging.CRITICAL,
+        preload=[preload] if preload else [],
+    ) as cluster:
+        yield cluster
+
+
+def _security(address: Address, credentials: Credentials) -> Security | None:
+    """Return the credentials of TLS, from files or from the configuration of Dask."""
+    if not address.url.startswith("tls:"):
+        return None
+    named = {
+        "tls_ca_file": credentials.authority,
+        "tls_client_cert": credentials.certificate,
+        "tls_client_key": credentials.key,
+    }
+    given = {name: os.fspath(path) for name, path in named.items() if path}
+    security = Security(require_encryption=True, **given)
+    try:
+        context = security.get_connection_args("client")["ssl_context"]
+    except OSError as error:  # also what is no certificate
+        raise ClusterError(f"{address.url}: its credentials cannot be used: {error}") from None
+    if context is None:
+        raise ClusterError(f"{address.url}: {NO_CREDENTIALS}")
+    return security
+
+
+def _require_workers(client: Client, staff: Staff, seconds: float) -> None:
+    """Raise ClusterError unless a worker is there and all that are have our code."""
+    try:
+        client.wait_for_workers(1, timeout=seconds)
+    except TimeoutError:
+        raise ClusterError(f"no worker has joined the scheduler within {seconds:g} s") from None
+    for name, there in client.run(staff.fingerprint, on_error="return").items():
+        if isinstance(there, ImportError):
+            raise ClusterError(f"worker {name} cannot import modewright: {there}")
+        if isinstance(there, BaseException):
+            raise ClusterError(f"worker {name}: {there!r}")
+        refusal = differences(fingerprint(), there)
+        if refusal:
+            raise ClusterError(f"worker {name} has other code: {refusal}")

@@ -1,0 +1,188 @@
+"""Sensitivity: which of the things that are drawn move a measure - indices from a store.
+
+Of Saltelli's blocks: first order and total (Saltelli and others, Comput. Phys. Commun. 181 (2010)
+259, Table 2 b and f). Of Morris' paths: mean, mean magnitude and spread of elementary effects
+(Campolongo and others, Environ. Model. Softw. 22 (2007) 1509). Intervals are those of a bootstrap.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sweep.design import LEVELS, STRIDE
+from sweep.interval import Interval
+from sweep.manifest import Design, refused
+from sweep.measure import Column
+from sweep.store import Store
+from sweep.summary import group_values
+from sweep.table import Reals, Table
+
+REPLICATES = 500
+"""Of the bootstrap: the ends of an interval at 95 % stand on a dozen of them each."""
+SEED = 1
+FEWEST = 4
+"""Complete blocks or paths below which nothing is told."""
+
+
+@dataclass(frozen=True)
+class Index:
+    """How one thing that is drawn moves a measure in one group.
+
+    `values` and `intervals` by name: `first`, `total` (shares of the variance), or `mu_star`, `mu`,
+    `sigma` [unit of the measure]: of the change from one share to another, over their difference.
+    `used` blocks or paths of `count` are complete: every point is done and has the measure.
+    """
+
+    group: Mapping[str, str]
+    measure: str
+    unit: str
+    name: str
+    values: Mapping[str, float]
+    intervals: Mapping[str, Interval]
+    used: int
+    count: int
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """The indices of a study, and of which design they are."""
+
+    study: str
+    digest: str
+    method: str
+    confidence: float
+    indices: tuple[Index, ...]
+
+    def csv(self) -> str:
+        """Return the indices as CSV, numbers in SI."""
+        text = io.StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        if self.indices:
+            first = self.indices[0]
+            ends = [f"{name}_{end}" for name in first.intervals for end in ("from", "to")]
+            names = [*first.group, "measure", "unit", "name", *first.values, *ends, "used", "count"]
+            writer.writerow(names)
+        for one in self.indices:
+            ends = [str(end) for pair in one.intervals.values() for end in pair or ("", "")]
+            head = [*one.group.values(), one.measure, one.unit, one.name]
+            writer.writerow([*head, *one.values.values(), *ends, one.used, one.count])
+        return text.getvalue()
+
+
+def sensitivity_of(store: Store) -> Sensitivity:
+    """Return the indices of what a store holds so far. Raises SpecError, ToolMissing."""
+    manifest, design = store.manifest, store.manifest.design
+    if design is None:
+        label = f"the points of `{manifest.study}` are no design of which indices are made"
+        hint = "draw them by `sampling: {saltelli: 256, seed: 1}`, or fewer by `{morris: 50}`"
+        raise refused(store.folder, "store", label, hint)
+    table = Table(store)
+    found = [
+        index
+        for column in manifest.measures
+        if column.type != "list"
+        for index in _of_measure(table, design, column)
+    ]
+    confidence = manifest.presentation.confidence
+    return Sensitivity(manifest.study, manifest.digest, design.method, confidence, tuple(found))
+
+
+def sobol_indices(results: Reals) -> dict[str, Reals]:
+    """Return indices (d,) of results (n, d + 2) at A, B and A with a column of B."""
+    a, b, mixed = results[:, :1], results[:, 1:2], results[:, 2:]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        variance = np.var(results[:, :2])
+        mean = np.mean(results[:, :2])
+        first = np.mean((b - mean) * (mixed - a), axis=0) / variance
+        total = 0.5 * np.mean((a - mixed) ** 2, axis=0) / variance
+    return {"first": first, "total": total}
+
+
+def morris_indices(effects: Reals) -> dict[str, Reals]:
+    """Return indices (d,) of elementary effects (n, d)."""
+    return {
+        "mu_star": np.mean(np.abs(effects), axis=0),
+        "mu": np.mean(effects, axis=0),
+        "sigma": np.std(effects, axis=0, ddof=1),
+    }
+
+
+def elementary_effects(results: Reals, shares: Reals) -> Reals:
+    """Return effects (n, d) of results (n, d + 1) at points (n, d + 1, d) of paths."""
+    moved = np.diff(shares, axis=1)
+    changed = np.argmax(np.abs(moved), axis=2)
+    sign = np.sign(np.take_along_axis(moved, changed[:, :, None], axis=2)[:, :, 0])
+    found = np.empty(changed.shape)
+    np.put_along_axis(found, changed, sign * np.diff(results, axis=1) * LEVELS / STRIDE, axis=1)
+    return found
+
+
+def _of_measure(table: Table, design: Design, column: Column) -> Iterator[Index]:
+    """Yield the indices of a measure in each group: variant, scenario, point of the grid."""
+    size = len(design.names)
+    each = size + (2 if design.method == "saltelli" else 1)
+    samples = table.reals("sample").astype(np.int64)
+    values = np.where(table.is_done, table.reals(column.name), np.nan)
+    count = (int(samples.max()) + 1) // each if len(samples) else 0
+    drawn = {name: table.reals(name) for name in design.names}
+    for group, chosen in _groups(table, design):
+        results = _at(samples[chosen], values[chosen], count, each)
+        points = [_at(samples[chosen], drawn[name][chosen], count, each) for name in design.names]
+        fine = ~np.isnan(results).any(axis=1)
+        estimate: Callable[[Reals], dict[str, Reals]] = sobol_indices
+        if design.method == "morris":
+            results = elementary_effects(results, np.stack(points, axis=2))
+            estimate = morris_indices
+        used = results[fine]
+        if len(used) < FEWEST:
+            continue
+        found = estimate(used)
+        ends = _intervals(used, estimate, table.store.manifest.presentation.confidence)
+        for place, name in enumerate(design.names):
+            own = {key: float(numbers[place]) for key, numbers in found.items()}
+            sure = {key: (float(e[0][place]), float(e[1][place])) for key, e in ends.items()}
+            yield Index(group, column.name, column.unit, name, own, sure, len(used), count)
+
+
+def _at(samples: NDArray[np.int64], values: Reals, count: int, each: int) -> Reals:
+    """Return values (count, each) by their place in the design, the mean over replicates."""
+    size = count * each
+    inside = samples < size
+    total = np.bincount(samples[inside], values[inside], size)
+    times = np.bincount(samples[inside], minlength=size)
+    return (total / np.where(times > 0, times, np.nan)).reshape(count, each)
+
+
+def _groups(table: Table, design: Design) -> Iterator[tuple[dict[str, str], NDArray[np.bool_]]]:
+    """Yield what has a design of its own: told by name where there are several."""
+    axes = [c.name for c in table.store.manifest.varied if c.name not in design.names]
+    keys = {name: group_values(table, name) for name in ("variant", "scenario", *axes)}
+    keys = {name: key for name, key in keys.items() if len(key[1]) > 1}
+    if not keys:
+        yield {}, np.ones(len(table.is_done), dtype=bool)
+        return
+    stacked = np.stack([places for places, _ in keys.values()], axis=1)
+    for row in np.unique(stacked, axis=0):
+        named = {name: key[1][k] for (name, key), k in zip(keys.items(), row, strict=True)}
+        yield named, np.all(stacked == row, axis=1)
+
+
+def _intervals(
+    used: Reals, estimate: Callable[[Reals], dict[str, Reals]], confidence: float
+) -> dict[str, tuple[Reals, Reals]]:
+    """Return the ends (d,) of the intervals of indices: whole blocks or paths are drawn again."""
+    source = np.random.default_rng(SEED)
+    drawn = [estimate(used[source.integers(0, len(used), len(used))]) for _ in range(REPLICATES)]
+    rest = (1.0 - confidence) / 2.0
+    found = {}
+    for key in drawn[0]:
+        with np.errstate(invalid="ignore"):  # of a measure that is the same everywhere
+            low, high = np.quantile([one[key] for one in drawn], (rest, 1.0 - rest), axis=0)
+        found[key] = (low, high)
+    return found

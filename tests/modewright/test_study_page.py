@@ -1,0 +1,78 @@
+"""The page of a study, and `modewright sensitivity`, as a user meets them."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from engine.variants import run_variants
+from modewright import study_page
+from modewright.cli import app
+from modewright.exits import exit_code
+from sweep.executor import InProcess
+from sweep.store import read_store
+from sweep.study_run import run_study
+from tests.sweep.laying import QUICK, study
+
+DESIGN = ("sampling: {random: 4, seed: 3}", "sampling: {morris: 6, seed: 3}")
+
+
+def test_a_study_is_one_page_that_asks_for_no_other_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, page = tmp_path / "out", tmp_path / "out.html"
+    made = study("grid", DESIGN)
+    run_study(made, out, QUICK)
+    arguments = ["sweep", "--summary", str(out), "--report", str(page)]
+    assert exit_code(lambda: app(arguments, standalone_mode=False)) == 0
+    assert f"wrote {page}" in capsys.readouterr().out
+    text = page.read_text()
+    assert "<h1>grid: 270 of 270 variants</h1>" in text
+    assert text.count("<svg ") == 4
+    assert re.findall(r'(?:src|href)="(?!#|data:)[^"]*"', text) == []
+    ids = re.findall(r' id="([^"]+)"', text)
+    assert len(ids) == len(set(ids))
+    assert read_store(out).manifest.digest in text
+    for part in (
+        "mu_star",
+        "peak [m]: the largest magnitudes",
+        "None of those",
+        "system of variant",
+    ):
+        assert part in text
+    assert study_page.report_page(read_store(out)).decode() == text
+
+
+def test_failed_variants_are_on_the_page_with_their_reasons(tmp_path: Path) -> None:
+    run_study(study("failing_ways"), tmp_path, InProcess(run_variants))
+    text = study_page.report_page(read_store(tmp_path)).decode()
+    assert "fire for ever" in text
+    assert "`plant.k` = 9 is outside its range [0, 5]" in text
+    assert '<span class="badge unknown">3 stopped</span>' in text
+
+
+def test_indices_are_told_to_people_and_machines(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, table = str(tmp_path / "out"), tmp_path / "indices.csv"
+    run_study(study("grid", DESIGN), tmp_path / "out", QUICK)
+    run = ["sensitivity", out, "--csv", str(table)]
+    assert exit_code(lambda: app(run, standalone_mode=False)) == 0
+    told = capsys.readouterr().out
+    assert "morris" in told and "mu_star" in told and "6 of 6" in told
+    assert table.read_text().startswith("w,d,measure,unit,name,mu_star,mu,sigma,")
+    assert exit_code(lambda: app(["sensitivity", out, "--json"], standalone_mode=False)) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert {one["name"] for one in found["indices"]} == {"x_1", "inputs.push.steps.1"}
+    assert len(found["indices"][0]["intervals"]["mu_star"]) == 2
+
+
+def test_a_study_without_a_design_says_what_is_missing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run_study(study(), tmp_path, QUICK)
+    assert exit_code(lambda: app(["sensitivity", str(tmp_path)], standalone_mode=False)) == 1
+    assert "sampling: {saltelli: 256, seed: 1}" in capsys.readouterr().err

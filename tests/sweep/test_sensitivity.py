@@ -1,0 +1,115 @@
+"""Indices of sensitivity against closed forms and SALib."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from SALib.analyze import morris as salib_morris, sobol as salib_sobol
+
+from language.problem import SpecError
+from sweep.design import LEVELS, STRIDE, morris_shares
+from sweep.draw import drawn_values
+from sweep.sensitivity import (
+    elementary_effects,
+    morris_indices,
+    sensitivity_of,
+    sobol_indices,
+)
+from sweep.store import read_store
+from sweep.study import Study
+from sweep.study_run import run_study
+from sweep.table import Reals
+from tests.sweep.laying import QUICK, Backwards, content, study
+
+A, B = 7.0, 0.1
+DRAWN = "  x_1: {uniform: [0.5 m, 1.5 m]}"
+RANDOM = "sampling: {random: 4, seed: 3}"
+
+
+def designed(method: str) -> Study:
+    return study("grid", (RANDOM, f"sampling: {{{method}, seed: 3}}"))
+
+
+def ishigami(shares: Reals) -> Reals:
+    """Ishigami and Homma 1990: x between -pi and pi (n, 3)."""
+    x = -math.pi + 2.0 * math.pi * shares
+    found = np.sin(x[:, 0]) + A * np.sin(x[:, 1]) ** 2 + B * x[:, 2] ** 4 * np.sin(x[:, 0])
+    return np.asarray(found)
+
+
+def blocks(count: int) -> Reals:
+    from scipy.stats import qmc
+
+    both = qmc.Sobol(6, seed=1).random(count)
+    parts = [both[:, :3], both[:, 3:]]
+    for k in range(3):
+        mixed = both[:, :3].copy()
+        mixed[:, k] = both[:, 3 + k]
+        parts.append(mixed)
+    return np.stack([ishigami(part) for part in parts], axis=1)
+
+
+def test_indices_of_the_ishigami_function_are_those_of_its_closed_form() -> None:
+    found = sobol_indices(blocks(1 << 13))
+    eighth = B * math.pi**4
+    variance = A**2 / 8 + eighth / 5 + eighth**2 / 18 + 0.5
+    one, two = 0.5 * (1 + eighth / 5) ** 2, A**2 / 8
+    both = eighth**2 * (1 / 18 - 1 / 50)
+    assert found["first"] == pytest.approx([one / variance, two / variance, 0.0], abs=5e-3)
+    total = [(one + both) / variance, two / variance, both / variance]
+    assert found["total"] == pytest.approx(total, abs=5e-3)
+
+
+def test_indices_are_those_of_salib() -> None:
+    results = blocks(256)
+    order = [0, 2, 3, 4, 1]  # SALib: A, A with a column of B ..., B
+    problem = {"num_vars": 3, "names": ["a", "b", "c"], "bounds": [[0, 1]] * 3}
+    theirs = salib_sobol.analyze(problem, results[:, order].reshape(-1), calc_second_order=False)
+    ours = sobol_indices(results)
+    assert ours["total"] == pytest.approx(theirs["ST"], rel=1e-9)
+    assert ours["first"] == pytest.approx(theirs["S1"], abs=2e-2)  # they norm by A and B and mixed
+
+
+def test_elementary_effects_are_those_of_salib() -> None:
+    shares = morris_shares(3, np.arange(4 * 40), 5)
+    assert set(np.unique(shares)) == {0.125, 0.375, 0.625, 0.875}
+    results = ishigami(shares)
+    effects = elementary_effects(results.reshape(40, 4), shares.reshape(40, 4, 3))
+    ours = morris_indices(effects)
+    problem = {"num_vars": 3, "names": ["a", "b", "c"], "bounds": [[0, 1]] * 3}
+    levels = (shares * LEVELS - 0.5) / (LEVELS - 1)
+    theirs = salib_morris.analyze(problem, levels, results, num_levels=LEVELS)
+    scale = (LEVELS / (2 * (LEVELS - 1))) / (STRIDE / LEVELS)
+    for name in ("mu_star", "mu", "sigma"):
+        assert ours[name] == pytest.approx(scale * np.asarray(theirs[name], float), rel=1e-9)
+
+
+def test_a_point_of_a_design_follows_from_its_number_alone() -> None:
+    for method, count in (("saltelli: 8", 8 * 4), ("morris: 6", 6 * 3)):
+        made = designed(method)
+        assert made.sampling.count == count
+        whole = drawn_values(made, range(count))
+        alone = [drawn_values(made, [k])[0] for k in range(count)]
+        assert whole == alone
+
+
+def test_indices_are_made_from_a_store_of_each_point_of_the_grid(tmp_path: Path) -> None:
+    made = designed("saltelli: 8")
+    run_study(made, tmp_path / "a", Backwards(), block=7)
+    assert len(content(read_store(tmp_path / "a"))) == made.count == 15 * 32
+    found = sensitivity_of(read_store(tmp_path / "a"))
+    assert (found.method, len(found.indices)) == ("saltelli", 15 * 2 * 6)
+    some = [i for i in found.indices if i.measure == "final"]
+    assert {i.name for i in some} == {"x_1", "inputs.push.steps.1"}
+    assert all(i.used == i.count == 8 and set(i.group) == {"w", "d"} for i in some)
+    assert found.csv().splitlines()[0].startswith("w,d,measure,unit,name,first,total,first_from,")
+    assert len(found.csv().splitlines()) == 1 + len(found.indices)
+
+
+def test_points_that_are_no_design_have_no_indices(tmp_path: Path) -> None:
+    run_study(study(), tmp_path, QUICK)
+    with pytest.raises(SpecError, match="no design of which indices are made"):
+        sensitivity_of(read_store(tmp_path))

@@ -1,0 +1,160 @@
+"""Verify a cluster: two of four workers killed, what Dask costs, the client's memory at a million.
+
+Times are those of processes here, which share this machine with whatever else runs on it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from tests.verify.store import ROOT, Figure, measured
+from tests.verify.studies import MILLION, MOST_MEGABYTES, bytes_digest
+
+VARIANTS, WORKERS, KILLS = 100_000, 4, 2
+MOST_OVERHEAD = 0.15
+"""Processor time and time on the clock that Dask may add to that of as many local processes."""
+STUDY = """language: 1
+study: many_tip_outs
+of: ev_driveline_ideal
+scenarios: [tip_out]
+vary:
+  plant.k_hs:  {{uniform: [3600 N*m/rad, 6000 N*m/rad]}}
+  plant.alpha: {{uniform: [0.015 rad, 0.035 rad]}}
+set:
+  initial.plant.theta_d: 0.0484754719736 rad * 4800 N*m/rad / plant.k_hs + plant.alpha
+sampling: {{random: {count}, seed: 1}}
+measures:
+  t_loss: {{time: plant.no_contact}}
+  losses: {{count: plant.no_contact}}
+  late:   {{delay: est.gap, after: plant.no_contact, before: 15 ms, within: 40 ms}}
+"""
+CLIENT = """
+import json, resource, sys, time
+from pathlib import Path
+import modewright
+from tests.verify import cluster
+
+start = time.monotonic()
+found = getattr(cluster, sys.argv[1])(*sys.argv[2:])
+seconds = time.monotonic() - start
+own = resource.getrusage(resource.RUSAGE_SELF)
+others = resource.getrusage(resource.RUSAGE_CHILDREN)
+used = sum((own.ru_utime, own.ru_stime, others.ru_utime, others.ru_stime))
+print(json.dumps({**found, "seconds": seconds, "processor_seconds": used,
+                  "client_megabytes": own.ru_maxrss / 1024.0}))
+"""
+"""One run in a process of its own: what it says, how long it took, what it took of this machine."""
+
+
+def main() -> int:
+    """Measure what is not measured yet; return 0 if every bar is met."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--count", type=int, default=VARIANTS, help="variants of real runs")
+    count: int = parser.parse_args().count
+    figures: dict[str, Callable[[], Figure]] = {
+        "cluster_with_two_workers_killed": partial(two_killed_and_what_dask_costs, count),
+        "cluster_of_a_million_variants": a_million_variants,
+    }
+    return measured(10, figures)
+
+
+def two_killed_and_what_dask_costs(count: int) -> Figure:
+    """Run a study by local processes, by Dask, and by Dask with two workers killed."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        study = folder / "many_tip_outs.yaml"
+        study.write_text(STUDY.format(count=count))
+        ran = {
+            kind: _client("sweep_by", kind, str(study), str(folder / kind))
+            for kind in ("warm", "processes", "dask", "killed")
+        }
+        digests = {kind: bytes_digest(folder / kind) for kind in ran if kind != "warm"}
+    local, dask = ran["processes"], ran["dask"]
+    more = {key: dask[key] / local[key] - 1.0 for key in ("seconds", "processor_seconds")}
+    same = len(set(digests.values())) == 1
+    fine = same and ran["killed"]["kills"] == KILLS and max(more.values()) <= MOST_OVERHEAD
+    return {
+        "met": fine, "variants": count, "workers": WORKERS, "same_bytes": same,
+        "overhead": more, **{kind: ran[kind] for kind in digests},
+        "load": [round(load, 2) for load in os.getloadavg()],
+    }  # fmt: skip
+
+
+def sweep_by(kind: str, study: str, out: str) -> dict[str, Any]:
+    """Run a study by local processes or by Dask; two of its workers are killed where asked for."""
+    import modewright as mw
+    from modewright import cluster_worker
+    from sweep.address import Address, Credentials
+    from sweep.cluster import Cluster
+    from sweep.clustering import Staff, connected
+
+    if kind == "warm":  # what is compiled is compiled, what is read is read
+        mw.sweep(study, out, root=ROOT, samples=2000, workers=WORKERS)
+        return {}
+    if kind == "processes":
+        return {"variants": mw.sweep(study, out, root=ROOT, workers=WORKERS).computed}
+    if kind == "dask":
+        found = mw.sweep(study, out, root=ROOT, cluster=f"local:{WORKERS}")
+        return {"variants": found.computed}
+    staff = Staff(cluster_worker.own_fingerprint, cluster_worker.__name__)
+    killed: list[int] = []
+    with connected(Address(count=WORKERS), Credentials(), staff) as client:
+
+        def kill(done: int, before: int, total: int) -> None:
+            """Kill a worker at a third and at two thirds of the way."""
+            if len(killed) < KILLS and done > total * (len(killed) + 1) // (KILLS + 1):
+                there = client.run(os.getpid).values()
+                killed.append(next(pid for pid in there if pid not in killed))
+                os.kill(killed[-1], signal.SIGKILL)
+
+        executor = Cluster(client, cluster_worker.compute)
+        found = mw.sweep(study, out, root=ROOT, executor=executor, progress=kill)
+    return {"variants": found.computed, "lost": len(found.lost), "kills": len(killed)}
+
+
+def a_million_variants() -> Figure:
+    """Run and sum up a million variants that cost nothing: what the client itself takes."""
+    with tempfile.TemporaryDirectory() as folder:
+        ran = _client("million", str(Path(folder) / "out"))
+    met = ran["client_megabytes"] < MOST_MEGABYTES and ran["variants"] == MILLION
+    return {"met": met, **ran}
+
+
+def million(out: str) -> dict[str, Any]:
+    """Run a million variants on two workers; the scheduler is in the client's process, too."""
+    from sweep.address import Address, Credentials
+    from sweep.cluster import Cluster
+    from sweep.clustering import Staff, connected
+    from sweep.study_run import run_study
+    from sweep.summary import summary_of
+    from tests.sweep.killing import own, quickly
+    from tests.sweep.laying import study
+
+    axes = "{linspace: [1 rad/s, 3 rad/s, 1000]}", "{linspace: [0 1/s, 1 1/s, 1000]}"
+    changes = (("[1 rad/s, 3 rad/s]", axes[0]), ("[0.05 1/s, 0.3 1/s]", axes[1]))
+    made = study("alone", *changes, ("one_at_a_time", "grid"))
+    with connected(Address(count=2), Credentials(), Staff(own)) as client:
+        found = run_study(made, Path(out), Cluster(client, quickly))
+    return {"variants": summary_of(found.store).lines[0].count}
+
+
+def _client(*arguments: str) -> dict[str, Any]:
+    command = [sys.executable, "-c", CLIENT, *arguments]
+    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+    done = subprocess.run(command, cwd=ROOT, env=environment, stdout=subprocess.PIPE, check=True)
+    found: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+    return found
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
