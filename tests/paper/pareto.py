@@ -61,11 +61,12 @@ def picture(points: dict[str, list[Point]]) -> Figure:
         own = points[scheme]
         x, y = [p.median for p in own], [p.cruise for p in own]
         axes.plot(x, y, color=colour, marker=marker, lw=0.8, label=label)
+        places: dict[tuple[float, float], list[str]] = {}
         for point in own:
-            where = (point.median, point.cruise)
-            axes.annotate(
-                point.setting, where, textcoords="offset points", xytext=(5, 4), fontsize=7
-            )
+            places.setdefault((point.median, point.cruise), []).append(point.setting)
+        for where, settings in places.items():
+            text = ", ".join(settings)
+            axes.annotate(text, where, textcoords="offset points", xytext=(5, 4), fontsize=7)
     axes.set_yscale("symlog", linthresh=1.0)
     axes.set_ylim(bottom=-0.2)
     axes.set_xlabel("first loss of contact is seen, median delay [ms]")
