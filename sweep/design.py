@@ -17,11 +17,6 @@ STRIDE = LEVELS // 2
 """Levels of one step of a path; so all levels come equally often."""
 
 
-def points_each(method: str, dimensions: int) -> int:
-    """Return how many points belong together: those of a block or a path; else each is alone."""
-    return {"saltelli": dimensions + 2, "morris": dimensions + 1}.get(method, 1)
-
-
 def saltelli_shares(
     dimensions: int, samples: NDArray[np.int64], sobol: Callable[[int], Reals]
 ) -> Reals:

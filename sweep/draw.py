@@ -15,8 +15,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from sweep.design import morris_shares, points_each, saltelli_shares
-from sweep.study import NANOSECONDS, Distribution, Study
+from sweep.design import morris_shares, saltelli_shares
+from sweep.study import NANOSECONDS, Distribution, Study, points_each
 
 Reals = NDArray[np.float64]
 PER_COUNTER = 4

@@ -9,10 +9,9 @@ from pathlib import Path
 
 from language.problem import Problems, Source, Span, SpecError
 from sweep.block import Block
-from sweep.design import points_each
 from sweep.measure import Column, columns_of
 from sweep.preparation import FORMAT, digest_of
-from sweep.study import Presentation, Study
+from sweep.study import Presentation, Study, points_each
 
 MANIFEST = "study.json"
 MOST_BLOCKS = 100

@@ -12,8 +12,7 @@ from engine.starting import programs_of
 from engine.stimulus import resolved
 from language.experiment import Scenario
 from language.printing import digest as program_digest
-from sweep.design import points_each
-from sweep.study import Course, Kind, Study
+from sweep.study import Course, Kind, Study, points_each
 from sweep.study_reader import signals_of
 
 FORMAT = 1

@@ -150,7 +150,10 @@ def locked(folder: Path) -> Iterator[None]:
         except OSError:
             label = "another process is writing into this folder"
             raise refused(folder, "store", label, "wait for it, or name another folder") from None
-        yield
+        try:
+            yield
+        finally:  # by hand: a process that is just being started may still share the file
+            fcntl.flock(file, fcntl.LOCK_UN)
 
 
 def _another(folder: Path, there: Manifest, wanted: Manifest) -> SpecError:

@@ -179,3 +179,8 @@ class Study:
         samples = max(1, self.sampling.count)
         shared = self.grid_count * samples * self.replicates
         return len(self.kinds) * len(self.scenarios) * shared
+
+
+def points_each(method: str, dimensions: int) -> int:
+    """Return how many points belong together: those of a block or a path; else each is alone."""
+    return {"saltelli": dimensions + 2, "morris": dimensions + 1}.get(method, 1)

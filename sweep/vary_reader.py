@@ -15,8 +15,7 @@ from language.problem import Problems, Span, nearest
 from language.reader import Reader
 from language.scope import Scope
 from language.units import NO_UNIT, Unit
-from sweep.design import points_each
-from sweep.study import Axis, Distribution, Sampling, Setting, Shape, Target, Varied
+from sweep.study import Axis, Distribution, Sampling, Setting, Shape, Target, Varied, points_each
 from sweep.target import Place
 
 LISTS = ("values", "linspace", "logspace")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, strategies as st
+from hypothesis import given, settings, strategies as st
 from scipy.integrate import quad_vec
 from scipy.linalg import expm
 
@@ -32,6 +32,7 @@ def theirs(a: Matrix, b: Matrix, time: float) -> tuple[Matrix, Matrix]:
     return mean, second - np.outer(mean, mean)
 
 
+@settings(max_examples=10)
 @given(
     st.lists(st.floats(-20.0, 20.0), min_size=6, max_size=6),
     st.floats(1e-3, 0.2),

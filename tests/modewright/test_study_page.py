@@ -55,8 +55,9 @@ def test_failed_variants_are_on_the_page_with_their_reasons(tmp_path: Path) -> N
 
 
 def test_indices_are_told_to_people_and_machines(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setenv("COLUMNS", "200")
     out, table = str(tmp_path / "out"), tmp_path / "indices.csv"
     run_study(study("grid", DESIGN), tmp_path / "out", QUICK)
     run = ["sensitivity", out, "--csv", str(table)]
