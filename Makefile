@@ -12,6 +12,8 @@ UV_LOCK := env -u UV_DEFAULT_INDEX -u UV_INDEX -u UV_INDEX_URL -u UV_EXTRA_INDEX
 
 # Whatever environment the calling shell is in, this project uses its own.
 unexport VIRTUAL_ENV PYTHONHOME PYTHONPATH PYTHONSAFEPATH UV_PROJECT UV_WORKING_DIR
+# Python keeps what it compiled of its modules, as it does by default: commands start sooner.
+unexport PYTHONDONTWRITEBYTECODE
 
 # A shell fragment that puts the first Python that is new enough into $$python.
 define find_python

@@ -79,12 +79,12 @@ def _targets(choice: Choose) -> list[str]:
 def affine(expr: Expr, known: Mapping[str, Affine]) -> Affine:
     """Return what an expression is in the states; `OTHER` where it is not linear in them."""
     match expr:
+        case Ref(name):
+            return known.get(name, OTHER)
         case Value(bool()):
             return OTHER
         case Value(value):
             return Affine({}, float(value))
-        case Ref(name):
-            return known.get(name, OTHER)
         case Unary("-", operand):
             return _scaled(affine(operand, known), -1.0)
         case Binary("+", left, right):

@@ -7,6 +7,7 @@ bound of micro-steps is passed: then a run stops there, for certain.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from itertools import islice
 
 from language.constants import exact_value
@@ -66,9 +67,8 @@ def ways_round(automaton: Automaton) -> tuple[Way, ...]:
     inquiry = Inquiry(automaton)
     ways = {way.key: way for way in instant_ways(automaton)}
     after: dict[str, list[str]] = {key: [] for key in ways}
-    for first, second in _possible_pairs(automaton, list(ways.values())):
-        if not _is_disproved(automaton, first, second, inquiry):
-            after[first.key].append(second.key)
+    for first, seconds in _possible_seconds(automaton, list(ways.values())):
+        after[first.key] = [way.key for way in _not_disproved(automaton, first, seconds, inquiry)]
     follows: dict[tuple[str, str], bool] = {}
     found: list[Way] = []
     for members in islice(simple_cycles(after), MOST_WAYS_ROUND):
@@ -107,10 +107,10 @@ def simple_cycles(after: Mapping[str, list[str]]) -> Iterator[tuple[str, ...]]:
                         stack += [(*path, name)] if len(path) < LONGEST else []
 
 
-def _possible_pairs(
+def _possible_seconds(
     automaton: Automaton, ways: list[Transition]
-) -> Iterator[tuple[Transition, Transition]]:
-    """Yield the pairs of which the second leaves where the first leads, on a way round of modes."""
+) -> Iterator[tuple[Transition, list[Transition]]]:
+    """Yield each transition with those that leave where it leads, on a way round of modes."""
     modes: dict[str, list[str]] = {f"{m.region} {m.name}": [] for m in automaton.all_modes}
     leaving: dict[str, list[Transition]] = {}
     for way in ways:
@@ -120,22 +120,25 @@ def _possible_pairs(
     for way in ways:
         target = f"{way.region} {way.target}"
         if groups[target] == groups[f"{way.region} {way.source}"]:
-            for second in leaving.get(target, ()):
-                if groups[f"{second.region} {second.target}"] == groups[target]:
-                    yield way, second
+            seconds = [(f"{second.region} {second.target}", second) for second in leaving[target]]
+            yield way, [second for name, second in seconds if groups[name] == groups[target]]
 
 
-def _is_disproved(
-    automaton: Automaton, first: Transition, second: Transition, inquiry: Inquiry
-) -> bool:
-    """Tell whether linear bounds say that one does not follow the other at the same instant."""
+def _not_disproved(
+    automaton: Automaton, first: Transition, seconds: list[Transition], inquiry: Inquiry
+) -> Iterator[Transition]:
+    """Yield the transitions that linear bounds let follow another one at the same instant."""
     moment = Moment(automaton, automaton.source(first))
     try:
         guard = moment.expression(first.when.tree)
-        there = moment.after(first).expression(second.when.tree)
+        there = moment.after(first)
     except (KeyError, SpecError):
-        return True
-    return disproved(inquiry.question(moment.story, (guard, there)))
+        return
+    for second in seconds:
+        with suppress(KeyError, SpecError):
+            condition = there.expression(second.when.tree)
+            if not disproved(inquiry.question(moment.story, (guard, condition))):
+                yield second
 
 
 def _follows(automaton: Automaton, first: Transition, second: Transition, inquiry: Inquiry) -> bool:

@@ -112,14 +112,16 @@ class DimensionCheck:
     def kind(self, tree: Tree) -> Kind | None:
         """Return what the expression is, None where a problem was reported inside it."""
         match tree:
-            case Broken():
-                return None
-            case Number(_, unit, _):
-                return unit.dimension
-            case Truth():
-                return "truth"
             case Name():
                 return self._name(tree)
+            case Number(_, unit, _):
+                return unit.dimension
+            case Arithmetic():
+                return self._arithmetic(tree)
+            case Application():
+                return function_kind(self, tree)
+            case Truth():
+                return "truth"
             case Negative(operand, _):
                 kind = self.kind(operand)
                 if isinstance(kind, Whole):
@@ -132,8 +134,6 @@ class DimensionCheck:
                 self.truth(left, operator)
                 self.truth(right, operator)
                 return "truth"
-            case Arithmetic():
-                return self._arithmetic(tree)
             case Relation():
                 return self._relation(tree)
             case Power(base, exponent, _):
@@ -141,8 +141,8 @@ class DimensionCheck:
                 return None if kind is None else power(kind, exponent)
             case Choice():
                 return self._choice(tree)
-            case Application():
-                return function_kind(self, tree)
+            case Broken():
+                return None
 
     def report(self, kind: str, span: Span, label: str, help: str = "") -> None:
         """Report a problem."""

@@ -18,16 +18,15 @@ Shape = tuple[str, tuple["Shape | int", ...]]
 """A rule of the grammar with its parts: other rules, or the numbers of tokens."""
 
 TOKEN = re.compile(
-    r" +"
-    r"|(?P<quantity>\d(?:[eE][-+]\d|[0-9A-Za-z_.])* (?!(?:then|else|and|or|if|not)\b)"
+    r" *(?:(?P<quantity>\d(?:[eE][-+]\d|[0-9A-Za-z_.])* (?!(?:then|else|and|or|if|not)\b)"
     r"(?:1/)?[A-Za-z]+(?:\^-?\d)?(?:[*/][A-Za-z]+(?:\^-?\d)?)*)"
     r"|(?P<number>\d(?:[eE][-+]\d|[0-9A-Za-z_.])*)"
     r"|(?P<word>(?:if|then|else|and|or|not|true|false)\b)"
     r"|(?P<name>\$?(?!(?:if|then|else|and|or|not|true|false)\b)[A-Za-z][A-Za-z0-9_]*)"
     r"|\^ *(?P<exponent>-?\d+)(?![\d.])"
-    r"|(?P<sign><=|>=|==|!=|[-+*/<>=(),.])"
+    r"|(?P<sign><=|>=|==|!=|[-+*/<>=(),.]))"
 )
-"""The tokens of `expression.lark`; an exponent with its `^`, for a digit elsewhere is a number."""
+"""The tokens of `expression.lark`, each with the blanks before it; an exponent with its `^`, for a digit elsewhere is a number."""
 ALIKE = {"quantity": "1 m", "number": "1", "name": "x"}
 """What stands for all tokens of a kind; words and signs stand for themselves."""
 EXPONENT = "^ 2"
@@ -58,9 +57,7 @@ def parsed(text: str, start: str) -> Parsed:
         if match.start() != end:
             break
         end = match.end()
-        kind = match.lastgroup
-        if kind is None:
-            continue
+        kind = str(match.lastgroup)
         found = match[kind]
         texts.append(found)
         starts.append(match.start(kind))
@@ -70,7 +67,7 @@ def parsed(text: str, start: str) -> Parsed:
             kinds.append(ALIKE[kind])
         else:
             kinds.append(ALIKE_SIGNS.get(found, found))
-    known = _shape_of(tuple(kinds), start) if end == len(text) else None
+    known = _shape_of(tuple(kinds), start) if not text[end:].strip(" ") else None
     if known:
         return Parsed(known[0], tuple(texts), tuple(starts), known[1])
     tokens: list[lark.Token] = []

@@ -66,24 +66,25 @@ def expression(tree: Tree, known: Names) -> Expr:
 def _typed(tree: Tree, known: Names) -> tuple[Expr, bool]:
     """Return the expression of a tree, and whether its value is a whole number."""
     match tree:
-        case Broken():
-            raise TypeError(f"{tree.span}: an expression with a problem is not lowered")
-        case Number(value, _, _):
-            return real(value), False
-        case Truth(value, _):
-            return Value(value), False
         case Name(path, _):
             return known[path], is_whole(known[path])
-        case Negative(operand, _):
-            inner, whole = _typed(operand, known)
-            return Unary("-", inner), whole
-        case Not(operand, _):
-            return Unary("not", expression(operand, known)), False
+        case Number(value, _, _):
+            return real(value), False
         case Arithmetic("/", left, right, _):
             return Binary("/", _real(left, known), _real(right, known)), False
         case Arithmetic(operator, left, right, _):
             first, second, whole = _matched(left, right, known)
             return Binary(operator, first, second), whole  # type: ignore[arg-type]
+        case Application():
+            made = _application(tree, known)
+            return made, is_whole(made)
+        case Truth(value, _):
+            return Value(value), False
+        case Negative(operand, _):
+            inner, whole = _typed(operand, known)
+            return Unary("-", inner), whole
+        case Not(operand, _):
+            return Unary("not", expression(operand, known)), False
         case Logic(operator, left, right, _):
             sides = expression(left, known), expression(right, known)
             return Binary(operator, *sides), False  # type: ignore[arg-type]
@@ -95,9 +96,8 @@ def _typed(tree: Tree, known: Names) -> tuple[Expr, bool]:
         case Choice(condition, then, other, _):
             first, second, whole = _matched(then, other, known)
             return Select(expression(condition, known), first, second), whole
-        case Application():
-            made = _application(tree, known)
-            return made, is_whole(made)
+        case Broken():
+            raise TypeError(f"{tree.span}: an expression with a problem is not lowered")
 
 
 def _application(tree: Application, known: Names) -> Expr:
@@ -148,10 +148,10 @@ def as_real(expr: Expr) -> Expr:
 def is_whole(expr: Expr) -> bool:
     """Tell whether the value of an expression is a whole number (an enumeration's too)."""
     match expr:
-        case Value(value):
-            return type(value) is int
         case Ref(_, whole) | Item(_, _, whole):
             return whole
+        case Value(value):
+            return type(value) is int
         case Unary("-", operand):
             return is_whole(operand)
         case Binary(operator, left, _):

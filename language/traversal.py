@@ -102,6 +102,8 @@ def parts(expr: Expr) -> Iterator[Expr]:
         part = stack.pop()
         yield part
         match part:
+            case Ref() | Value():
+                pass
             case Item(_, operand) | Unary(_, operand):
                 stack.append(operand)
             case Binary(_, left, right) | Compare(_, left, right):
