@@ -26,7 +26,10 @@ TOKEN = re.compile(
     r"|\^ *(?P<exponent>-?\d+)(?![\d.])"
     r"|(?P<sign><=|>=|==|!=|[-+*/<>=(),.]))"
 )
-"""The tokens of `expression.lark`, each with the blanks before it; an exponent with its `^`, for a digit elsewhere is a number."""
+"""The tokens of `expression.lark`, each with the blanks before it.
+
+An exponent is one with its `^`, for a digit elsewhere is a number.
+"""
 ALIKE = {"quantity": "1 m", "number": "1", "name": "x"}
 """What stands for all tokens of a kind; words and signs stand for themselves."""
 EXPONENT = "^ 2"
