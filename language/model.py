@@ -9,12 +9,7 @@ from functools import cached_property
 from typing import Literal
 
 from language.chart import Chart, Keeping
-from language.declaration import (
-    Formula,
-    Input,
-    Parameter,
-    State,
-)
+from language.declaration import Formula, Input, Parameter, State
 from language.document import Scalar
 from language.kind import Kind as ValueKind
 from language.number import NumberType

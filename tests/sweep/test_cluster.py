@@ -4,23 +4,18 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import queue
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import Future
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
-from distributed import Client, KilledWorker, LocalCluster, Security
-from distributed.scheduler import WorkerState
-from hypothesis import HealthCheck, given, settings, strategies as st
+from distributed import Client, LocalCluster, Security
 
 from sweep.address import Address, Credentials, address_of
 from sweep.block import Block
-from sweep.cluster import IN_FLIGHT, Cluster
+from sweep.cluster import Cluster
 from sweep.cluster_error import ClusterError
 from sweep.cluster_worker import Answer, answer, packed
 from sweep.clustering import NOWHERE, Staff, connected
@@ -28,7 +23,7 @@ from sweep.fingerprint import differences, fingerprint
 from sweep.processes import WorkerError
 from sweep.study_run import run_study
 from tests.sweep.killing import broken, deadly, older, own, quickly
-from tests.sweep.laying import QUICK, content, quick, study
+from tests.sweep.laying import QUICK, quick, study
 from tests.sweep.test_study_run import bytes_of
 
 STAFF = Staff(own)
@@ -162,159 +157,6 @@ def test_a_cluster_by_tls_takes_files_and_refuses_who_has_none(tmp_path: Path) -
         ):
             with pytest.raises(ClusterError, match=told), connected(address, wrong, STAFF):
                 pass
-
-
-@pytest.mark.parametrize(
-    ("text", "address", "is_open"),
-    [
-        ("local:4", Address(count=4), False),
-        ("tcp://127.0.0.1:8786", Address(0, "tcp://127.0.0.1:8786", "127.0.0.1"), False),
-        ("tcp://localhost:8786/", Address(0, "tcp://localhost:8786", "localhost"), False),
-        ("tcp://[::1]:8786", Address(0, "tcp://[::1]:8786", "::1"), False),
-        ("tcp://head.site:8786", Address(0, "tcp://head.site:8786", "head.site"), True),
-        ("tcp://10.0.0.1:8786", Address(0, "tcp://10.0.0.1:8786", "10.0.0.1"), True),
-        ("tls://head.site:8786", Address(0, "tls://head.site:8786", "head.site"), False),
-    ],
-)
-def test_an_address_is_of_processes_here_or_of_a_scheduler(
-    text: str, address: Address, is_open: bool
-) -> None:
-    assert address_of(text) == address
-    assert address.is_open == is_open
-
-
-@pytest.mark.parametrize(
-    "text", ["", "local", "local:0", "local:-1", "head:8786", "tcp://head", "tcp://head:99999"]
-)
-def test_what_is_no_address_is_refused(text: str) -> None:
-    with pytest.raises(ValueError, match="is no cluster: `local:4`"):
-        address_of(text)
-
-
-# Without processes: a client that answers in an order of its own.
-
-
-class Desk:
-    """Takes what a client is given, answers it in any order, and counts."""
-
-    def __init__(self, order: Callable[[int], int], threads: int = 3, deadly: int = -1) -> None:
-        self.order, self.threads, self.deadly = order, threads, deadly
-        self.most = 0
-        self.waiting: list[tuple[Reply, Callable[[], Any]]] = []
-        self.status = "running"
-
-    def nthreads(self) -> dict[str, int]:
-        return {"worker": self.threads}
-
-    def submit(self, function: Any, *arguments: Any, pure: bool) -> Reply:
-        reply = Reply(self)
-        if function is bytes:
-            reply.set_result(arguments[0])
-            return reply
-        wanted, held, start, stop = arguments
-        self.waiting.append(
-            (reply, lambda: self._answer(function, wanted, held.result(), start, stop))
-        )
-        self.most = max(self.most, len(self.waiting))
-        return reply
-
-    def cancel(self, replies: Any, force: bool) -> None:
-        self.waiting.clear()
-
-    def _answer(self, task: Any, wanted: Mapping[str, str], held: bytes, *ends: int) -> Answer:
-        if ends[0] == self.deadly:
-            raise KilledWorker("block", _worker(), 2)
-        found: Answer = task(wanted, held, *ends)
-        return found
-
-    def turn(self) -> None:
-        """Answer one of those that wait."""
-        reply, work = self.waiting.pop(self.order(len(self.waiting)))
-        try:
-            reply.set_result(work())
-        except KilledWorker as error:
-            reply.set_exception(error)
-
-
-class Reply(Future[Any]):
-    """A future whose desk answers when somebody waits."""
-
-    def __init__(self, desk: Desk) -> None:
-        super().__init__()
-        self.desk = desk
-
-
-def _worker() -> WorkerState:
-    return WorkerState(
-        address="tcp://127.0.0.1:1", status="running", pid=1, name="w", nthreads=1,
-        memory_limit=1, local_directory="", nanny="", server_id="w", services={}, versions={},
-        extra={}, scheduler=None,
-    )  # fmt: skip
-
-
-class Turning(queue.SimpleQueue):  # type: ignore[type-arg]
-    """A queue that lets its desk answer when it is empty."""
-
-    desk: Desk
-
-    def get(self, block: bool = True, timeout: float | None = None) -> Any:
-        if self.empty() and self.desk.waiting:
-            self.desk.turn()
-        return super().get(block=False)
-
-
-def cluster_of(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> Cluster:
-    kind = type("Turned", (Turning,), {"desk": desk})
-    monkeypatch.setattr("sweep.cluster.SimpleQueue", kind)
-    return Cluster(desk, quickly)
-
-
-@settings(max_examples=15, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(size=st.integers(1, 60), threads=st.integers(1, 9), seed=st.randoms(use_true_random=False))
-def test_rows_depend_on_no_worker_no_block_size_and_no_order(
-    tmp_path_factory: pytest.TempPathFactory, size: int, threads: int, seed: Any
-) -> None:
-    made, folder = study(), tmp_path_factory.mktemp("any")
-    desk = Desk(lambda count: seed.randrange(count), threads)
-    with pytest.MonkeyPatch.context() as patch:
-        found = run_study(made, folder / "there", cluster_of(desk, patch), block=size)
-    assert content(found.store) == content(run_study(made, folder / "here", QUICK).store)
-    assert desk.most <= IN_FLIGHT * threads
-
-
-def test_only_so_many_blocks_are_under_way(monkeypatch: pytest.MonkeyPatch) -> None:
-    taken = 0
-
-    def blocks() -> Iterator[Block]:
-        nonlocal taken
-        for start in range(60):
-            taken = start + 1
-            yield Block(start, start + 1)
-
-    desk = Desk(lambda count: 0, threads=2)
-    for done, finished in enumerate(cluster_of(desk, monkeypatch)(study(), blocks()), start=1):
-        assert finished.file
-        assert taken <= done + IN_FLIGHT * desk.threads
-    assert taken == 60
-
-
-def test_a_block_is_to_blame_only_where_it_is_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    desk = Desk(lambda count: 0, deadly=2)
-    blocks = [Block(k, k + 1) for k in range(5)]
-    found = list(cluster_of(desk, monkeypatch)(study(), blocks))
-    assert [each.block.start for each in found] == [0, 1, 3, 4, 2]
-    assert [each.lost for each in found if each.lost] == [
-        "3 workers died while it was computed alone"
-    ]
-
-
-def test_a_cluster_whose_workers_are_all_gone_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sweep.cluster.LOOK", 0.0)
-    desk = Desk(lambda count: 0, threads=0)
-    with pytest.raises(ClusterError, match="no worker any more for 0 s"):
-        list(
-            dataclasses.replace(cluster_of(desk, monkeypatch), patience=0.0)(study(), [Block(0, 1)])
-        )
 
 
 def test_dask_is_loaded_by_no_other_executor() -> None:
