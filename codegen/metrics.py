@@ -1,4 +1,4 @@
-"""Metrics: what generated C takes of a Cortex-M4F - ROM, RAM, stack."""
+"""Metrics: what generated C takes of a Cortex-M4F - ROM, RAM, stack, the longest step."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from codegen.build import FLAGS
+from codegen.longest_step import Unbounded, longest_step
 from codegen.machine import CORTEX
 from codegen.proofs.stack import stack_of
 from codegen.source import c_files
@@ -28,6 +29,8 @@ class Metrics:
     """Bytes: of `code` and its `constants`, of the calibration `page` (both ROM), of `data` that
     is no one's instance, of one `instance` (RAM), of the structures of inputs and outputs, and of
     the `stack` of a step; `beside` are functions whose stack the compiler does not tell.
+
+    `longest` are the most instructions of a step; where there is no bound, `unbounded` says why.
     """
 
     name: str
@@ -41,6 +44,8 @@ class Metrics:
     outputs: int
     stack: int
     beside: tuple[str, ...]
+    longest: int | None
+    unbounded: str
 
     @property
     def rom(self) -> int:
@@ -63,6 +68,7 @@ def metrics(program: Program) -> Metrics:
         held = _sections(folder, sources)
         sizes = _sections(folder, ["probe.c"])
         found = stack_of(folder, sources, f"{name}_Step")
+        longest, unbounded = _longest(folder, sources, f"{name}_Step")
     kinds: Counter[str] = Counter()
     for section, size in held.items():
         kinds[KINDS.get("." + section.split(".")[1], "")] += size
@@ -78,7 +84,17 @@ def metrics(program: Program) -> Metrics:
         outputs=sizes[".rodata.of_Out"],
         stack=found.most,
         beside=found.beside,
+        longest=longest,
+        unbounded=unbounded,
     )
+
+
+def _longest(folder: Path, sources: Sequence[str], entry: str) -> tuple[int | None, str]:
+    """Return the most instructions of a step, or None and why there is no bound."""
+    try:
+        return longest_step(folder, sources, entry), ""
+    except Unbounded as error:
+        return None, str(error)
 
 
 def _sections(folder: Path, sources: Sequence[str]) -> Counter[str]:

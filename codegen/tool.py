@@ -13,6 +13,8 @@ from language.missing import ToolMissing
 
 ARM_COMPILER = "arm-none-eabi-gcc"
 ARM_SIZE = "arm-none-eabi-size"
+ARM_OBJECTS = "arm-none-eabi-objdump"
+ARM_LINES = "arm-none-eabi-addr2line"
 EMULATOR = "qemu-system-arm"
 SECONDS = 900
 """Longest run of a tool before it is given up."""
@@ -20,7 +22,7 @@ PACKAGES: Mapping[str, str] = {
     "gcc": "gcc libc6-dev",
     "clang-19": "clang-19 libclang-rt-19-dev",
     ARM_COMPILER: "gcc-arm-none-eabi libnewlib-arm-none-eabi",
-    ARM_SIZE: "binutils-arm-none-eabi",
+    **dict.fromkeys((ARM_SIZE, ARM_OBJECTS, ARM_LINES), "binutils-arm-none-eabi"),
     EMULATOR: "qemu-system-arm",
     "llvm-profdata-19": "llvm-19",
     "llvm-cov-19": "llvm-19",

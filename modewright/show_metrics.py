@@ -13,11 +13,15 @@ from codegen.metrics import Metrics
 
 Measured = tuple[Metrics, Instructions | None]
 """What one automaton takes, and its instructions where they were counted."""
-HEADS = ("automaton", "ROM", "code", "constants", "page", "RAM", "data", "stack", "instructions")
+HEADS = (
+    *("automaton", "ROM", "code", "constants", "page", "RAM", "data", "stack", "instructions"),
+    "at most",
+)
 ABOUT = (
     "Bytes on a Cortex-M4F, -O2. ROM: code, constants and the default calibration page. RAM: one "
     "instance; data: what belongs to none. Stack: the most that a step takes with all that it "
-    "calls. Instructions of a step: mean, least and most."
+    "calls. Instructions of a step: mean, least and most of those counted; at most: with each loop "
+    "to its end and the longer side of each branch, read from the machine code."
 )
 STYLE = """body{font:14px/1.45 system-ui,sans-serif;margin:2rem;color:#222;max-width:60rem}
 table{border-collapse:collapse}
@@ -59,11 +63,12 @@ def metrics_html(found: Sequence[Measured]) -> str:
         "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in _row(measured)) + "</tr>\n"
         for measured in found
     )
+    reasons = "".join(f"<p>{escape(line)}</p>\n" for line in unbounded_lines(found))
     pictures = "".join(_picture(metrics, counts) for metrics, counts in found if counts)
     return (
         f"<!doctype html><meta charset=utf-8><title>metrics</title><style>{STYLE}</style>\n"
         f"<h1>What generated C takes</h1><p>{escape(ABOUT)}</p>\n"
-        f"<table><tr>{heads}</tr>\n{rows}</table>\n{pictures}"
+        f"<table><tr>{heads}</tr>\n{rows}</table>\n{reasons}{pictures}"
     )
 
 
@@ -73,7 +78,14 @@ def _row(measured: Measured) -> tuple[str, ...]:
     sizes = (metrics.rom, metrics.code, metrics.constants, metrics.page)
     ram = (metrics.instance, metrics.data)
     numbers = (str(size) for size in (*sizes, *ram))
-    return metrics.name, *numbers, stack, str(counts) if counts else "not counted"
+    most = "no bound" if metrics.longest is None else str(metrics.longest)
+    return metrics.name, *numbers, stack, str(counts) if counts else "not counted", most
+
+
+def unbounded_lines(found: Sequence[Measured]) -> list[str]:
+    """Return why there is no bound of a step, a line for each automaton without one."""
+    lacking = [metrics for metrics, _ in found if metrics.longest is None]
+    return [f"{one.name}: no bound of a step: {one.unbounded}" for one in lacking]
 
 
 def _picture(metrics: Metrics, counts: Instructions) -> str:

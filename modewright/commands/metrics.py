@@ -34,6 +34,8 @@ def metrics(
 ) -> None:
     """Measure the C of automata on a Cortex-M4F: ROM, RAM, stack, instructions of a step.
 
+    Instructions are counted in a scenario; the most that a step can take is always told.
+
     \b
     modewright metrics estimator_float32 supervisor --out metrics.html
     modewright metrics estimator --numbers float32 --system ev_driveline -s tip_out
@@ -59,6 +61,8 @@ def metrics(
         print(json.dumps(data, indent=2))
     else:
         console().print(show_metrics.metrics_table(found))
+        for line in show_metrics.unbounded_lines(found):
+            console().print(line, highlight=False)
         announce([out] if out else [])
 
 

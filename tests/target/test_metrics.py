@@ -67,6 +67,17 @@ def test_instructions_are_those_of_the_whole_run() -> None:
     assert len(found.steps) == len(tape.inputs)
     assert whole - 25 < found.mean < whole, "the loop takes some instructions, too"
     assert found.steps[0] == min(found.steps) < found.steps[1], "the first tick only starts"
+    most = metrics(tape.program).longest
+    assert most is not None
+    assert max(found.steps) <= most, "a step takes no more than its machine code lets it"
+
+
+def test_arithmetic_in_software_has_no_bound_and_says_so() -> None:
+    found = metrics(program("estimator_simple"))
+    assert (found.longest, found.unbounded) == (
+        None,
+        "__aeabi_dmul has a loop of which no end is known",
+    )
 
 
 def test_the_command_measures_counts_and_draws(
