@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 
 import numpy as np
@@ -27,6 +27,8 @@ from language.problem import SpecError
 from language.program import Program
 from language.syntax import Name
 
+Ends = tuple[float, float]
+"""The least and the largest value of a parameter."""
 START = "start_of_{}"
 """The name of the parameter that a swept initial value becomes."""
 
@@ -37,6 +39,7 @@ class Adjustment:
 
     `tuned` gives for each swept name its instance and tunable parameter; `rebuilt` says why a name
     needs a Program per value. `programs` are those of the batch's own values of what is rebuilt.
+    Where nothing is, `ends` are the values [SI] between which the Programs are the same.
     """
 
     system: System
@@ -44,6 +47,7 @@ class Adjustment:
     programs: Mapping[str, Program]
     tuned: Mapping[str, tuple[str, str]]
     rebuilt: Mapping[str, str]
+    ends: Mapping[str, Ends] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -61,9 +65,11 @@ def adjusted(batch: Batch) -> Adjustment:
     """
     require_known(batch)
     scenario = _without_initial(resolved(batch.system, batch.scenario), batch)
-    at_once = _all_tunable(batch, scenario)
-    if at_once:
-        return at_once
+    met = ends_of(batch)
+    for ends in (declared, met) if (declared := _declared(batch, met)) != met else (met,):
+        at_once = _all_tunable(batch, scenario, ends)
+        if at_once:
+            return at_once
     arrays = {**batch.parameters, **batch.initial}
     rebuilt: dict[str, str] = {}
     system, tuned = batch.system, {}
@@ -77,16 +83,31 @@ def adjusted(batch: Batch) -> Adjustment:
     return Adjustment(system, scenario, programs_of(system, scenario), tuned, rebuilt)
 
 
-def _all_tunable(batch: Batch, scenario: Scenario) -> Adjustment | None:
+def ends_of(batch: Batch) -> dict[str, Ends]:
+    """Return between which values [SI] the parameters of a batch are."""
+    return {name: (float(min(v)), float(max(v))) for name, v in batch.parameters.items()}
+
+
+def _declared(batch: Batch, met: Mapping[str, Ends]) -> dict[str, Ends]:
+    """Return the declared ranges of parameters that have one, where all values are inside."""
+    found = {}
+    for name, (low, high) in met.items():
+        owner, _, short = name.partition(".")
+        declared = batch.system.instances[owner].automaton.parameters[short].range
+        first, last = map(float, declared) if declared else (low, high)
+        found[name] = (first, last) if first <= low and high <= last else (low, high)
+    return found
+
+
+def _all_tunable(batch: Batch, scenario: Scenario, ends: Mapping[str, Ends]) -> Adjustment | None:
     """Return the Programs in which all names are tunable, where nothing but values differs."""
     names = list(dict.fromkeys([*batch.parameters, *batch.initial]))
     systems, made = [], []
     try:
-        for end in (np.min, np.max):
+        for end in range(2):
             system = batch.system
             for name in names:
-                values = batch.parameters.get(name)
-                value = 0.0 if values is None else float(end(values))
+                value = ends[name][end] if name in ends else 0.0
                 system = _tuned(system, name, batch, value)
             systems.append(system)
             made.append(programs_of(system, scenario))
@@ -96,7 +117,7 @@ def _all_tunable(batch: Batch, scenario: Scenario) -> Adjustment | None:
         return None
     low, high = ({n: digest(_without_values(p)) for n, p in part.items()} for part in made)
     tuned = {name: _tunable_of(name, batch) for name in names}
-    return Adjustment(systems[0], scenario, made[0], tuned, {}) if low == high else None
+    return Adjustment(systems[0], scenario, made[0], tuned, {}, ends) if low == high else None
 
 
 def groups(batch: Batch) -> list[Group]:

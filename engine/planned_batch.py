@@ -6,6 +6,7 @@ range of a sampled instance) the interpreter does.
 
 from __future__ import annotations
 
+import copy
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -15,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.adjustment import Group, groups
+from engine.adjustment import Group, ends_of, groups, require_known
 from engine.assembling import assembly_of
 from engine.batch import NO_EVENT, Batch, BatchResult, EventKind
 from engine.plan import Plan, noise_of, plan_of, why_not_planned
@@ -32,6 +33,8 @@ from language.assembly import Assembly, ranged
 from language.program import short
 
 KINDS = ("first", "final", "max", "min", "peak", "mean", "rms")
+KEPT = 4
+"""Plans of a planner: the scenarios of a study take turns."""
 CHUNK = 2000
 """Variants of one call: their events and values are a few megabytes."""
 
@@ -70,6 +73,20 @@ class PlannedBatch:
         if not found:
             raise ValueError("a batch has at least one variant")
 
+    def again(self, batch: Batch) -> PlannedBatch | None:
+        """Return what is planned already for a batch that differs in numbers alone, else None."""
+        if self.reason or self._few or len(self._parts) != 1 or not _is_alike(batch, self.batch):
+            return None
+        (part,) = self._parts
+        ends = part.group.adjustment.ends
+        for name, (low, high) in ends_of(batch).items():
+            if name not in ends or not ends[name][0] <= low <= high <= ends[name][1]:
+                return None
+        require_known(batch)
+        found = copy.copy(self)
+        found.batch, found._parts = batch, [part.of(batch)]
+        return found
+
     def carry_out(self, threads: int | None = None) -> BatchResult:
         """Return what is kept of each variant."""
         if self.reason:
@@ -84,6 +101,37 @@ class PlannedBatch:
             for variant in group.variants.tolist():
                 keep_variant(self.batch, result, variant, group.adjustment)
         return result
+
+
+class Planner:
+    """Plans batches; a batch like one of the last ones, but for its numbers, has its plan."""
+
+    def __init__(self, build: Build, least: int = 0) -> None:
+        """Plan nothing yet; `build` and `least` are those of a planned batch."""
+        self.build, self.least = build, least
+        self._kept: list[PlannedBatch] = []
+
+    def planned(self, batch: Batch) -> PlannedBatch:
+        """Return a batch that is planned."""
+        for known in self._kept:
+            if found := known.again(batch):
+                return found
+        fresh = PlannedBatch(batch, self.build, self.least)
+        self._kept = [fresh, *self._kept[: KEPT - 1]]
+        return fresh
+
+
+def _is_alike(first: Batch, second: Batch) -> bool:
+    """Tell whether two batches differ in numbers, and in how many they are, alone."""
+    return not (first.courses or second.courses) and _form(first) == _form(second)
+
+
+def _form(batch: Batch) -> object:
+    """Return what a batch is but for its numbers."""
+    starts = [(name, table.starts) for name, table in batch.inputs.items()]
+    names = list(batch.parameters), list(batch.initial), starts, batch.seeds is None
+    wanted = batch.measures, batch.outputs, batch.most_events
+    return batch.system, batch.scenario, names, wanted
 
 
 def _steps(group: Group) -> int:
@@ -142,6 +190,12 @@ class _Planned:
             **self._tables(),
         }
         self.kinds = _kind_places(self.assembly, event_kinds(self.programs))
+
+    def of(self, batch: Batch) -> _Planned:
+        """Return the same for all variants of another batch."""
+        found = copy.copy(self)
+        found.batch, found.group = batch, Group(np.arange(batch.count), self.group.adjustment)
+        return found
 
     def run(self, result: BatchResult, threads: int) -> None:
         """Carry all out, in chunks on threads; each chunk writes its own part of the result."""

@@ -6,6 +6,7 @@ Both have the same bits. What did the work is told, with the reason where it is 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
 
 from codegen.build import BuildError
 from codegen.library import library_of
@@ -13,7 +14,7 @@ from codegen.stepper import CompiledStepper
 from engine.batch import Batch, BatchResult
 from engine.plan import why_not_planned
 from engine.planned import PlannedRun
-from engine.planned_batch import planned_batch
+from engine.planned_batch import Planner
 from engine.simulate import simulate
 from engine.starting import programs_of
 from engine.stimulus import resolved
@@ -79,16 +80,28 @@ def run_batch(batch: Batch, threads: int | None = None, least: int = 0) -> Batch
 
     Variants that share a Program and have fewer than `least` steps in all are not compiled for.
     """
-    try:
-        return planned_batch(batch, library_of, threads, least)
-    except (ToolMissing, BuildError, OSError) as error:
-        note = f"interpreter: {str(error).splitlines()[0]}"
-        return BatchResult(**{**vars(run_variants(batch)), "note": note})
+    return _carried_out(Planner(library_of, least), batch, threads)
 
 
 def run_block(batch: Batch) -> BatchResult:
-    """Return what is kept of each variant of a part of a study, which has one core."""
-    return run_batch(batch, threads=1, least=LONG)
+    """Return what is kept of each variant of a part of a study, which has one core.
+
+    Parts that differ in numbers alone are planned once in a process.
+    """
+    return _carried_out(_planner(), batch, threads=1)
+
+
+@cache
+def _planner() -> Planner:
+    return Planner(library_of, LONG)
+
+
+def _carried_out(planner: Planner, batch: Batch, threads: int | None) -> BatchResult:
+    try:
+        return planner.planned(batch).carry_out(threads)
+    except (ToolMissing, BuildError, OSError) as error:
+        note = f"interpreter: {str(error).splitlines()[0]}"
+        return BatchResult(**{**vars(run_variants(batch)), "note": note})
 
 
 def _count(scenario: Scenario, programs: dict[str, Program]) -> int:

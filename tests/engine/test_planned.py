@@ -7,20 +7,22 @@ import re
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import modewright as mw
 from codegen.build import optimised
-from codegen.library import library_of
+from codegen.library import Library, library_of
 from engine.batch import Batch, BatchResult, InputTable, Measure
 from engine.plan import why_not_planned
 from engine.planned import PlannedRun
-from engine.planned_batch import planned_batch
+from engine.planned_batch import Planner, planned_batch
 from engine.simulate import simulate
 from engine.starting import programs_of
 from engine.variants import run_variants
+from language.assembly import Assembly
 from language.experiment import Page, Scenario, System
 from language.signal import Piece
 from modewright.api import load
@@ -181,6 +183,31 @@ def test_variants_of_a_batch_have_the_bits_of_the_interpreter_on_any_number_of_t
         mine = planned_batch(batch, quick, threads)
         assert mine.note == "compiled"
         assert_same_batch(mine, theirs)
+
+
+def test_a_batch_that_differs_in_numbers_alone_is_planned_once() -> None:
+    """In other numbers, in how many, and beyond those of the first: up to the declared range."""
+    made: list[object] = []
+
+    def build(assembly: Assembly) -> Library:
+        made.append(assembly)
+        return quick(assembly)
+
+    planner = Planner(build)
+    first = {"plant.k_hs": np.array([4800.0, 5000.0]), "plant.J_em": np.array([0.05, 0.05])}
+    others: list[dict[str, Any]] = [
+        {"count": 2, "parameters": first},
+        {"count": 1, "parameters": {name: values[:1] * 1.1 for name, values in first.items()}},
+        {"count": 1, "parameters": {"plant.k_hs": first["plant.k_hs"][:1]}},
+        {"count": 2, "parameters": first, "most_events": 9},
+    ]
+    for changes, plans in zip(others, (1, 1, 2, 3), strict=True):
+        batch = batch_of(**changes)
+        assert_same_batch(planner.planned(batch).carry_out(1), run_variants(batch))
+        assert len(made) == plans
+    refused = {name: np.array([np.nan]) for name in first}
+    with pytest.raises(ValueError, match="needs 1 finite values"):
+        planner.planned(batch_of(1, parameters=refused))
 
 
 def test_a_variant_that_leaves_a_range_or_stops_is_told_by_the_interpreter() -> None:
