@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from language.model import Automaton, Mode
-from language.problem import Problems
+from language.problem import Problems, nearest
 from language.reading import all_names
 
 HINT = "make it an output, or remove it"
@@ -21,7 +21,8 @@ def check_unused(automaton: Automaton, problems: Problems) -> None:
     read |= {*_observed(automaton), *(_run_names(automaton) if model else ())}
     for name, parameter in automaton.parameters.items():
         if not (model and name in model.parameters) and name not in read:
-            problems.warning("unused", parameter.span, f"parameter `{name}` is read nowhere")
+            hint = nearest(name, automaton.parameters.keys() - {name})
+            problems.warning("unused", parameter.span, f"parameter `{name}` is read nowhere", hint)
     for name, thing in automaton.inputs.items():
         if name not in read:
             problems.warning("unused", thing.span, f"input `{name}` is read nowhere")

@@ -21,7 +21,8 @@ def numbers_text(program: Program) -> str:
         lines += _rewind_lines(program)
     if program.period is not None:
         most = most_operations(program.blocks, "step")
-        lines.append(f"longest tick: at most {most} operations, every loop to its end")
+        what = "operations (arithmetic, comparisons, stores)"
+        lines.append(f"longest tick: at most {most} {what}, every loop to its end")
     for observer in program.observers:
         lines += _observer_lines(program, observer)
     return "\n".join(lines) + "\n"

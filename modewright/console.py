@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 PLAIN_WIDTH = 160
 """Columns of a table in a pipe or a file, where there is no window to fit."""
+EVERY = 20.0
+"""Seconds between two lines that tell how far a work is, where there is no terminal."""
 log = logging.getLogger("modewright")
 
 
@@ -68,7 +70,8 @@ def working(what: str) -> Iterator[None]:
 def counting(what: str, noun: str) -> Iterator[Callable[[int, int, int], None]]:
     """Show on a terminal how much of a work is done, its rate and the time left.
 
-    What is yielded is told: how much is done, how much of it was before, how much it is in all.
+    Elsewhere, in the log of a build, a line tells it now and then. What is yielded is told: how
+    much is done, how much of it was before, how much it is in all.
     """
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
@@ -79,7 +82,7 @@ def counting(what: str, noun: str) -> Iterator[Callable[[int, int, int], None]]:
         TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[count]}"),
         TextColumn("{task.fields[rate]}"), TimeRemainingColumn(),
     )  # fmt: skip
-    start = time.monotonic()
+    start = told = time.monotonic()
     with Progress(*columns, console=screen, transient=True, disable=is_hidden) as progress:
 
         def tell(done: int, before: int, total: int) -> None:
@@ -89,6 +92,10 @@ def counting(what: str, noun: str) -> Iterator[Callable[[int, int, int], None]]:
             shown = f"{rate:.3g} {noun}/s" if done > before else ""
             count, bar = f"{done}/{total}", progress.tasks[0].id
             progress.update(bar, total=total, completed=done, count=count, rate=shown)
+            nonlocal told
+            if not (screen.is_terminal or console().quiet) and time.monotonic() - told > EVERY:
+                told = time.monotonic()
+                print(f"{what}: {done} of {total} {noun}, {shown}", file=sys.stderr, flush=True)
 
         yield tell
     log.info("%s: %.2f s", what, time.monotonic() - start)

@@ -18,7 +18,12 @@ def explain(
         str | None, typer.Argument(help="a second one: what differs between the two")
     ] = None,
     stage: Annotated[
-        str, typer.Option("--pass", help="document (expanded), model (checked), program or numbers")
+        str,
+        typer.Option(
+            "--pass",
+            help="document (expanded), model (checked), lowered, parameters, inputs, program, "
+            "numbers",
+        ),
     ] = "document",
     sets: Sets = None,
     as_json: Json = False,

@@ -69,6 +69,7 @@ def picture(points: dict[str, list[Point]]) -> Figure:
             axes.annotate(text, where, textcoords="offset points", xytext=(5, 4), fontsize=7)
     axes.set_yscale("symlog", linthresh=1.0)
     axes.set_ylim(bottom=-0.2)
+    axes.margins(x=0.12)
     axes.set_xlabel("first loss of contact is seen, median delay [ms]")
     axes.set_ylabel("false losses in a minute at 2 N*m")
     axes.grid(alpha=0.25)

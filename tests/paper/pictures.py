@@ -43,7 +43,7 @@ def traces(scenario: str, mode: str) -> Figure:
     motor.plot(t, RPM * fitted.model, color=OTHER, lw=1.0, ls="--", label="model, fitted to 0.35 s")
     motor.axvspan(0.0, 0.35, color=PAPER, alpha=0.08)
     motor.set_ylabel("w_EM [rpm]")
-    motor.legend(loc="upper right", fontsize=8)
+    motor.legend(loc="lower right" if mode == "tip-in" else "upper right", fontsize=8)
     wheel.plot(t, RPM * car.signals["car.w_w"], color=TRUTH)
     wheel.set_ylabel("w_w [rpm]")
     wheel.set_xlim(-0.1, 1.9)
@@ -74,7 +74,7 @@ def spectrogram(scenario: str) -> Figure:
     axes.set_xlabel("time after the step [s]")
     axes.set_ylabel("frequency [Hz]")
     axes.legend(loc="upper right", fontsize=8)
-    figure.colorbar(shown, label="dB")
+    figure.colorbar(shown, label="twist's rate [dB of 1 rad/s]")
     return figure
 
 
@@ -145,7 +145,8 @@ def modes(shown: Mapping[str, str], until: float) -> Figure:
 def _beside(axes: Axes, name: str, factor: float, shown: Mapping[str, str]) -> None:
     found: mw.Trajectory = run("paper_tip_out")
     t = found.times - STEP
-    axes.plot(t, factor * signal(found, f"plant.{name}"), color=TRUTH, label="plant")
+    plant = factor * signal(found, f"plant.{name}")
+    axes.plot(t, plant, color=TRUTH, lw=1.0, ls=(0, (4, 2)), zorder=5, label="plant")
     for (instance, label), colour in zip(shown.items(), (OTHER, PAPER, "#2a9d5c"), strict=False):
         own = factor * signal(found, f"{instance}.{name}")
         axes.step(t, own, color=colour, lw=1.0, where="post", label=label)
