@@ -13,6 +13,7 @@ from language.check_cycle import report_refiring
 from language.check_domain import check_domains
 from language.check_element import check_laid_on
 from language.check_memory import check_memory
+from language.check_number import check_ranges
 from language.check_observer import check_observer
 from language.check_reached import check_reached
 from language.check_region import check_regions
@@ -51,6 +52,7 @@ def check_automaton(automaton: Automaton, problems: Problems) -> Automaton:
     if automaton.model:
         automaton = dataclasses.replace(automaton, model=_declared(automaton.model, problems))
     checked = _declared(automaton, problems)
+    check_ranges(checked, problems)
     problems.stop_if_any()
     check_memory(checked, problems)
     check_tunable_waits(checked, problems)

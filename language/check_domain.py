@@ -78,6 +78,19 @@ class _ModeDomains:
                 interval = ranging.expression(factor)
                 if interval.meets_zero:
                     self._report("divisor", factor, interval)
+        self._densities()
+
+    def _densities(self) -> None:
+        """Warn of spectral densities of an observer that the ranges of what they read let be
+        negative.
+        """
+        noise = self.mode.observer.process_noise if self.mode.observer else {}
+        for name, formula in noise.items():
+            found = self.quiet.expression(formula.tree)
+            if found.known and found.low < 0.0:
+                label = f"the density of `{name}` may be negative: from {found.low:g} on"
+                help = "its square, its `abs`, or `max(0, ...)`"
+                self.problems.warning("observer", formula.span, label, help)
 
     def check_starts(self) -> None:
         """Report start values that lie outside of their range, whatever tunables are."""

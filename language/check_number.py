@@ -8,7 +8,7 @@ import math
 from collections.abc import Iterator, Mapping
 from fractions import Fraction
 
-from language.declaration import Input, Parameter
+from language.declaration import Input, Parameter, State
 from language.model import Automaton
 from language.number import rounded
 from language.problem import Problems, Span
@@ -28,6 +28,7 @@ def check_numbers(automaton: Automaton, problems: Problems) -> None:
         elif near == 0.0 and value != 0:
             label = f"{_short(value)} is 0 in {number}"
             problems.error("value", span, label, "`numbers: float64` tells it from 0")
+    check_ranges(automaton, problems)
     for parameter in automaton.parameters.values():
         for axis in parameter.table.axes if parameter.table else ():
             points = [rounded(point, number) for point in axis.points]
@@ -37,6 +38,23 @@ def check_numbers(automaton: Automaton, problems: Problems) -> None:
                     "table", parameter.span, label, "`numbers: float64` tells them apart"
                 )
     problems.stop_if_any()
+
+
+def check_ranges(automaton: Automaton, problems: Problems) -> None:
+    """Report ranges that the type turns into an infinity."""
+    for thing in _declared(automaton):
+        if any(math.isinf(rounded(bound, automaton.numbers)) for bound in thing.range or ()):
+            label = f"the range of `{thing.name}` goes beyond the largest {automaton.numbers}"
+            problems.error("value", thing.span, label, "`numbers: float64` has room for it")
+
+
+def _declared(automaton: Automaton) -> Iterator[Input | State | Parameter]:
+    """Yield what an automaton, and the model that it knows, declare with a range."""
+    yield from automaton.inputs.values()
+    yield from automaton.carried.values()
+    yield from automaton.parameters.values()
+    if automaton.model:
+        yield from _declared(automaton.model)
 
 
 def _numbers(part: object) -> Iterator[tuple[Fraction, Span]]:

@@ -27,6 +27,7 @@ def check_rewind(automaton: Automaton, transition: Transition, problems: Problem
     _one_chart(automaton, rewind, problems)
     region = automaton.region(transition.region)
     source, target = region.modes[transition.source], region.modes.get(transition.target)
+    _turns(automaton, source, rewind, problems)
     _without_memory(source, rewind, problems)
     _flow_back(automaton, source, rewind, problems)
     if target is not None:
@@ -58,6 +59,14 @@ def _one_chart(automaton: Automaton, rewind: Rewind, problems: Problems) -> None
         if thing and thing.regions:
             label = f"`{thing.name}` has parallel regions: what they did meanwhile stays done"
             problems.error("rewind", rewind.span, label, "a `wait` in place of `rewind`")
+
+
+def _turns(automaton: Automaton, source: Mode, rewind: Rewind, problems: Problems) -> None:
+    """`until` is looked for where it turned true: what never changes does not."""
+    read = {*rewind.until.reads, *closure(source, rewind.until.reads)}
+    if read <= set(automaton.parameters):
+        label = "`until` never changes: it reads neither states nor inputs"
+        problems.error("rewind", rewind.until.span, label)
 
 
 def _without_memory(source: Mode, rewind: Rewind, problems: Problems) -> None:

@@ -10,10 +10,12 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
+from language.constants import constant_value
+from language.evaluate import Scalar
 from language.kalman import SolvedNames
 from language.limit import stored
 from language.matrix import Matrix
-from language.model import Automaton
+from language.model import Automaton, Observer
 from language.operation import (
     Assign,
     Binary,
@@ -33,6 +35,8 @@ from language.operation import (
     subtract,
     total,
 )
+from language.parameter import tunables_of
+from language.problem import Problems
 from language.program import Variable
 
 COVARIANCE_RANGE = "covariance_range"
@@ -129,6 +133,23 @@ def corrected(
         less = times(Ref(f"work.gain_{row}"), pc[column])
         ops.append(Assign(before.name, subtract(before, less)))
     return tuple(ops)
+
+
+def variance_limits(
+    automaton: Automaton, observer: Observer, values: Mapping[str, Scalar], problems: Problems
+) -> dict[str, tuple[float, float]]:
+    """Return the limits that an observer gives variances; report those that leave none."""
+    found = {}
+    for name, pair in observer.limits.items():
+        if tunables_of(automaton, pair):
+            label = "the limits of a variance are made of fixed values"
+            problems.error("observer", pair[0].span, label)
+        low, high = (constant_value(one, automaton, values, "a limit") for one in pair)
+        if not 0.0 <= low < high:
+            label = f"the variance of `{name}` is kept from {low:g} to {high:g}"
+            problems.error("observer", pair[0].span, label, "`[low, high]` with 0 <= low < high")
+        found[name] = (low, high)
+    return found
 
 
 def bounded(states: States, limits: Mapping[str, tuple[float, float]]) -> Block:

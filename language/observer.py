@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from language.declaration import Formula
@@ -49,6 +51,14 @@ def read_observer(reader: Reader, node: Node, key: str, model: Automaton | None)
     of_node = table.get("of")
     of = _mode_of_model(reader, of_node, "an observer", node.span, model) if of_node else None
     _one_source(reader, table)
+    _each_once(reader, states, table.entries.get("kalman"))
+    noise = _vector(
+        reader, table.get("measurement_noise"), f"{key}.measurement_noise", set(measures)
+    )
+    for name in measures if "measurement_noise" in table.entries else ():
+        if name not in noise:
+            label = f"`{name}` has no measurement noise"
+            reader.problems.error("observer", table.entries["measurement_noise"].span, label)
     rows = columns = set(states)
     correct = table.get("correct")
     inputs = tuple(item.text for item in reader.items(table.get("inputs"), "inputs"))
@@ -61,9 +71,7 @@ def read_observer(reader: Reader, node: Node, key: str, model: Automaton | None)
         c=_matrix(reader, table.get("C"), f"{key}.C", set(measures), columns),
         f=_vector(reader, table.get("f"), f"{key}.f", rows),
         process_noise=_vector(reader, table.get("process_noise"), f"{key}.process_noise", rows),
-        measurement_noise=_vector(
-            reader, table.get("measurement_noise"), f"{key}.measurement_noise", set(measures)
-        ),
+        measurement_noise=noise,
         key=key,
         span=of_node.span if of_node else node.span,
         of=of,
@@ -75,6 +83,13 @@ def read_observer(reader: Reader, node: Node, key: str, model: Automaton | None)
         limits=_limits(reader, kalman.get("covariance_range"), f"{key}.covariance_range", rows),
         unknown_instant=instants,
     )
+
+
+def _each_once(reader: Reader, states: Iterable[str], entry: Entry | None) -> None:
+    for name, count in Counter(states).items():
+        if count > 1 and entry:
+            label = f"the observer has the state `{name}` {count} times"
+            reader.problems.error("observer", entry.span, label)
 
 
 def _measures(reader: Reader, node: Node | None, key: str) -> dict[str, str]:

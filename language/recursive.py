@@ -11,8 +11,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 
-from language.constants import constant_value
-from language.covariance import Ahead, bounded, corrected, entry, pairs, spread
+from language.covariance import Ahead, bounded, corrected, entry, pairs, spread, variance_limits
 from language.density import at_rest, varies
 from language.derived import with_model
 from language.entries import number_diagonal, number_matrix, output_matrix
@@ -66,8 +65,10 @@ def recursive(
     """Return the observer of a mode; None where its numbers cannot be computed (reported)."""
     assert mode.observer and automaton.period is not None
     with problems.collecting():
-        made = _Recursive(automaton, mode, (before, now), values, problems)
-        return made.kalman()
+        try:
+            return _Recursive(automaton, mode, (before, now), values, problems).kalman()
+        except ValueError as error:
+            problems.error("observer", mode.observer.span, f"it cannot be solved: {error}")
     return None
 
 
@@ -127,7 +128,7 @@ class _Recursive:
 
     def _same_states(self) -> None:
         """The covariance belongs to the automaton, as its states do."""
-        observers = [mode.observer for mode in self.automaton.modes.values()]
+        observers = (mode.observer for mode in self.automaton.modes.values())
         first = next(o for o in observers if o and o.gain == "recursive")
         if self.states != first.states:
             label = "recursive observers of an automaton have the same states in the same order"
@@ -263,13 +264,7 @@ class _Recursive:
         return (*ops, *spread(SolvedNames(ahead.tag, observer), ahead), *self._bounded(observer))
 
     def _bounded(self, observer: Observer) -> Block:
-        limits = {}
-        for name, pair in observer.limits.items():
-            if tunables_of(self.automaton, pair):
-                label = "the limits of a variance are made of fixed values"
-                self.problems.error("observer", pair[0].span, label)
-            low, high = (constant_value(f, self.automaton, self.values, "a limit") for f in pair)
-            limits[name] = (low, high)
+        limits = variance_limits(self.automaton, observer, self.values, self.problems)
         return bounded(self.states, limits)
 
     def _correct(self, observer: Observer, c: Matrix) -> Block:

@@ -42,6 +42,8 @@ def exit_code(run: Callable[[], object]) -> int:
         print("interrupted", file=sys.stderr)
         return INTERRUPTED
     except typer.Exit as error:
+        if error.exit_code == INTERRUPTED:
+            print("interrupted", file=sys.stderr)
         return _flushed(error.exit_code)
     except SpecError as error:
         report(error)

@@ -112,7 +112,9 @@ class _Pool:
             if self.is_over:
                 raise EOFError
             pipe = subprocess.PIPE
-            process = subprocess.Popen(self.command, stdin=pipe, stdout=pipe)
+            process = subprocess.Popen(
+                self.command, stdin=pipe, stdout=pipe, start_new_session=True
+            )
             self.running.append(process)
         assert process.stdin
         send(process.stdin, self.study)

@@ -51,8 +51,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error("no recordings: give --recordings DIR or MODEWRIGHT_RECORDINGS")
     found: list[Change] = []
     runs = {}
-    for drive in DRIVES:
-        path = Path(given.recordings).resolve() / "nissan_leaf" / f"{drive}.csv"
+    paths = {d: Path(given.recordings).resolve() / "nissan_leaf" / f"{d}.csv" for d in DRIVES}
+    for path in paths.values():
+        if not path.is_file():
+            parser.error(f"{path}: there is no such recording")
+    for drive, path in paths.items():
         runs[drive] = {n: mw.replay(n, path, "leaf_can", v, root=ROOT) for n, v in SCHEMES.items()}
         found += changes(drive, {n: one.result.trajectory for n, one in runs[drive].items()})
     differing = sum(

@@ -33,9 +33,8 @@ def publish(
     found: Sequence[Claim],
     rows: Sequence[Row],
     points: Mapping[str, Sequence[Point]],
-    figures: Mapping[str, Any],
 ) -> None:
-    """Write the page, and its figures as JSON."""
+    """Write the page."""
     here = Path(__file__).parent
     shown = Environment(undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     text = shown.from_string((here / "paper.md.jinja").read_text("utf-8")).render(
@@ -53,6 +52,16 @@ def publish(
     )
     FOLDER.mkdir(parents=True, exist_ok=True)
     PAGE.write_text(text, encoding="utf-8")
+
+
+def told(
+    seed: int,
+    table: Mapping[str, float],
+    rows: Sequence[Row],
+    points: Mapping[str, Sequence[Point]],
+    figures: Mapping[str, Any],
+) -> None:
+    """Write what was measured as JSON."""
     everything = {
         "seed": seed,
         "table_1_ms": dict(table),
