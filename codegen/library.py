@@ -14,6 +14,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from codegen.abreast import LANES
 from codegen.build import FLAGS, SECONDS, BuildError, compiler, compiler_version
 from codegen.cache import cache_folder, key_of, stored
 from codegen.run_places import column_places, row_width
@@ -102,13 +103,17 @@ class VariantsStruct(ctypes.Structure):
 
 
 class Library:
-    """The compiled runs of one assembly; `columns` are the places of its columns in a row."""
+    """The compiled runs of one assembly; `columns` are the places of its columns in a row.
+
+    `lanes` is how many variants may be carried out side by side: of so many there is room for rows.
+    """
 
     def __init__(self, assembly: Assembly, path: Path) -> None:
         """Load what was built."""
         self.assembly = assembly
         self.columns = tuple(column_places(assembly))
         self.width = row_width(assembly)
+        self.lanes = LANES
         self._run = ctypes.CDLL(str(path)).run_variants
         self._run.argtypes = [Address, Address, Whole, Whole]
         self._run.restype = None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
+from codegen.abreast import abreast
 from codegen.expression import literal
 from codegen.marks import LEFT, ranged_signals
 from codegen.names import CNames, c_member
@@ -38,6 +39,7 @@ def module_of(
         "ranges": _ranges(program, number) if is_flow else [],
         "invariants": _invariants(program, place, number),
         "has_record": "record" in program.blocks,
+        "abreast": _abreast(assembly, name, program, places) if is_flow else None,
         "age": place(AGE.name),
         "fired": [place(v) for v in program.fired_variables()],
         "log": [place(v.name) for v in program.variables if v.name in (LOG, LOGGED)],
@@ -55,6 +57,15 @@ def module_of(
         "left": [] if is_flow else _left(program, place),
         "finite": [place(wire.source) for wire in program.outputs if wire.type == "real"],
     }
+
+
+def _abreast(
+    assembly: Assembly, name: str, program: Program, places: Places
+) -> dict[str, Any] | None:
+    """Return how steps of several variants are taken side by side, where nothing else looks in."""
+    if varying(assembly, name, program, places) or _lagging(assembly, name):
+        return None
+    return abreast(program, _slots(assembly, name, program))
 
 
 def _slots(assembly: Assembly, name: str, program: Program) -> list[tuple[int, str]]:

@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from fractions import Fraction
 from typing import Any
 
+from codegen.abreast import LANES
 from codegen.expression import literal
 from codegen.marks import marked
 from codegen.mathematics import math_files
@@ -34,17 +35,20 @@ def run_files(assembly: Assembly) -> dict[str, str]:
     """Return the files of a system's runs by name."""
     programs = {name: _part(name, program) for name, program in assembly.programs.items()}
     places = Places(assembly, programs)
-    context = _driver(assembly, programs, places)
+    inside = {
+        name: module_of(assembly, name, program, places, flow)
+        for flow, (name, program) in enumerate(programs.items())
+    }
+    context = _driver(assembly, programs, places, inside)
     files = {
         "run.h": render("run.h.jinja", context),
         "run.c": render("run_driver.c.jinja", context),
     }
     numbers: dict[NumberType, None] = {"float64": None} if context["uses_math"] else {}
-    for flow, (name, program) in enumerate(programs.items()):
-        inside = module_of(assembly, name, program, places, flow)
-        files[f"{program.name}.h"] = render("module.h.jinja", inside)
-        files[f"{program.name}_run.c"] = render("run_module.c.jinja", inside)
-        if inside["uses_math"]:
+    for name, program in programs.items():
+        files[f"{program.name}.h"] = render("module.h.jinja", inside[name])
+        files[f"{program.name}_run.c"] = render("run_module.c.jinja", inside[name])
+        if inside[name]["uses_math"]:
             numbers[program.number] = None
     for number in numbers:
         files.update(math_files(number))
@@ -59,8 +63,19 @@ def _part(name: str, program: Program) -> Program:
     return finished(own, ("init", "derive", *PARTS), keep=(*BETWEEN, "work.s"))
 
 
-def _driver(assembly: Assembly, programs: Mapping[str, Program], places: Places) -> dict[str, Any]:
-    instances = [_instance(assembly, name, program, places) for name, program in programs.items()]
+def _driver(
+    assembly: Assembly,
+    programs: Mapping[str, Program],
+    places: Places,
+    inside: Mapping[str, Mapping[str, Any]],
+) -> dict[str, Any]:
+    instances = [
+        {
+            **_instance(assembly, name, program, places),
+            "is_abreast": bool(inside[name]["abreast"]),
+        }
+        for name, program in programs.items()
+    ]
     rows = dataclasses.replace(places, is_row=True)
     formulas = [c for c in assembly.columns if c.block]
     sensors = [_sensor(sensor, places) for sensor in assembly.sensors.values()]
@@ -74,6 +89,7 @@ def _driver(assembly: Assembly, programs: Mapping[str, Program], places: Places)
         "sensors": sensors,
         "seen": [seen for part in instances for flag in part["flags"] for seen, _ in flag["seen"]],
         "width": row_width(assembly),
+        "lanes": LANES if any(one["is_abreast"] for one in instances) else 0,
         "inputs": len(assembly.inputs),
         "has_lag": has_lag,
         "uses_math": has_lag or bool(called),

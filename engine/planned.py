@@ -49,6 +49,10 @@ class Library(Protocol):
     def width(self) -> int:
         """How many numbers a row has."""
 
+    @property
+    def lanes(self) -> int:
+        """How many variants may be carried out side by side."""
+
     def bound(self, plan: Any, variants: Mapping[str, Any]) -> Callable[[int, int], None]:
         """Return what carries variants out, from a first to one behind the last."""
 

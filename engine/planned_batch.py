@@ -234,8 +234,8 @@ class _Planned:
             "counts": counts,
             "is_left": is_left,
             "faults": faults,
-            "rows": np.empty((rows, self.library.width)),
-            "inputs_room": np.empty(self.plan.inputs.shape),
+            "rows": np.empty((self.library.lanes, rows, self.library.width)),
+            "inputs_room": np.empty((self.library.lanes, *self.plan.inputs.shape)),
         }
         self.library.bound(plan, members)(0, count)
         for place, measure in enumerate(batch.measures):
