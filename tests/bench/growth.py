@@ -1,0 +1,253 @@
+"""Growth: time and memory as a spec, a run or a study gets larger; docs/growth.md.
+
+Each point is measured in a process of its own. Times are those of the processor, but for studies by
+several workers, which are on the clock.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from tests.verify.store import ROOT, write
+
+PAGE, PICTURE, JSON = (
+    ROOT / "docs" / "growth.md",
+    ROOT / "docs" / "growth.png",
+    ROOT / "build" / "growth.json",
+)
+CURVES: Mapping[str, Sequence[int]] = {
+    "states": (4, 8, 16, 32, 64),
+    "modes": (3, 6, 12, 30, 60),
+    "seconds": (1, 10, 100, 1000),
+    "variants": (100, 1000, 10_000, 100_000, 1_000_000),
+    "workers": (1, 2, 4),
+}
+ABOUT = {
+    "states": "a chain of inertias, two states each, in three modes: read, checked and lowered; "
+    "compiled; a second of it at 1 ms",
+    "modes": "four states in a ring of modes: the same",
+    "seconds": "the driveline with its estimator at 1 kHz, in compiled C, rows each 10 ms",
+    "variants": "of the tip-out over five parameters, in one call on one core, at 5 ms",
+    "workers": "20 000 variants of the driveline with its estimator, a study in a new folder, on "
+    "the clock",
+}
+STUDY_VARIANTS = 20_000
+
+
+@dataclass(frozen=True)
+class Point:
+    """A size with times [s] by what takes them, and the largest memory [MB]."""
+
+    size: int
+    seconds: Mapping[str, float]
+    megabytes: float
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Measure all curves, or one point; write the page."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--point", nargs=2, metavar=("CURVE", "SIZE"), help=argparse.SUPPRESS)
+    parser.add_argument("--most", type=int, help="leave out larger sizes, write no page")
+    given = parser.parse_args(arguments)
+    if given.point:
+        curve, size = given.point
+        print(json.dumps(asdict(_here(curve, int(size)))))
+        return 0
+    found = {
+        curve: [_measured(curve, size) for size in sizes if size <= (given.most or size)]
+        for curve, sizes in CURVES.items()
+    }
+    if given.most is None:
+        write(JSON, {name: [asdict(one) for one in points] for name, points in found.items()})
+        PAGE.write_text(page(found), encoding="utf-8")
+        picture(found).savefig(PICTURE, dpi=110, metadata={"Software": None})
+    return 0
+
+
+def _measured(curve: str, size: int) -> Point:
+    command = [sys.executable, "-m", "tests.bench.growth", "--point", curve, str(size)]
+    done = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True)
+    found = json.loads(done.stdout.splitlines()[-1])
+    point = Point(found["size"], found["seconds"], found["megabytes"])
+    told = ", ".join(f"{name} {value:.3g} s" for name, value in point.seconds.items())
+    print(f"{curve} {size}: {told}, {point.megabytes:.0f} MB", flush=True)
+    return point
+
+
+def _here(curve: str, size: int) -> Point:
+    """Measure a point in this process."""
+    with tempfile.TemporaryDirectory() as name:
+        seconds = MEASURES[curve](size, Path(name))
+    used = (resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF,))
+    return Point(size, seconds, max(used) / 1024.0)
+
+
+def _spec(states: int, modes: int) -> str:
+    """Return a chain of inertias whose first spring differs by mode, and modes in a ring."""
+    count = states // 2
+    lines = ["language: 1", "automaton: growing", "step: 1 ms"]
+    lines += [
+        "parameters: {J: {value: 0.1 kg*m^2}, k: {value: 90 N*m/rad}, c: {value: 0.05 N*m*s/rad}}"
+    ]
+    lines += ["states:"]
+    for i in range(count):
+        lines += [f"  a_{i}: {{unit: rad, initial: {0.1 if i == 0 else 0} rad}}"]
+        lines += [f"  w_{i}: {{unit: rad/s, initial: 0 rad/s}}"]
+    lines += ["flow:"]
+    for i in range(count):
+        left = f"c * (w_{i} - w_{i - 1}) + k * (a_{i} - a_{i - 1})" if i else "T_0"
+        right = f"k * (a_{i} - a_{i + 1})" if i + 1 < count else f"k * a_{i}"
+        lines += [f"  a_{i}: der(a_{i}) = w_{i}", f"  w_{i}: J * der(w_{i}) = -({left}) - {right}"]
+    lines += ["initial: m_0", "modes:"]
+    for m in range(modes):
+        guard = "a_0 < 0 rad and w_0 < 0 rad/s" if m % 2 == 0 else "a_0 > 0 rad and w_0 > 0 rad/s"
+        lines += [f"  m_{m}:", f"    equations: {{T_0: k * {0.01 * m:.2f} * a_0 + c * w_0}}"]
+        lines += [f"    transitions: {{m_{(m + 1) % modes}: {{when: {guard}}}}}"]
+    return "\n".join([*lines, "outputs: [a_0, w_0, mode]", ""])
+
+
+def _grown(states: int, modes: int, folder: Path) -> dict[str, float]:
+    """Read, check and lower, compile and run a spec of a size; return each's processor time."""
+    from modewright.api import load
+    from modewright.compiled import run_in_c
+
+    os.environ["MODEWRIGHT_CACHE"] = str(folder / "cache")
+    (folder / "spec").mkdir()
+    (folder / "spec" / "growing.yaml").write_text(_spec(states, modes))
+    (folder / "spec" / "second.yaml").write_text(
+        "language: 1\nscenario: second\nof: growing\nhorizon: 1 s\nrecord: {every: 10 ms}\n"
+    )
+    begin = _used()
+    loaded = load("growing", "second", root=folder)
+    read = _used() - begin
+    run_in_c(loaded.system, loaded.scenario)
+    first = _used() - begin - read
+    begin = _used()
+    for _ in range(5):
+        run_in_c(loaded.system, loaded.scenario)
+    again = (_used() - begin) / 5
+    return {"read and checked": read, "compiled": first - again, "a second": again}
+
+
+def _lasting(seconds: int, folder: Path) -> dict[str, float]:
+    import dataclasses
+
+    from modewright.api import load
+    from modewright.compiled import run_in_c
+
+    loaded = load("ev_driveline_ideal", "tip_out", root=ROOT)
+    every = dataclasses.replace(loaded.scenario, every=Fraction(1, 100))
+    run_in_c(loaded.system, dataclasses.replace(every, horizon=Fraction(1, 10)))
+    begin = _used()
+    run_in_c(loaded.system, dataclasses.replace(every, horizon=Fraction(seconds)))
+    return {"run": _used() - begin}
+
+
+def _variants(count: int, folder: Path) -> dict[str, float]:
+    from tests.bench.manoeuvre import TIP_OUT
+    from tests.bench.variants import Sweep
+
+    Sweep(TIP_OUT, 8).ours(1)
+    sweep = Sweep(TIP_OUT, count)
+    begin = _used()
+    sweep.ours(1)
+    return {"carried out": _used() - begin}
+
+
+def _working(workers: int, folder: Path) -> dict[str, float]:
+    import modewright as mw
+    from tests.verify.cluster import STUDY
+
+    (folder / "study.yaml").write_text(STUDY.format(count=STUDY_VARIANTS))
+    mw.sweep(str(folder / "study.yaml"), folder / "warm", root=ROOT, samples=100, workers=1)
+    begin = time.perf_counter()
+    mw.sweep(str(folder / "study.yaml"), folder / "out", root=ROOT, workers=workers)
+    return {"study": time.perf_counter() - begin}
+
+
+MEASURES = {
+    "states": lambda size, folder: _grown(size, 3, folder),
+    "modes": lambda size, folder: _grown(4, size, folder),
+    "seconds": _lasting,
+    "variants": _variants,
+    "workers": _working,
+}
+
+
+def _used() -> float:
+    """Return the processor time of this process and of those that it started and that ended [s]."""
+    return sum(
+        used.ru_utime + used.ru_stime
+        for used in map(resource.getrusage, (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    )
+
+
+def exponent(points: Sequence[Point], what: str) -> float:
+    """Return the power of the size that a time grows with, between the last two points."""
+    (a, b) = points[-2:]
+    return float(np.log(b.seconds[what] / a.seconds[what]) / np.log(b.size / a.size))
+
+
+def page(found: Mapping[str, Sequence[Point]]) -> str:
+    """Return the page: a table for each curve."""
+    lines = [
+        "# Growth",
+        "",
+        "`python -m tests.bench.growth` measures this page: each point in a process of its own, "
+        "processor time but for workers.",
+        f"{os.cpu_count()} cores; what else runs on them changes the figures.",
+        "",
+        "![Time and memory over size](growth.png)",
+    ]
+    for name, points in found.items():
+        parts = list(points[0].seconds)
+        lines += ["", f"**{name}**: {ABOUT[name]}.", ""]
+        lines += [f"| {name} | " + " | ".join(f"{part} [s]" for part in parts) + " | memory [MB] |"]
+        lines += ["|---" * (len(parts) + 2) + "|"]
+        for one in points:
+            cells = [f"{one.size:,}", *(f"{one.seconds[part]:.3g}" for part in parts)]
+            lines += ["| " + " | ".join([*cells, f"{one.megabytes:.0f}"]) + " |"]
+        grows = [f"{part}: size^{exponent(points, part):.1f}" for part in parts]
+        lines += ["", f"Between the last two points: {', '.join(grows)}."]
+    return "\n".join(lines) + "\n"
+
+
+def picture(found: Mapping[str, Sequence[Point]]) -> Figure:
+    """Draw times and memory over size, both axes logarithmic: a slope of one is linear."""
+    figure = Figure(figsize=(3.4 * len(found), 5.4), layout="constrained")
+    axes = figure.subplots(2, len(found), sharex="col")
+    for column, (name, points) in enumerate(found.items()):
+        upper, lower = axes[0][column], axes[1][column]
+        sizes = [one.size for one in points]
+        for part in points[0].seconds:
+            upper.loglog(sizes, [one.seconds[part] for one in points], "o-", lw=1.0, label=part)
+        first: Any = max(points[0].seconds.values())
+        upper.loglog(sizes, [first * s / sizes[0] for s in sizes], ":", color="#999", lw=1.0)
+        lower.semilogx(sizes, [one.megabytes for one in points], "s-", color="#444a52", lw=1.0)
+        lower.set_ylim(bottom=0)
+        lower.set_xlabel(name)
+        upper.legend(fontsize=7)
+        for each in (upper, lower):
+            each.grid(alpha=0.25)
+    axes[0][0].set_ylabel("time [s]; dotted: linear")
+    axes[1][0].set_ylabel("memory [MB]")
+    return figure
+
+
+if __name__ == "__main__":
+    sys.exit(main())
