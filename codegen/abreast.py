@@ -14,6 +14,7 @@ from typing import Any, Literal
 from codegen.expression import LIBRARY, literal
 from codegen.names import CNames
 from codegen.statement import wrapped
+from language.assembly import ranged
 from language.operation import (
     Assign,
     Binary,
@@ -156,6 +157,8 @@ class _Made:
         if program.number != "float64" or program.invariants or len(program.mode_variables()) != 1:
             raise NotAbreast
         if "record" in program.blocks or program.blocks["load"]:
+            raise NotAbreast
+        if not all(one.name.startswith(("state.", "discrete.")) for one in ranged(program)):
             raise NotAbreast
         self.program, self.looks = program, looks
         variables = {one.name: one.type for one in program.variables}

@@ -183,18 +183,24 @@ class _Wanted:
     digest: str
     command: tuple[str, ...]
     folder: Path
+    side_by_side: bool
     assembly: Assembly = field(compare=False)
 
 
 def library_of(
-    assembly: Assembly, flags: Sequence[str] = FLAGS, named: str | None = None
+    assembly: Assembly,
+    flags: Sequence[str] = FLAGS,
+    named: str | None = None,
+    side_by_side: bool = True,
 ) -> Library:
     """Return the compiled runs of an assembly, kept from an earlier time if there was one.
 
-    Raises ToolMissing, BuildError.
+    A single run needs none `side_by_side`, and is compiled sooner without. Raises ToolMissing,
+    BuildError.
     """
     parts = (*compiler(named), *flags)
-    return _loaded(_Wanted(assembly.digest(), parts, cache_folder(), assembly), tuple(flags), named)
+    wanted = _Wanted(assembly.digest(), parts, cache_folder(), side_by_side, assembly)
+    return _loaded(wanted, tuple(flags), named)
 
 
 @lru_cache(maxsize=64)
@@ -202,7 +208,7 @@ def _loaded(wanted: _Wanted, flags: tuple[str, ...], named: str | None) -> Libra
     assembly = wanted.assembly
     with tempfile.TemporaryDirectory(prefix="modewright-") as name:
         folder = Path(name)
-        for file, text in run_files(assembly).items():
+        for file, text in run_files(assembly, wanted.side_by_side).items():
             (folder / file).write_text(text)
         sources = sorted(folder.glob("*.c"))
         command = [*compiler(named), *flags, *SHARED]

@@ -39,7 +39,6 @@ def module_of(
         "ranges": _ranges(program, number) if is_flow else [],
         "invariants": _invariants(program, place, number),
         "has_record": "record" in program.blocks,
-        "abreast": _abreast(assembly, name, program, places) if is_flow else None,
         "age": place(AGE.name),
         "fired": [place(v) for v in program.fired_variables()],
         "log": [place(v.name) for v in program.variables if v.name in (LOG, LOGGED)],
@@ -59,11 +58,15 @@ def module_of(
     }
 
 
-def _abreast(
+def abreast_of(
     assembly: Assembly, name: str, program: Program, places: Places
 ) -> dict[str, Any] | None:
     """Return how steps of several variants are taken side by side, where nothing else looks in."""
-    if varying(assembly, name, program, places) or _lagging(assembly, name):
+    if (
+        program.period is not None
+        or varying(assembly, name, program, places)
+        or _lagging(assembly, name)
+    ):
         return None
     return abreast(program, _slots(assembly, name, program))
 

@@ -19,7 +19,7 @@ from codegen.mathematics import math_files
 from codegen.member import page_of
 from codegen.names import REAL, c_member, c_type
 from codegen.rendering import render, version
-from codegen.run_module import module_of, varying
+from codegen.run_module import abreast_of, module_of, varying
 from codegen.run_places import INSTANCE, Clock, Places, formula_of, row_width
 from language.assembly import Assembly, Course, Feed, ranged, short_input
 from language.continuous import PARTS
@@ -31,12 +31,15 @@ from language.traversal import block_names
 from language.wiring import finished
 
 
-def run_files(assembly: Assembly) -> dict[str, str]:
-    """Return the files of a system's runs by name."""
+def run_files(assembly: Assembly, side_by_side: bool = True) -> dict[str, str]:
+    """Return the files of a system's runs by name; `side_by_side` ones are for many variants."""
     programs = {name: _part(name, program) for name, program in assembly.programs.items()}
     places = Places(assembly, programs)
     inside = {
-        name: module_of(assembly, name, program, places, flow)
+        name: {
+            **module_of(assembly, name, program, places, flow),
+            "abreast": abreast_of(assembly, name, program, places) if side_by_side else None,
+        }
         for flow, (name, program) in enumerate(programs.items())
     }
     context = _driver(assembly, programs, places, inside)

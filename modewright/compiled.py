@@ -6,7 +6,7 @@ Both have the same bits. What did the work is told, with the reason where it is 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cache
+from functools import cache, partial
 
 from codegen.build import BuildError
 from codegen.library import library_of
@@ -71,7 +71,8 @@ def _in_c(
     if why:
         found = simulate(system, scenario, CompiledStepper, programs=programs)
         return found, f"compiled, block by block: {why}"
-    run = PlannedRun(system, scenario, programs, library_of).trajectory()
+    build = partial(library_of, side_by_side=False)
+    run = PlannedRun(system, scenario, programs, build).trajectory()
     return run, "compiled" if run else "it has to tell what happened"
 
 
