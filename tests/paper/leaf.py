@@ -34,12 +34,19 @@ TRUTH, PAPER, BETTER = "#444a52", "#20639b", "#c0392b"
 @dataclass(frozen=True)
 class Change:
     """Where the motor's torque changes its sign for good [s], and when each scheme loses contact
-    and has it again on a side there [s]; NaN: not at all."""
+    and has it again on a side there [s], NaN: not at all; `bounces` are when it loses it once more.
+    """
 
     drive: str
     time: float
     lost: dict[str, float]
     again: dict[str, float]
+    bounces: dict[str, list[float]]
+
+
+def apart(times: Sequence[dict[str, float]]) -> float:
+    """Return how far the schemes are apart at most in what they do at some instants [s]."""
+    return max(max(one.values()) - min(one.values()) for one in times)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -65,7 +72,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     picture(found, trajectories).savefig(FOLDER / "leaf.png", dpi=110, metadata={"Software": None})
     shown = Environment(undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     template = Path(__file__).with_name("leaf.md.jinja").read_text("utf-8")
-    text = shown.from_string(template).render(changes=found, differing=differing)
+    text = shown.from_string(template).render(
+        changes=found,
+        differing=differing,
+        lost_ms=1e3 * apart([one.lost for one in found]),
+        again_ms=1e3 * apart([one.again for one in found]),
+    )
     (FOLDER / "leaf.md").write_text(text, encoding="utf-8")
     print(text)
     return 0 if all(np.isfinite(t) for one in found for t in one.lost.values()) else 1
@@ -78,13 +90,17 @@ def changes(drive: str, runs: dict[str, mw.Trajectory]) -> list[Change]:
     found = []
     for time in signs(one.times, torque):
         begin, end = time - AROUND[0], time + AROUND[1]
-        lost, again = {}, {}
+        lost: dict[str, float] = {}
+        again: dict[str, float] = {}
+        bounces: dict[str, list[float]] = {}
         for name, run in runs.items():
             here = [event for event in run.events if begin <= event.time <= end]
             lost[name] = next((e.time for e in here if e.target == "gap"), float("nan"))
             back = [e.time for e in here if e.target != "gap" and e.time > lost[name]]
             again[name] = back[0] if back else float("nan")
-        found.append(Change(drive, time, lost, again))
+            later = [e.time for e in here if e.target == "gap" and e.time > again[name]]
+            bounces[name] = later
+        found.append(Change(drive, time, lost, again, bounces))
     return found
 
 
