@@ -7,13 +7,14 @@ import random
 import sys
 from collections import Counter
 from collections.abc import Sequence
+from functools import partial
 
 from tests.proof.answer import Answer
 from tests.proof.bar import Bar, bars
 from tests.proof.cases import GENERATOR
 from tests.proof.catalogue import pairs_of
 from tests.proof.control import most_frequent, permuted, simpler, simpler_alarms
-from tests.proof.kept import answers, carry
+from tests.proof.kept import answers, carry, dask, threads
 from tests.proof.page import published
 from tests.proof.plan import SEED, Plan, plans
 from tests.proof.seals import is_sealed, sealed, seals_of
@@ -42,7 +43,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     every: list[Answer] = []
     for plan in study:
         if plan.name in wanted:
-            source = given.seed, given.jobs, given.first, given.generator
+            workers = (
+                partial(dask, given.cluster) if given.cluster else partial(threads, given.jobs)
+            )
+            source = given.seed, workers, given.first, given.generator
             every += answers(plan, *source, carried=VERDICTS)
     found = bars(every)
     for bar in found:
@@ -108,6 +112,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--seed", type=int, default=SEED)
     parser.add_argument("--jobs", type=int, default=2, help="diagnoses at a time (2)")
+    parser.add_argument("--cluster", help="diagnose on Dask's workers: local:4, tls://head:8786")
     parser.add_argument("--plans", help="some of full,clean,weak,pairs,removed")
     parser.add_argument("--first", type=int, help="so many cases of each plan only")
     parser.add_argument("--share", type=float, default=1.0, help="of the cases of each plan (1)")

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor, as_completed
+from contextlib import AbstractContextManager, contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any
 
+from modewright import cluster_worker
+from sweep.address import Credentials, address_of
 from sweep.block import DONE, STOPPED, Block, Row
+from sweep.clustering import Staff, connected
 from sweep.manifest import Manifest
 from sweep.measure import Column
 from sweep.preparation import digest_of
@@ -22,6 +26,8 @@ from tests.proof.plan import Plan
 from tests.proof.result import Result, diagnosed
 from tests.verify.store import CODE, ROOT, code_digest
 
+Workers = Callable[[], AbstractContextManager[Executor]]
+"""What diagnoses cases, while it is open."""
 VARIED = (Column("strength", "real", ""), Column("rate", "real", "Hz"))
 MEASURES = (
     Column("verdict", "text", ""),
@@ -32,8 +38,28 @@ MEASURES = (
 )
 
 
+@contextmanager
+def threads(jobs: int) -> Iterator[Executor]:
+    """Yield what diagnoses so many cases at a time on this machine, each in its process."""
+    with ThreadPoolExecutor(jobs) as pool:
+        yield pool
+
+
+@contextmanager
+def dask(cluster: str) -> Iterator[Executor]:
+    """Yield the workers of a Dask cluster, which see this folder: `local:4`, `tls://head:8786`."""
+    staff = Staff(cluster_worker.own_fingerprint, cluster_worker.__name__)
+    with connected(address_of(cluster), Credentials(), staff) as client:
+        yield client.get_executor(pure=False)
+
+
 def answers(
-    plan: Plan, seed: int, jobs: int, most: int | None, generator: str, carried: Path | None = None
+    plan: Plan,
+    seed: int,
+    workers: Workers,
+    most: int | None,
+    generator: str,
+    carried: Path | None = None,
 ) -> list[Answer]:
     """Return what a diagnosis says of each case of a plan; what is missing is diagnosed now.
 
@@ -45,7 +71,7 @@ def answers(
         store = _store(plan, seed, cases)
         if carried and (count := restored(store, plan.name, carried)):
             print(f"{plan.name}: {count} results of {carried.name}", flush=True)
-        _fill(store, plan, cases, list(known.items()), seed, jobs)
+        _fill(store, plan, cases, list(known.items()), seed, workers)
         rows = {row["scenario"]: row for row in rows_of(store)}
     return [_answer(rows[name], plan, label) for name, label in known.items()]
 
@@ -95,12 +121,19 @@ def _manifest(plan: Plan, seed: int, cases: Cases) -> Manifest:
 
 
 def _fill(
-    store: Store, plan: Plan, cases: Cases, known: list[tuple[str, Label]], seed: int, jobs: int
+    store: Store,
+    plan: Plan,
+    cases: Cases,
+    known: list[tuple[str, Label]],
+    seed: int,
+    workers: Workers,
 ) -> None:
     """Diagnose the cases that the store does not have, some at a time, and keep each."""
     finished = store.finished()
     missing = [number for number in range(len(known)) if number not in finished]
-    with ThreadPoolExecutor(jobs) as pool:
+    if not missing:
+        return
+    with workers() as pool:
         work = {pool.submit(partial(_row, plan, cases, *known[n], n, seed)): n for n in missing}
         try:
             for done, future in enumerate(as_completed(work), 1):
