@@ -212,7 +212,7 @@ def page(found: Mapping[str, Sequence[Point]]) -> str:
     lines = [
         "# Growth",
         "",
-        "`python -m tests.bench.growth` measures this page: each point in a process of its own, "
+        '`make bench ARGS="--growth"` measures this page: each point in a process of its own, '
         "processor time but for workers.",
         f"{os.cpu_count()} cores; what else runs on them changes the figures.",
         "",

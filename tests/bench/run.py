@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from codegen.build import FLAGS, compiler_version
-from tests.bench import figures
+from tests.bench import figures, growth
 from tests.bench.charts import charts
 from tests.bench.first_step import first_step
 from tests.bench.rivals import RIVALS, RivalMissing, measured
@@ -34,8 +34,13 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--pairs", type=int, default=PAIRS, help="of each ratio")
     parser.add_argument("--peers", default="", help=f"some of {', '.join(RIVALS)}")
     parser.add_argument("--page", action="store_true", help=f"write the table into {PAGE.name}")
+    parser.add_argument(
+        "--growth", action="store_true", help="time and memory over size instead: docs/growth.md"
+    )
     parser.add_argument("--out", type=Path, default=RESULT)
     given = parser.parse_args(arguments)
+    if given.growth:
+        return growth.main([])
     peers = [name for name in given.peers.split(",") if name]
     for name in peers:
         if name not in RIVALS:
