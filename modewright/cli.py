@@ -53,7 +53,7 @@ from modewright.spread import spread
 
 COMPLETION = "_MODEWRIGHT_COMPLETE"
 """Set by a shell that asks for completions; its words are elsewhere."""
-YOUNG_OBJECTS = 100_000
+YOUNG_OBJECTS = 1_000_000
 """New objects after which garbage is looked for: trees of expressions have no circles."""
 COMMANDS = (
     new, check, test, trace, diagnose, fit, effects, simulate, sweep, sensitivity,
