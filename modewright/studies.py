@@ -15,6 +15,7 @@ from language.missing import ToolMissing
 from language.project import Project, read_document
 from modewright.compiled import run_block
 from modewright.files import OutputError
+from sweep import fork_server
 from sweep.address import Address, Credentials, address_of
 from sweep.executor import Executor, InProcess
 from sweep.preparation import prepared, resampled
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
 
 WORKER = (sys.executable, "-P", "-m", "modewright.worker")
 """What starts a process that computes blocks."""
+TEMPLATE = "modewright.cluster_template"
+"""What the workers of a cluster of this machine are copies of."""
 
 
 def sweep(
@@ -56,6 +59,8 @@ def sweep(
     ToolMissing, ValueError.
     """
     place = address_of(cluster) if cluster else None
+    if place and place.count:
+        fork_server.start(TEMPLATE)
     project = Project(root or Path())
     document = read_document(project.path_of(study))
     scalars: dict[str, Scalar] = {

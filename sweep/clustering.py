@@ -15,6 +15,7 @@ from distributed import Client, LocalCluster, Security
 from sweep.address import Address, Credentials
 from sweep.cluster_error import ClusterError
 from sweep.fingerprint import differences, fingerprint
+from sweep.fork_server import method
 from sweep.processes import MOST_DEATHS
 
 SECONDS = 30.0
@@ -25,8 +26,15 @@ NO_CREDENTIALS = (
     "TLS takes an authority, a certificate and its key: --tls-ca, --tls-cert and --tls-key, or "
     "distributed.comm.tls in the configuration of Dask"
 )
-LARGE_GRAPH = "distributed.admin.large-graph-warning-threshold"
 DEATHS = "distributed.scheduler.allowed-failures"
+SETTINGS = {
+    "distributed.admin.large-graph-warning-threshold": "1 GB",
+    "distributed.admin.tick.interval": "1s",
+    "distributed.admin.system-monitor.interval": "5s",
+    "distributed.worker.profile.enabled": False,  # it looks into workers a hundred times a second
+    "distributed.worker.multiprocessing-method": method(),
+}
+"""What Dask does beside computing, seldom."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +61,7 @@ def connected(
     `deaths` workers started here may die of a block before it is told.
     Raises ClusterError where nobody answers, no worker is there, or one has other code.
     """
-    with ExitStack() as stack, dask.config.set({DEATHS: deaths - 1, LARGE_GRAPH: "1 GB"}):
+    with ExitStack() as stack, dask.config.set({**SETTINGS, DEATHS: deaths - 1}):
         where: Any = address.url
         if address.count:
             where = stack.enter_context(_local(address.count, staff.preload))

@@ -18,12 +18,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import EngFormatter, NullLocator
 
 from language.signal import Piece, Stimulus
+from tests.verify.processor import peak_megabytes
 from tests.verify.store import ROOT, write
 
 PAGE, PICTURE, JSON = (
@@ -47,7 +48,22 @@ ABOUT = {
     "workers": "20 000 variants of the driveline with its estimator, a study in a new folder, on "
     "the clock",
 }
+WHY = {
+    "states": "The longest step that is stable is told from eigenvalues of each mode, found in our "
+    "own arithmetic so that their bits are the same everywhere: the cube of the states, half of "
+    "`run again` at 64. What is compiled is a line of C for each operation, and grows with them.",
+    "modes": "Each mode has its equations and its step; nothing is done for pairs of modes. "
+    "Below ten modes reading the language and starting the compiler are most of it.",
+    "seconds": "A tenth of a second is lowering and printing, whatever is run. Memory is the plan: "
+    "instants, what happens at each, and rows.",
+    "variants": "Linear from the first hundred. Memory is what is kept of each variant in one "
+    "call; studies run block by block instead and stay where they are (docs/studies.md).",
+    "workers": "Each worker starts Python, loads the study and finds the compiled library, a "
+    "second and more of a processor, before its first block; more workers than cores add to that.",
+}
+"""Why growth is what it is: found with a profiler, and to be looked at again with new figures."""
 STUDY_VARIANTS = 20_000
+SHORT = EngFormatter(sep="")
 GENTLE = Fraction(5)
 """A torque [N*m] with which no speed leaves its range, however long it acts."""
 
@@ -96,8 +112,7 @@ def _here(curve: str, size: int) -> Point:
     """Measure a point in this process."""
     with tempfile.TemporaryDirectory() as name:
         seconds = MEASURES[curve](size, Path(name))
-    used = (resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF,))
-    return Point(size, seconds, max(used) / 1024.0)
+    return Point(size, seconds, peak_megabytes())
 
 
 def _spec(states: int, modes: int) -> str:
@@ -227,24 +242,28 @@ def page(found: Mapping[str, Sequence[Point]]) -> str:
             cells = [f"{one.size:,}", *(f"{one.seconds[part]:.3g}" for part in parts)]
             lines += ["| " + " | ".join([*cells, f"{one.megabytes:.0f}"]) + " |"]
         grows = [f"{part}: size^{exponent(points, part):.1f}" for part in parts]
-        lines += ["", f"Between the last two points: {', '.join(grows)}."]
+        lines += ["", f"Between the last two points: {', '.join(grows)}. {WHY[name]}"]
     return "\n".join(lines) + "\n"
 
 
 def picture(found: Mapping[str, Sequence[Point]]) -> Figure:
     """Draw times and memory over size, both axes logarithmic: a slope of one is linear."""
-    figure = Figure(figsize=(3.4 * len(found), 5.4), layout="constrained")
+    figure = Figure(figsize=(2.9 * len(found), 5.0), layout="constrained")
     axes = figure.subplots(2, len(found), sharex="col")
     for column, (name, points) in enumerate(found.items()):
         upper, lower = axes[0][column], axes[1][column]
-        sizes = [one.size for one in points]
+        sizes = np.array([one.size for one in points], dtype=float)
         for part in points[0].seconds:
-            upper.loglog(sizes, [one.seconds[part] for one in points], "o-", lw=1.0, label=part)
-        first: Any = max(points[0].seconds.values())
-        upper.loglog(sizes, [first * s / sizes[0] for s in sizes], ":", color="#999", lw=1.0)
-        lower.semilogx(sizes, [one.megabytes for one in points], "s-", color="#444a52", lw=1.0)
-        lower.set_ylim(bottom=0)
-        lower.set_xlabel(name)
+            upper.loglog(sizes, [one.seconds[part] for one in points], "o-", ms=4, lw=1, label=part)
+        first = max(points[0].seconds.values())
+        power = -1 if name == "workers" else 1
+        upper.loglog(sizes, first * (sizes / sizes[0]) ** power, ":", color="#999", lw=1.0)
+        memory = [one.megabytes for one in points]
+        lower.semilogx(sizes, memory, "s-", ms=4, color="#444a52", lw=1.0)
+        lower.set_ylim(0, 1.1 * max(memory))
+        lower.set_xlabel("simulated seconds" if name == "seconds" else name)
+        lower.set_xticks(sizes, [SHORT.format_data(size) for size in sizes])
+        lower.xaxis.set_minor_locator(NullLocator())
         upper.legend(fontsize=7)
         for each in (upper, lower):
             each.grid(alpha=0.25)

@@ -26,13 +26,14 @@ SECONDS = (0.05, 1.0)
 MOST_MEGABYTES = 500.0
 MILLION = 1_000_000
 CLIENT = """
-import resource, sys, time
+import sys, time
 from pathlib import Path
 import modewright
 from sweep.processes import Processes
 from sweep.study_run import run_study
 from sweep.summary import summary_of
 from tests.sweep.laying import study
+from tests.verify.processor import peak_megabytes
 
 axes = "{linspace: [1 rad/s, 3 rad/s, 1000]}", "{linspace: [0 1/s, 1 1/s, 1000]}"
 changes = (("[1 rad/s, 3 rad/s]", axes[0]), ("[0.05 1/s, 0.3 1/s]", axes[1]))
@@ -44,7 +45,7 @@ found = run_study(made, Path(sys.argv[1]), Processes(2, [sys.executable, "-c", w
 seconds = time.monotonic() - start
 lines = summary_of(found.store).lines
 assert lines[0].count == made.count == 1_000_000
-print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0, seconds)
+print(peak_megabytes(), seconds)
 """
 """A study whose variants cost nothing, through real workers: what the client itself takes."""
 

@@ -1,0 +1,52 @@
+"""Workers of this machine are copies of one process, which takes nothing from the user's folder."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+ASKED = """
+import os
+import modewright
+from modewright.studies import TEMPLATE
+from sweep import fork_server
+
+def main():
+    environment = dict(os.environ)
+    fork_server.start(TEMPLATE)
+    assert environment == dict(os.environ), "its environment is not ours"
+    from sweep.address import Address, Credentials
+    from sweep.clustering import Staff, connected
+    staff = Staff(modewright.cluster_worker.own_fingerprint)
+    with connected(Address(count=2), Credentials(), staff) as client:
+        told = client.run(lambda: (os.getppid(), "engine.planned_batch" in sys.modules))
+    parents, loaded = zip(*told.values())
+    print(len(told), len(set(parents)), all(loaded))
+
+if __name__ == "__main__":
+    import sys
+    import modewright.cluster_worker
+    main()
+"""
+
+
+def test_workers_are_copies_of_one_process_that_has_loaded_our_code(tmp_path: Path) -> None:
+    script, folder = tmp_path / "script" / "asked.py", tmp_path / "user"
+    script.parent.mkdir()
+    script.write_text(ASKED)
+    for hidden in ("distributed", "engine", "numpy", "modewright"):
+        (folder / hidden).mkdir(parents=True)
+        (folder / hidden / "__init__.py").write_text("raise SystemExit('the file of a user')\n")
+    environment = {k: v for k, v in os.environ.items() if k != "PYTHONSAFEPATH"}
+    done = subprocess.run(
+        [sys.executable, str(script)],
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert done.stdout == "2 1 True\n", done.stderr
