@@ -32,7 +32,10 @@ def seconds_of(run: Callable[[], object], bar: float = 0.0, attempts: int = ATTE
 
 
 def with_descendants(run: Callable[[], T]) -> tuple[T, float]:
-    """Return what a run gives and the processor time [s] of all processes that it led to."""
+    """Return what a run gives and the processor time [s] of all processes that it led to.
+
+    Raises TimeoutError where some do not end: they would not be counted.
+    """
     ctypes.CDLL(None).prctl(ADOPT, 1, 0, 0, 0)
     before = _so_far()
     found = run()
@@ -42,8 +45,8 @@ def with_descendants(run: Callable[[], T]) -> tuple[T, float]:
             if not os.waitpid(-1, os.WNOHANG)[0]:
                 time.sleep(0.05)
         except ChildProcessError:  # all have ended and are counted
-            break
-    return found, _so_far() - before
+            return found, _so_far() - before
+    raise TimeoutError(f"processes go on {PATIENCE:g} s after the one that started them")
 
 
 def peak_megabytes() -> float:
