@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from language.problem import Problems, Source, Span, SpecError
 from sweep.block import Block
@@ -18,6 +20,8 @@ MOST_BLOCKS = 100
 FEWEST_BLOCKS = 8
 MOST_IN_BLOCK = 5000
 LEAST_IN_BATCH = 200
+TYPES = {"real": "float64", "whole": "int64", "text": "string", "truth": "bool_", "list": "list_"}
+"""What a column may hold, and the type that pyarrow has for it; a list is one of reals."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +52,11 @@ class Manifest:
         """All blocks in their order."""
         starts = range(0, self.count, self.block)
         return [Block(start, min(start + self.block, self.count)) for start in starts]
+
+    def has(self, block: Block) -> bool:
+        """Tell whether this is one of the blocks."""
+        is_inside = 0 <= block.start < self.count and block.start % self.block == 0
+        return is_inside and block.stop == min(block.start + self.block, self.count)
 
 
 def manifest_of(study: Study, block: int | None = None) -> Manifest:
@@ -88,7 +97,7 @@ def block_size(study: Study) -> int:
 def manifest_json(manifest: Manifest) -> bytes:
     """Return a manifest as the bytes of its file."""
     shown = manifest.presentation
-    data = {
+    data: dict[str, Any] = {
         "modewright": FORMAT,
         "study": manifest.study,
         "digest": manifest.digest,
@@ -104,40 +113,23 @@ def manifest_json(manifest: Manifest) -> bytes:
     }  # fmt: skip
     if manifest.design:
         data["design"] = {"method": manifest.design.method, "names": list(manifest.design.names)}
+    data["seal"] = seal_of(data)
     return (json.dumps(data, indent=1) + "\n").encode()
 
 
-def read_manifest(folder: Path) -> Manifest:
-    """Return what the store in a folder is of. Raises SpecError."""
-    path = folder / MANIFEST
-    try:
-        data = json.loads(path.read_text("utf-8"))
-        if data["modewright"] != FORMAT:
-            label = "these results are in a form that is not known here"
-            raise refused(folder, "store", label, "run the study into another folder")
-        shown, drawn = data["presentation"], data.get("design")
-        return Manifest(
-            study=data["study"],
-            digest=data["digest"],
-            identity=data["identity"],
-            count=data["count"],
-            block=data["block"],
-            varied=tuple(Column(**column) for column in data["varied"]),
-            words=data["words"],
-            measures=tuple(Column(**column) for column in data["measures"]),
-            presentation=Presentation(tuple(shown["by"]), shown["confidence"], shown["plots"]),
-            design=Design(drawn["method"], tuple(drawn["names"])) if drawn else None,
-        )
-    except FileNotFoundError:
-        label = "there are no results of a study here"
-        raise refused(folder, "store", label, "modewright sweep STUDY --out DIR") from None
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        label = f"`{MANIFEST}` cannot be read: {error}"
-        raise refused(folder, "store", label) from None
+def seal_of(data: Mapping[str, Any]) -> str:
+    """Return the SHA-256 of all that a manifest says, but its own seal: a change is seen."""
+    plain = {key: value for key, value in data.items() if key != "seal"}
+    return hashlib.sha256(json.dumps(plain, sort_keys=True).encode()).hexdigest()
 
 
 def refused(folder: Path, kind: str, label: str, help: str = "") -> SpecError:
     """Return a problem of a folder, to be raised."""
     problems = Problems()
-    problems.error(kind, Span(Source(str(folder)), 1, 1), label, help)
+    problems.error(kind, start_of(folder), label, help)
     return SpecError(problems.found)
+
+
+def start_of(path: Path) -> Span:
+    """Return the place of a folder or file as a whole."""
+    return Span(Source(str(path)), 1, 1)
