@@ -12,6 +12,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from sweep.moments import deviation_of, mean_of
+
 Interval = tuple[float, float] | None
 
 
@@ -30,16 +32,19 @@ def wilson(hits: int, count: int, confidence: float) -> Interval:
 
 
 def of_mean(values: NDArray[np.float64], confidence: float) -> Interval:
-    """Return the interval of a mean [unit of the values] (n,); None for fewer than two values."""
+    """Return the interval of a mean [unit of the values] (n,); None for fewer than two values.
+
+    None too where an end is more than a number can hold.
+    """
     count = len(values)
     if count < 2:
         return None
     from scipy.special import stdtrit
 
-    mean = math.fsum(values) / count
-    deviation = math.sqrt(math.fsum((values - mean) ** 2) / (count - 1))
+    mean, deviation = mean_of(values), deviation_of(values)
     half = float(stdtrit(count - 1, 0.5 + confidence / 2.0)) * deviation / math.sqrt(count)
-    return mean - half, mean + half
+    low, high = mean - half, mean + half
+    return (low, high) if math.isfinite(low) and math.isfinite(high) else None
 
 
 def of_quantile(ordered: Sequence[float], share: float, confidence: float) -> Interval:

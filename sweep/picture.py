@@ -25,6 +25,8 @@ BINS = 12
 """Bins along each axis of a heat map of drawn values, and of histograms at most."""
 MOST_ANNOTATED = 144
 """Cells of a heat map up to which each has its number written in it."""
+LARGEST = 1.0e300
+"""Magnitudes above it are not drawn: axes have room beside the numbers, up to 1e308 in all."""
 
 
 def pictures(store: Store) -> dict[str, Picture]:
@@ -37,7 +39,7 @@ def pictures(store: Store) -> dict[str, Picture]:
     for name, plot in store.manifest.presentation.plots.items():
         count = int(np.sum(table.is_done))
         figure = draw[plot["kind"]](table, plot) if count else _empty()
-        title = f"{store.manifest.study}: {name} ({count} variants)"
+        title = f"{store.manifest.study}: {name} ({count} variants{_left_out(table, plot)})"
         figure.suptitle(visible(title), x=0.01, ha="left", fontsize=11, parse_math=False)
         found[name] = Picture(figure)
     return found
@@ -62,7 +64,18 @@ def _label(table: Table, name: str) -> str:
 
 
 def _done(table: Table, name: str) -> Reals:
-    return table.reals(name)[table.is_done]
+    return _drawable(table.reals(name)[table.is_done])
+
+
+def _drawable(values: Reals) -> Reals:
+    return np.where(np.abs(values) <= LARGEST, values, np.nan)
+
+
+def _left_out(table: Table, plot: Mapping[str, Any]) -> str:
+    """Return how many numbers of the measures of a picture are too large for it, if any."""
+    drawn = [table.pooled(name) for name in plot["of"]]
+    count = sum(int(np.sum(np.abs(p.values[table.is_done[p.rows]]) > LARGEST)) for p in drawn)
+    return f", without {count} numbers above {LARGEST:g}" if count else ""
 
 
 # Heat map.
@@ -105,12 +118,16 @@ def _annotate(axis: Axes, cells: Reals) -> None:
 
 
 def _binned(values: Reals) -> tuple[NDArray[np.int64], Reals]:
-    """Return the bin of each value, and the middles of the bins: the values where they are few."""
+    """Return the bin of each value, and the middles of the bins: the values where they are few.
+
+    Of many values those that are not there are in no bin: -1.
+    """
     unique, places = np.unique(values, return_inverse=True)
     if len(unique) <= 2 * BINS:
         return places.reshape(-1).astype(np.int64), unique
-    ends = np.linspace(unique[0], unique[-1], BINS + 1)
+    ends = np.linspace(np.nanmin(unique), np.nanmax(unique), BINS + 1)
     places = np.clip(np.searchsorted(ends, values, side="right") - 1, 0, BINS - 1)
+    places[np.isnan(values)] = -1
     return places.astype(np.int64), (ends[:-1] + ends[1:]) / 2.0
 
 
@@ -239,7 +256,7 @@ def _histogram(table: Table, plot: Mapping[str, Any]) -> Figure:
     if by:
         places, names = group_values(table, by[0])
         groups = [(f"{by[0]}: {name}", places == k) for k, name in enumerate(names)]
-    kept = table.is_done[pooled.rows]
+    kept = table.is_done[pooled.rows] & (np.abs(pooled.values) <= LARGEST)
     ends = np.histogram_bin_edges(pooled.values[kept], bins="auto") if kept.any() else [0.0, 1.0]
     if len(ends) > 60:
         ends = np.linspace(ends[0], ends[-1], 61)

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from sweep.interval import Interval, of_mean, of_quantile, wilson
 from sweep.measure import Column
+from sweep.moments import deviation_of, mean_of, quantiles_of, total_of
 from sweep.store import Store
 from sweep.table import Reals, Table
 
@@ -155,24 +156,22 @@ def _line(group: Mapping[str, str], column: Column, values: Reals, confidence: f
     count = len(values)
     ordered = np.sort(values)
     nothing = math.nan
-    mean = math.fsum(values) / count if count else nothing
-    spread = math.fsum((values - mean) ** 2) / (count - 1) if count > 1 else nothing
-    p5, median, p95 = np.quantile(ordered, (0.05, 0.5, 0.95)) if count else (nothing,) * 3
+    p5, median, p95 = quantiles_of(ordered, (0.05, 0.5, 0.95)) if count else (nothing,) * 3
     return Line(
         group=group,
         measure=column.name,
         unit=column.unit,
         count=count,
-        mean=mean,
+        mean=mean_of(values) if count else nothing,
         mean_interval=of_mean(values, confidence),
-        deviation=math.sqrt(spread) if count > 1 else nothing,
-        median=float(median),
+        deviation=deviation_of(values) if count > 1 else nothing,
+        median=median,
         median_interval=of_quantile(ordered, 0.5, confidence),  # type: ignore[arg-type]
-        p5=float(p5),
-        p95=float(p95),
+        p5=p5,
+        p95=p95,
         low=float(ordered[0]) if count else nothing,
         high=float(ordered[-1]) if count else nothing,
-        total=math.fsum(values) if count else nothing,
+        total=total_of(values) if count else nothing,
     )
 
 

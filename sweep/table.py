@@ -36,7 +36,8 @@ class Table:
             np.asarray(part.cast("float64").to_numpy(zero_copy_only=False), dtype=np.float64)
             for part in self._parts(name)
         ]
-        return np.concatenate(parts) if parts else np.zeros(0)
+        found = np.concatenate(parts) if parts else np.zeros(0)
+        return np.where(np.isfinite(found), found, np.nan)
 
     def pooled(self, name: str) -> Pooled:
         """Return the numbers of a column of reals, whole numbers or lists; none are left out."""
