@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from language.text import visible
 from modewright.show import finite
 from modewright.show_study import interval_text, short
 from sweep.sensitivity import Index, Sensitivity
@@ -19,7 +20,7 @@ WHOLE = {"saltelli": "blocks", "morris": "paths"}
 def print_sensitivity(console: Console, found: Sensitivity) -> None:
     """Print the indices by group and measure, the largest first."""
     text = f"{found.study}: {found.method}, {len(found.indices)} indices"
-    console.print(text, highlight=False, markup=False)
+    console.print(visible(text), highlight=False, markup=False)
     if not found.indices:
         return
     first = found.indices[0]
@@ -30,7 +31,8 @@ def print_sensitivity(console: Console, found: Sensitivity) -> None:
         header_style="bold",
     )  # fmt: skip
     for one in ordered_indices(found):
-        table.add_row(*map(escape, one.group.values()), one.measure, escape(one.name), *_cells(one))
+        groups = (escape(visible(name)) for name in one.group.values())
+        table.add_row(*groups, one.measure, escape(one.name), *_cells(one))
     console.print(table)
 
 

@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from language.text import visible
 from modewright.show import finite
 from sweep.summary import Line, Rate, Summary
 
@@ -19,7 +20,7 @@ def print_summary(console: Console, summary: Summary) -> None:
     total = sum(summary.counts.values())
     ended = ", ".join(f"{count} {name}" for name, count in summary.counts.items())
     text = f"{summary.study}: {total} of {summary.expected} variants: {ended or 'none yet'}"
-    console.print(text, highlight=False, markup=False)
+    console.print(visible(text), highlight=False, markup=False)
     if summary.lines:
         console.print(_lines(summary))
     if summary.rates:
@@ -47,7 +48,7 @@ def _lines(summary: Summary) -> Table:
         "min", "max", box=None, pad_edge=False, header_style="bold",
     )  # fmt: skip
     for line in summary.lines:
-        table.add_row(*(escape(line.group[name]) for name in groups), *_cells(line))
+        table.add_row(*(escape(visible(line.group[name])) for name in groups), *_cells(line))
     return table
 
 
@@ -67,7 +68,7 @@ def _rates(summary: Summary) -> Table:
     table = Table(*groups, "rate", "hits", "of", "share", sure, box=None, pad_edge=False,
                   header_style="bold")  # fmt: skip
     for rate in summary.rates:
-        table.add_row(*(escape(rate.group[name]) for name in groups), *_rate_cells(rate))
+        table.add_row(*(escape(visible(rate.group[name])) for name in groups), *_rate_cells(rate))
     return table
 
 

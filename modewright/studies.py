@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,6 +13,7 @@ from typing import TYPE_CHECKING
 from language.document import Scalar
 from language.load import command_line_value
 from language.missing import ToolMissing
+from language.problem import Problems, ordered, render
 from language.project import Project, read_document
 from modewright.compiled import run_block
 from modewright.files import OutputError
@@ -21,9 +23,11 @@ from sweep.executor import Executor, InProcess
 from sweep.preparation import prepared, resampled
 from sweep.processes import Processes
 from sweep.store import read_store
+from sweep.study import Study
 from sweep.study_reader import read_study
-from sweep.study_run import Progress, StudyRun, run_study
+from sweep.study_run import Progress, StudyRun, Warn, run_study
 from sweep.summary import Summary, summary_of
+from sweep.vary_reader import balance_fault
 
 if TYPE_CHECKING:
     from engine.plot import Picture
@@ -46,6 +50,7 @@ def sweep(
     samples: int | None = None,
     seed: int | None = None,
     progress: Progress | None = None,
+    warn: Warn | None = None,
     executor: Executor | None = None,
     cluster: str | None = None,
     credentials: Credentials | None = None,
@@ -54,29 +59,44 @@ def sweep(
 
     `workers` processes (all cores), 1: in this process; `cluster`: on the workers of a Dask
     cluster, `local:4` or the address of a scheduler, with `credentials` of TLS. `block` variants
-    are kept at once; `samples` and `seed` replace those of the study.
+    are kept at once; `samples` and `seed` replace those of the study. `warn` is told what the
+    study is warned of, and which blocks were damaged; without it Python warns.
     Raises SpecError, OutputError (a full disk: what is finished is kept), ClusterError,
     ToolMissing, ValueError.
     """
     place = address_of(cluster) if cluster else None
     if place and place.count:
         fork_server.start(TEMPLATE)
-    project = Project(root or Path())
-    document = read_document(project.path_of(study))
-    scalars: dict[str, Scalar] = {
-        name: command_line_value(text, name=name) for name, text in (values or {}).items()
-    }
-    ready = prepared(resampled(read_study(document, project, scalars), samples, seed))
+    if block is not None and block < 1:
+        raise ValueError(f"blocks of {block} variants are none")
+    tell = warn or warnings.warn
+    found = _read(study, values or {}, Project(root or Path()), tell)
+    ready = prepared(resampled(found, samples, seed))
+    if samples is not None and (fault := balance_fault(ready.sampling.method, samples)):
+        tell(f"{fault[0]}; {fault[1]}")
     count = workers or os.cpu_count() or 1
     local: Executor = Processes(count, WORKER) if count > 1 else InProcess(run_block)
     try:
         if place is None:
-            return run_study(ready, Path(out), executor or local, block, progress)
+            return run_study(ready, Path(out), executor or local, block, progress, tell)
         with _on_cluster(place, credentials or Credentials()) as remote:
-            return run_study(ready, Path(out), remote, block, progress)
+            return run_study(ready, Path(out), remote, block, progress, tell)
     except OSError as error:
         where = f" {error.filename}" if error.filename else ""
         raise OutputError(f"{out}: cannot write{where}: {error.strerror}") from None
+
+
+def _read(study: str, values: Mapping[str, str], project: Project, warn: Warn) -> Study:
+    """Return a study with values of the command line; tell its warnings. Raises SpecError."""
+    document = read_document(project.path_of(study))
+    scalars: dict[str, Scalar] = {
+        name: command_line_value(text, name=name) for name, text in values.items()
+    }
+    problems = Problems()
+    found = read_study(document, project, scalars, problems)
+    for problem in ordered(dict.fromkeys(problems.found)):
+        warn(render(problem))
+    return found
 
 
 @contextmanager

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import itertools
 import re
 from collections.abc import Mapping, Sequence
@@ -147,8 +148,9 @@ def _cell(value: Any, unit: str | None) -> str:
 
 def _embedded(name: str, data: bytes) -> str:
     """Return an SVG as a part of a page: its names are like no other's."""
-    text = OWN_NAME.sub(rf"\g<1>{name}-", METADATA.sub("", data.decode()))
-    return HEAD.sub(f'<svg role="img" aria-label="{name}" ', text, count=1)
+    title = html.escape(name)
+    text = OWN_NAME.sub(lambda found: f"{found[1]}{title}-", METADATA.sub("", data.decode()))
+    return HEAD.sub(lambda _: f'<svg role="img" aria-label="{title}" ', text, count=1)
 
 
 def _page(context: Mapping[str, Any]) -> str:

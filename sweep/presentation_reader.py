@@ -40,6 +40,7 @@ class PresentationReader(Reader):
         self.columns = [column.name for column in columns]
         self.numbers = [column.name for column in columns if column.type != "list"]
         self.is_plural = len(kinds) > 1
+        self.example = self.numbers[0] if self.numbers else "late"
 
     def presentation(self, summary: Node | None, plots: Node | None) -> Presentation:
         """Return what the sections say."""
@@ -72,6 +73,9 @@ class PresentationReader(Reader):
         of = self._names(
             node, kind, self.columns if kind == "histogram" else self.numbers, not many
         )
+        if kind != "parallel" and len(of) != 1 and len(self.problems.found) == told:
+            label = f"a `{kind}` is of one measure"
+            self.problems.error("form", entry.span, label, f"like `{{{kind}: {self.example}}}`")
         found: dict[str, Any] = {"kind": kind, "of": of}
         if kind == "heat_map":
             found["over"] = self._names(own.get("over"), "over", self.varied)

@@ -15,6 +15,7 @@ from language.problem import Problems, Span, nearest
 from language.reader import Reader
 from language.scope import Scope
 from language.units import NO_UNIT, Unit
+from sweep.shape import fault_of_shape, log_spaced
 from sweep.study import Axis, Distribution, Sampling, Setting, Shape, Target, Varied, points_each
 from sweep.target import Place
 
@@ -112,7 +113,10 @@ class VaryReader(Reader):
         weights = tuple(float(w) for w in self._plain(table.get("weights"), "weights"))
         shape = Distribution(form, tuple(map(_real, numbers)), within, weights)  # type: ignore[arg-type]
         if len(self.problems.found) == told:
-            self._check_shape(shape, table.entries[form].span)
+            fault = fault_of_shape(shape)
+            if fault:
+                kind, label = fault
+                self.problems.error(kind, table.entries[form].span, label)
         return shape, unit
 
     def _axis(self, numbers: Sequence[Fraction], span: Span) -> Axis:
@@ -166,9 +170,7 @@ class VaryReader(Reader):
             if first <= 0 or last <= 0:
                 self.problems.error("range", items[0].span, "`logspace` is between two above zero")
                 return None, unit
-            ratio = float(last / first)
-            values = [float(first) * ratio ** (k / (count - 1)) for k in range(count)]
-            return Axis((*values[:-1], _real(last))), unit
+            return Axis(log_spaced(first, last, count)), unit
         steps = [first + (last - first) * Fraction(k, count - 1) for k in range(count)]
         return Axis(tuple(map(_real, steps))), unit
 
@@ -189,32 +191,6 @@ class VaryReader(Reader):
             label = f"`within` cuts a normal or lognormal; `{form}` has its ends"
             self.problems.error("form", node.span, label)
         return (_real(limits[0]), _real(limits[1])) if limits else None
-
-    def _check_shape(self, shape: Distribution, span: Span) -> None:
-        numbers = shape.numbers
-        if shape.shape == "choice":
-            fits_weights = not shape.weights or len(shape.weights) == len(numbers)
-            if not numbers or not fits_weights or any(w <= 0 for w in shape.weights):
-                label = "a `choice` has values, and `weights` above zero, one for each, or none"
-                self.problems.error("form", span, label)
-            return
-        if shape.weights:
-            self.problems.error("form", span, f"`{shape.shape}` has no `weights`")
-        label = {
-            "uniform": "`uniform` is `[low, high]`",
-            "log_uniform": "`log_uniform` is `[low, high]`, above zero",
-            "normal": "`normal` is `[mean, standard deviation]`",
-            "lognormal": "`lognormal` is `[median, sigma of the logarithm]`",
-        }[shape.shape]  # fmt: skip
-        fine = len(numbers) == 2
-        if fine and shape.shape in ("uniform", "log_uniform"):
-            fine = numbers[0] < numbers[1]
-        elif fine:
-            fine = numbers[1] > 0.0
-        if fine and shape.shape in ("log_uniform", "lognormal"):
-            fine = numbers[0] > 0.0
-        if not fine:
-            self.problems.error("range", span, label)
 
     # What follows from what varies.
 
@@ -277,13 +253,20 @@ class VaryReader(Reader):
         if not drawn and not self.problems.has_errors:
             label = "nothing in `vary` is drawn: `sampling` has no work"
             self.problems.error("form", place.span, label, "`replicates` repeats with other noise")
-        if method in ("sobol", "saltelli") and count & (count - 1):
-            label = f"{count} is no power of 2: a Sobol sequence loses its balance"
-            near = 1 << round(math.log2(count))
-            self.problems.warning("sampling", place.node.span, label, f"like {near}")
+        unbalanced = balance_fault(method, count)
+        if unbalanced:
+            self.problems.warning("sampling", place.node.span, *unbalanced)
         seed = self.whole(table.get("seed"), "seed", 0, 0, LARGEST_SEED)
         count *= points_each(method, len(drawn))
         return Sampling(method, count, seed)  # type: ignore[arg-type]
+
+
+def balance_fault(method: str, count: int) -> tuple[str, str] | None:
+    """Return what is wrong with a number of points of a sequence, and what helps; None: nothing."""
+    if method not in ("sobol", "saltelli") or not count & (count - 1):
+        return None
+    label = f"{count} is no power of 2: a Sobol sequence loses its balance"
+    return label, f"like {1 << round(math.log2(count))}"
 
 
 def _is_list(course: Axis | Distribution) -> bool:

@@ -11,7 +11,7 @@ import typer
 from modewright.commands.options import Json, Sets, usage_errors, values_of
 from modewright.console import announce, console, counted, counting
 from modewright.exits import PROBLEMS
-from modewright.files import OutputError, make_folder, require_writable, write_files
+from modewright.files import OutputError, make_folder, require_beside, write_files
 from sweep.cluster_error import ClusterError
 
 if TYPE_CHECKING:
@@ -75,8 +75,8 @@ def sweep(
     modewright sweep my_study.yaml --out results --cluster tls://head:8786 --tls-ca ca.pem
     modewright sweep --summary results --csv summary.csv --report results.html
     """
-    require_writable(report)
     folder = _checked_folder(study, out, summary, form)
+    require_beside(folder, table, report)
     lost = 0
     if study is not None:
         options: dict[str, Any] = {"block": block, "samples": samples, "seed": seed}
@@ -144,7 +144,7 @@ def _run(
 
     try:
         with counting(f"sweep {study}", "variants") as progress, usage_errors():
-            found = studies.sweep(study, out, values, **options, progress=tell)
+            found = studies.sweep(study, out, values, **options, progress=tell, warn=_warn)
     except KeyboardInterrupt:
         _tell_kept(out, *done)
         raise
@@ -163,6 +163,11 @@ def _tell_kept(out: Path, now: int, total: int) -> None:
         console_error(f"{now} of {total} variants are kept in {out}; the same command goes on")
 
 
+def _warn(text: str) -> None:
+    """Print a warning; a problem says itself that it is one."""
+    console_error(text if ": warning: " in text.split("\n")[0] else f"warning: {text}")
+
+
 def _tell_run(found: StudyRun) -> None:
     before = f", {found.before} were there" if found.before else ""
     console().print(f"{counted(found.computed, 'variant')} computed{before}", highlight=False)
@@ -176,21 +181,35 @@ def console_error(text: str) -> None:
 
 
 def _show(folder: Path, table: Path | None, report: Path | None, form: str, as_json: bool) -> None:
+    """Tell the summary; then write what is drawn, and what is asked for."""
     from modewright import show_study, studies
     from modewright.show import print_json
 
     found = studies.study_summary(folder)
-    drawn = studies.study_pictures(folder)
-    files = {folder / PLOTS / f"{name}.{form}": p.data(form) for name, p in drawn.items()}
-    if files:
-        make_folder(folder / PLOTS)
-    if table:
-        files[table] = found.csv().encode()
-    if report:
-        files[report] = studies.study_report(folder)
-    write_files(files)
     if as_json:
         print_json(show_study.summary_json(found))
     else:
         show_study.print_summary(console(), found)
-        announce(list(files))
+    written = _drawn(folder, form)
+    files = {table: found.csv().encode()} if table else {}
+    if report:
+        files[report] = studies.study_report(folder)
+    write_files(files)
+    if not as_json:
+        announce([*written, *files])
+
+
+def _drawn(folder: Path, form: str) -> list[Path]:
+    """Write the pictures of a study; where that cannot be, the summary was told all the same."""
+    from modewright import studies
+
+    drawn = studies.study_pictures(folder)
+    files = {folder / PLOTS / f"{name}.{form}": p.data(form) for name, p in drawn.items()}
+    try:
+        if files:
+            make_folder(folder / PLOTS)
+        write_files(files)
+    except OutputError as error:
+        _warn(f"the pictures are not written: {error}")
+        return []
+    return list(files)
