@@ -35,7 +35,7 @@ IN_FLIGHT = 2
 LOOK = 5.0
 """Time [s] between two looks at how many workers there are."""
 PATIENCE = 60.0
-"""Time [s] without any worker after which a cluster is given up."""
+"""Time [s] without any worker, or an answer of the scheduler, after which a cluster is given up."""
 
 
 @dataclass(frozen=True)
@@ -107,29 +107,43 @@ class _Flight:
 
     def _look(self) -> None:
         """See how many threads there are. Raises ClusterError where nobody is left to compute."""
-        now = time.monotonic()
-        if now < self.looked + LOOK:
+        client, patience = self.cluster.client, self.cluster.patience
+        if client.status in ("closing", "closed"):
+            raise ClusterError("the connection to the scheduler is lost")
+        if time.monotonic() < self.looked + LOOK:
             return
-        client = self.cluster.client
         try:
-            self.threads = sum(client.nthreads().values())
+            threads = client.nthreads(callback_timeout=patience)
+        except TimeoutError:
+            raise ClusterError(f"the scheduler does not answer for {patience:g} s") from None
         except OSError as error:
             raise ClusterError(f"the scheduler does not answer any more: {error}") from None
+        self.threads = sum(threads.values())
         self.looked = time.monotonic()
         if self.threads:
             self.seen = self.looked
         elif self.looked > self.seen + self.cluster.patience:
             raise ClusterError(f"there is no worker any more for {self.cluster.patience:g} s")
 
+    def _answer(self, future: Future) -> Answer:
+        """Return an answer; it may be lost with its worker, and made again, which takes a while."""
+        while True:
+            try:
+                found: Answer = future.result(timeout=self.cluster.patience)
+                return found
+            except TimeoutError:
+                self.looked = float("-inf")
+                self._look()
+
     def _result(self, future: Future) -> Finished:
         block = self.under_way.pop(future)
         try:
-            answer: Answer = future.result()  # may be lost with its worker, and made again
+            answer = self._answer(future)
         except KilledWorker as error:
             return Finished(block, lost=_blame(error))
         except ImportError as error:
             raise ClusterError(f"a worker cannot import modewright: {error}") from None
-        except CancelledError:
+        except (CancelledError, OSError):
             raise ClusterError("the scheduler has dropped what it was given: it ended") from None
         if answer.refusal:
             raise ClusterError(f"a worker {answer.refusal}")

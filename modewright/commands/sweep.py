@@ -12,6 +12,7 @@ from modewright.commands.options import Json, Sets, usage_errors, values_of
 from modewright.console import announce, console, counted, counting
 from modewright.exits import PROBLEMS
 from modewright.files import OutputError, make_folder, require_beside, write_files
+from modewright.interruption import interrupted_once
 from sweep.cluster_error import ClusterError
 
 if TYPE_CHECKING:
@@ -142,15 +143,16 @@ def _run(
         done[:] = [now, total]
         progress(now, before, total)
 
-    try:
-        with counting(f"sweep {study}", "variants") as progress, usage_errors():
-            found = studies.sweep(study, out, values, **options, progress=tell, warn=_warn)
-    except KeyboardInterrupt:
-        _tell_kept(out, *done)
-        raise
-    except (OutputError, ClusterError) as error:
-        kept = f"{done[0]} of {done[1]} variants are kept; the same command goes on"
-        raise OutputError(f"{error}; {kept}" if done[1] else str(error)) from None
+    with interrupted_once():
+        try:
+            with counting(f"sweep {study}", "variants") as progress, usage_errors():
+                found = studies.sweep(study, out, values, **options, progress=tell, warn=_warn)
+        except KeyboardInterrupt:
+            _tell_kept(out, *done)
+            raise
+        except (OutputError, ClusterError) as error:
+            kept = f"{done[0]} of {done[1]} variants are kept; the same command goes on"
+            raise OutputError(f"{error}; {kept}" if done[1] else str(error)) from None
     if not as_json:
         _tell_run(found)
     for part, reason in found.lost:

@@ -76,3 +76,10 @@ def test_a_study_without_a_design_says_what_is_missing(
     run_study(study(), tmp_path, QUICK)
     assert exit_code(lambda: app(["sensitivity", str(tmp_path)], standalone_mode=False)) == 1
     assert "sampling: {saltelli: 256, seed: 1}" in capsys.readouterr().err
+
+
+def test_a_name_is_no_markup_of_the_page() -> None:
+    data = b'<?xml version="1.0"?><svg width="1"><path id="p"/><use href="#p"/></svg>'
+    text = study_page._embedded('"><script>\\1', data)
+    assert "<script>" not in text
+    assert text.startswith('<svg role="img" aria-label="&quot;&gt;&lt;script&gt;\\1" ')

@@ -31,7 +31,7 @@ class Desk:
         self.waiting: list[tuple[Reply, Callable[[], Any]]] = []
         self.status = "running"
 
-    def nthreads(self) -> dict[str, int]:
+    def nthreads(self, callback_timeout: float) -> dict[str, int]:
         return {"worker": self.threads}
 
     def submit(self, function: Any, *arguments: Any, pure: bool) -> Reply:

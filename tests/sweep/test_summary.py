@@ -13,7 +13,7 @@ from matplotlib.patches import Rectangle
 from engine.batch import Batch, BatchResult
 from modewright import show_study
 from sweep.executor import InProcess
-from sweep.picture import pictures, rank_correlation
+from sweep.picture import _binned, pictures, rank_correlation
 from sweep.store import Store
 from sweep.study_run import run_study
 from sweep.summary import Summary, summary_of
@@ -118,3 +118,10 @@ def test_a_rank_correlation_sees_what_rises_together() -> None:
     assert rank_correlation(a, np.exp(a)) == pytest.approx(1.0)
     assert rank_correlation(a, -(a**3)) == pytest.approx(-1.0)
     assert rank_correlation(a, np.ones(4)) == 0.0
+
+
+def test_numbers_that_are_not_there_are_in_no_bin_of_many() -> None:
+    values = np.array([*np.linspace(0.0, 1.0, 40), np.nan])
+    places, middles = _binned(values)
+    assert places[-1] == -1
+    assert (places[0], places[-2], len(middles)) == (0, 11, 12)
