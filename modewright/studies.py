@@ -71,9 +71,7 @@ def sweep(
         raise ValueError(f"blocks of {block} variants are none")
     tell = warn or warnings.warn
     found = _read(study, values or {}, Project(root or Path()), tell)
-    ready = prepared(resampled(found, samples, seed))
-    if samples is not None and (fault := balance_fault(ready.sampling.method, samples)):
-        tell(f"{fault[0]}; {fault[1]}")
+    ready = prepared(_resampled(found, samples, seed, tell))
     count = workers or os.cpu_count() or 1
     local: Executor = Processes(count, WORKER) if count > 1 else InProcess(run_block)
     try:
@@ -96,6 +94,15 @@ def _read(study: str, values: Mapping[str, str], project: Project, warn: Warn) -
     found = read_study(document, project, scalars, problems)
     for problem in ordered(dict.fromkeys(problems.found)):
         warn(render(problem))
+    return found
+
+
+def _resampled(study: Study, samples: int | None, seed: int | None, warn: Warn) -> Study:
+    """Return a study with points of the command line; warn of a number that suits it badly."""
+    found = resampled(study, samples, seed)
+    fault = balance_fault(found.sampling.method, samples) if samples is not None else None
+    if fault:
+        warn(f"{fault[0]}; {fault[1]}")
     return found
 
 
