@@ -21,6 +21,7 @@ from engine.assembling import assembly_of
 from engine.batch import NO_EVENT, Batch, BatchResult, EventKind
 from engine.plan import Plan, noise_of, plan_of, why_not_planned
 from engine.planned import EVENT, Build
+from engine.trajectory import fault_names
 from engine.variants import (
     empty_result,
     event_kinds,
@@ -243,12 +244,25 @@ class _Planned:
         for place, name in enumerate(batch.outputs):
             result.outputs[name][variants] = kept[:, place]
         result.event_counts[variants] = counts
-        result.faults[variants] = faults.any(axis=1)
+        self._tell_faults(result, variants, faults)
         filled = np.arange(most) < counts[:, None]
         result.event_times[variants] = np.where(filled, events["time"], np.nan)
         numbers = np.where(filled, events["number"], 0)
         result.event_kinds[variants] = np.where(filled, self.kinds[numbers], NO_EVENT)
         return [int(variant) for variant in variants[is_left != 0]]
+
+    def _tell_faults(
+        self, result: BatchResult, variants: NDArray[np.int64], words: NDArray[np.uint32]
+    ) -> None:
+        """Tell which bits of the fault words (n_variants, n_programs) are set."""
+        assert isinstance(result.faults, dict)
+        for place in np.flatnonzero(words.any(axis=1)).tolist():
+            named = zip(self.programs.items(), words[place].tolist(), strict=True)
+            result.faults[int(variants[place])] = tuple(
+                fault
+                for (name, program), word in named
+                for fault in fault_names(name, program, word)
+            )
 
     def _values(self, variants: NDArray[np.int64]) -> NDArray[np.float64]:
         names = list(self.assembly.tunables())

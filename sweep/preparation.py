@@ -15,7 +15,7 @@ from language.printing import digest as program_digest
 from sweep.study import Course, Kind, Study, points_each
 from sweep.study_reader import signals_of
 
-FORMAT = 1
+FORMAT = 2
 """Form of the results: those of another one are not continued."""
 
 

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 from engine.arrow import arrow_for
+from language.problem import SpecError
+from language.text import shortened
 from sweep.block import Block, Row
-from sweep.manifest import Manifest
+from sweep.manifest import Manifest, refused
 
 
 def block_file(manifest: Manifest, block: Block, rows: Sequence[Row]) -> bytes:
@@ -50,9 +53,30 @@ def parquet_of(manifest: Manifest, rows: Sequence[Row], mark: bytes) -> bytes:
     kept = {b"modewright": mark, b"units": json.dumps(units).encode()}
     sink = arrow.BufferOutputStream()
     table = arrow.table(columns, metadata=kept)
-    arrow.parquet.write_table(table, sink, compression="zstd")
+    arrow.parquet.write_table(table, sink, compression="zstd", write_page_checksum=True)
     data: bytes = sink.getvalue().to_pybytes()
     return data
+
+
+def columns_of_file(path: Path, names: Sequence[str] | None = None) -> Any:
+    """Return columns of a block from its file. Raises SpecError where that is damaged.
+
+    Pages carry checksums: without them most single bits that turn are read as other numbers.
+    """
+    arrow = arrow_module()
+    try:
+        with arrow.parquet.ParquetFile(path, page_checksum_verification=True) as file:
+            found = file.read(columns=None if names is None else list(names))
+    except (OSError, arrow.ArrowException) as error:
+        raise _damaged(path, str(error).splitlines()[0]) from None
+    if missing := [name for name in names or () if name not in found.column_names]:
+        raise _damaged(path, f"it has no column `{missing[0]}`")
+    return found
+
+
+def _damaged(path: Path, why: str) -> SpecError:
+    hint = "the same `modewright sweep STUDY --out DIR` removes it and computes it again"
+    return refused(path, "store", f"the file of this block is damaged: {shortened(why)}", hint)
 
 
 def arrow_module() -> ModuleType:

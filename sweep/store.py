@@ -18,7 +18,7 @@ from pathlib import Path
 from language.problem import SpecError
 from sweep.block import Block, Row
 from sweep.manifest import MANIFEST, Manifest, manifest_json, read_manifest, refused
-from sweep.rows_file import arrow_module, block_file, mark_of
+from sweep.rows_file import arrow_module, block_file, columns_of_file, mark_of
 
 BLOCKS = "blocks"
 LOCK = ".lock"
@@ -33,25 +33,25 @@ class Store:
     manifest: Manifest
 
     def finished(self) -> set[int]:
-        """Return the starts of the blocks that are there; one that cannot be read is removed."""
-        arrow = arrow_module()
-        found = set()
+        """Return the starts of the blocks that are there; one that cannot be read is removed.
+
+        Each is read whole: what is summed up later is what was computed.
+        """
+        known, found = set(self.manifest.blocks), set()
         for path, block in self._files():
-            try:
-                kept = arrow.parquet.read_metadata(path)
-                mine = (kept.metadata or {}).get(b"modewright") == mark_of(self.manifest, block)
-                fine = mine and kept.num_rows == block.stop - block.start
-            except (OSError, arrow.ArrowException):
-                fine = False
-            if fine and block in self._known:
+            if block in known and self._is_fine(path, block):
                 found.add(block.start)
             else:
                 path.unlink(missing_ok=True)
         return found
 
-    @property
-    def _known(self) -> set[Block]:
-        return set(self.manifest.blocks)
+    def _is_fine(self, path: Path, block: Block) -> bool:
+        try:
+            rows = columns_of_file(path)
+        except SpecError:
+            return False
+        mine = (rows.schema.metadata or {}).get(b"modewright") == mark_of(self.manifest, block)
+        return mine and rows.num_rows == block.stop - block.start
 
     def _files(self) -> Iterator[tuple[Path, Block]]:
         for path in sorted((self.folder / BLOCKS).iterdir()):

@@ -19,12 +19,16 @@ Progress = Callable[[int, int, int], None]
 
 @dataclass(frozen=True)
 class StudyRun:
-    """The store after a run; `lost` are blocks that could not be computed, with the reason."""
+    """The store after a run; `lost` are blocks that could not be computed, with the reason.
+
+    `damaged` are files of blocks that could not be read: these blocks were computed again.
+    """
 
     store: Store
     before: int
     computed: int
     lost: tuple[tuple[Block, str], ...] = ()
+    damaged: tuple[Path, ...] = ()
 
 
 def run_study(
@@ -54,7 +58,9 @@ def fill(
     with locked(folder):
         store = open_store(folder, manifest)
         total = manifest.count
+        files = store.paths()
         there = store.finished()
+        damaged = tuple(path for path in files if not path.exists())
         missing = [each for each in store.manifest.blocks if each.start not in there]
         before = total - sum(each.stop - each.start for each in missing)
         done, lost = before, []
@@ -76,7 +82,7 @@ def fill(
             close = getattr(finished, "close", None)
             if close:
                 close()
-        return StudyRun(store, before, done - before, tuple(lost))
+        return StudyRun(store, before, done - before, tuple(lost), damaged)
 
 
 def _silent(done: int, before: int, total: int) -> None:

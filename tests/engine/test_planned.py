@@ -160,9 +160,10 @@ def assert_same_batch(mine: BatchResult, theirs: BatchResult) -> None:
     for key in ("measures", "outputs"):
         for name, values in getattr(theirs, key).items():
             assert getattr(mine, key)[name].tobytes() == values.tobytes(), name
-    for key in ("times", "event_counts", "event_times", "event_kinds", "faults"):
+    for key in ("times", "event_counts", "event_times", "event_kinds"):
         assert getattr(mine, key).tobytes() == getattr(theirs, key).tobytes(), key
     assert (mine.kinds, mine.stopped) == (theirs.kinds, theirs.stopped)
+    assert mine.faults == theirs.faults
 
 
 def test_variants_of_a_batch_have_the_bits_of_the_interpreter_on_any_number_of_threads() -> None:
@@ -217,7 +218,7 @@ def test_a_variant_that_leaves_a_range_or_stops_is_told_by_the_interpreter() -> 
         inputs={"T_req": InputTable((Fraction(0),), np.array([[30.0], [30.0]]))},
     )
     mine = planned_batch(batch, quick)
-    assert list(mine.faults) == [False, True]
+    assert list(mine.faults) == [1]
     assert_same_batch(mine, run_variants(batch))
 
 
