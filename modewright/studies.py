@@ -18,6 +18,7 @@ from modewright.files import OutputError
 from sweep import fork_server
 from sweep.address import Address, Credentials, address_of
 from sweep.executor import Executor, InProcess
+from sweep.override import require_left_alone
 from sweep.preparation import prepared, resampled
 from sweep.processes import Processes
 from sweep.store import read_store
@@ -66,7 +67,9 @@ def sweep(
     scalars: dict[str, Scalar] = {
         name: command_line_value(text, name=name) for name, text in (values or {}).items()
     }
-    ready = prepared(resampled(read_study(document, project, scalars), samples, seed))
+    asked = read_study(document, project, scalars)
+    require_left_alone(asked, scalars)
+    ready = prepared(resampled(asked, samples, seed))
     count = workers or os.cpu_count() or 1
     local: Executor = Processes(count, WORKER) if count > 1 else InProcess(run_block)
     try:

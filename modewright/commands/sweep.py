@@ -19,6 +19,12 @@ if TYPE_CHECKING:
 
 PLOTS = "plots"
 FORMATS = ("svg", "png", "pdf")
+OF_A_RUN = {
+    "out": "--out", "workers": "--workers", "cluster": "--cluster", "tls_ca": "--tls-ca",
+    "tls_cert": "--tls-cert", "tls_key": "--tls-key", "sets": "--set", "samples": "--samples",
+    "seed": "--seed", "block": "--block",
+}  # fmt: skip
+"""Options that have no influence on a summary, by parameter."""
 OPEN_WARNING = (
     "warning: {} is not encrypted, and workers run whatever reaches their scheduler (pickles): "
     "use tls:// wherever others share the network"
@@ -29,6 +35,7 @@ TlsFile = Annotated[
 
 
 def sweep(
+    context: typer.Context,
     study: Annotated[str | None, typer.Argument(help="a study: its name or its file")] = None,
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="the folder of the results")
@@ -77,6 +84,8 @@ def sweep(
     """
     require_writable(report)
     folder = _checked_folder(study, out, summary, form)
+    if summary is not None:
+        _require_nothing_to_run(context)
     lost = 0
     if study is not None:
         options: dict[str, Any] = {"block": block, "samples": samples, "seed": seed}
@@ -86,6 +95,15 @@ def sweep(
     _show(folder, table, report, form, as_json)
     if lost:
         raise typer.Exit(PROBLEMS)
+
+
+def _require_nothing_to_run(context: typer.Context) -> None:
+    """Refuse options that have no influence where nothing is run."""
+    given = {name: context.get_parameter_source(name) for name in OF_A_RUN}
+    used = [OF_A_RUN[name] for name, source in given.items() if source and source.name != "DEFAULT"]
+    if used:
+        label = f"it runs nothing: {', '.join(used)} would have no influence"
+        raise typer.BadParameter(label, param_hint="--summary")
 
 
 def _checked_folder(study: str | None, out: Path | None, summary: Path | None, form: str) -> Path:
@@ -151,6 +169,8 @@ def _run(
     except (OutputError, ClusterError) as error:
         kept = f"{done[0]} of {done[1]} variants are kept; the same command goes on"
         raise OutputError(f"{error}; {kept}" if done[1] else str(error)) from None
+    for path in found.damaged:
+        console_error(f"{path}: the file of this block was damaged: it is computed again")
     if not as_json:
         _tell_run(found)
     for part, reason in found.lost:
