@@ -211,6 +211,36 @@ def test_a_batch_that_differs_in_numbers_alone_is_planned_once() -> None:
         planner.planned(batch_of(1, parameters=refused))
 
 
+def test_inputs_that_step_at_times_of_their_own_share_programs_and_library() -> None:
+    """From batch to batch: each variant has a plan, what is lowered and built is one."""
+    made: list[object] = []
+
+    def build(assembly: Assembly) -> Library:
+        made.append(assembly)
+        return quick(assembly)
+
+    def stepping(batch: Batch, *milliseconds: int) -> Batch:
+        step, before = batch.scenario.inputs["T_req"], dict(batch.scenario.inputs)
+        courses = []
+        for number in milliseconds:
+            piece = dataclasses.replace(step.pieces[1], start=Fraction(number, 1000))
+            courses.append(
+                {**before, "T_req": dataclasses.replace(step, pieces=(step.pieces[0], piece))}
+            )
+        scenario = dataclasses.replace(batch.scenario, inputs=courses[0])
+        return dataclasses.replace(batch, scenario=scenario, courses=tuple(courses))
+
+    planner, programs = Planner(build), []
+    names = {"parameters": {"plant.k_hs": np.array([4800.0, 7000.0])}, "seeds": np.array([1, 2])}
+    for times, builds in (((20, 31), 1), ((45, 12), 2)):
+        batch = stepping(batch_of(2, **names), *times)
+        planned = planner.planned(batch)
+        assert_same_batch(planned.carry_out(1), run_variants(batch))
+        programs.append(planned._parts[0].group.adjustment.programs)
+        assert len(made) == builds
+    assert programs[0] is programs[1]
+
+
 def test_a_variant_that_leaves_a_range_or_stops_is_told_by_the_interpreter() -> None:
     batch = batch_of(
         2,
