@@ -69,12 +69,13 @@ class PlannedBatch:
         """Return what is planned already for a batch that differs in numbers alone, else None.
 
         Where inputs step at times of their own the plan of each variant is made, for the same
-        Programs.
+        Programs; so it is where the interpreter took the few there were, whose steps then count
+        as steps of all that is compiled for.
         """
-        if self.reason or self._few or not self._parts or _form(batch) != _form(self.batch):
+        if self.reason or _form(batch) != _form(self.batch):
             return None
-        part = self._parts[0]
-        adjustment = part.group.adjustment
+        first = self._parts[0].group if self._parts else self._few[0]
+        adjustment = first.adjustment
         if adjustment.rebuilt:
             return None
         ends = adjustment.ends
@@ -82,10 +83,11 @@ class PlannedBatch:
             if name not in ends or not ends[name][0] <= low <= high <= ends[name][1]:
                 return None
         require_known(batch)
-        if batch.courses:
-            return PlannedBatch(batch, self.build, self.least, adjustment)
+        if batch.courses or self._few:
+            least = self.least - sum(map(_steps, self._few))
+            return PlannedBatch(batch, self.build, least, adjustment)
         found = copy.copy(self)
-        found.batch, found._parts = batch, [part.of(batch)]
+        found.batch, found._parts = batch, [self._parts[0].of(batch)]
         return found
 
     def carry_out(self, threads: int | None = None) -> BatchResult:
@@ -114,8 +116,9 @@ class Planner:
 
     def planned(self, batch: Batch) -> PlannedBatch:
         """Return a batch that is planned."""
-        for known in self._kept:
+        for place, known in enumerate(self._kept):
             if found := known.again(batch):
+                self._kept[place] = found
                 return found
         fresh = PlannedBatch(batch, self.build, self.least)
         self._kept = [fresh, *self._kept[: KEPT - 1]]

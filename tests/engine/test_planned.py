@@ -211,6 +211,17 @@ def test_a_batch_that_differs_in_numbers_alone_is_planned_once() -> None:
         planner.planned(batch_of(1, parameters=refused))
 
 
+def test_steps_that_the_interpreter_took_count_until_they_are_worth_a_library() -> None:
+    """Each block of a study has 500 here: with the third there are 1500."""
+    planner, notes = Planner(quick, least=1500), []
+    for k_hs in (4800.0, 5000.0, 5200.0, 5400.0):
+        batch = batch_of(1, parameters={"plant.k_hs": np.array([k_hs])})
+        found = planner.planned(batch).carry_out(1)
+        assert_same_batch(found, run_variants(batch))
+        notes.append(found.note.partition(":")[0])
+    assert notes == ["interpreter", "interpreter", "compiled", "compiled"]
+
+
 def test_inputs_that_step_at_times_of_their_own_share_programs_and_library() -> None:
     """From batch to batch: each variant has a plan, what is lowered and built is one."""
     made: list[object] = []
