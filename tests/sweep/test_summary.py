@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import dataclasses
 import io
+import itertools
 from pathlib import Path
 
 import numpy as np
@@ -190,3 +191,20 @@ def test_a_rank_correlation_sees_what_rises_together() -> None:
     assert rank_correlation(a, np.exp(a)) == pytest.approx(1.0)
     assert rank_correlation(a, -(a**3)) == pytest.approx(-1.0)
     assert rank_correlation(a, np.ones(4)) == 0.0
+
+
+@pytest.mark.parametrize("count", [5, 9, 12, 24, 40])
+def test_no_label_of_a_heat_map_is_over_another(count: int, tmp_path: Path) -> None:
+    axes = (
+        ("[1 rad/s, 3 rad/s, 5]", f"[1 rad/s, 3.14159 rad/s, {count}]"),
+        ("[0.1 1/s, 0.2 1/s, 0.4 1/s]", f"{{linspace: [0.001 1/s, 0.4567 1/s, {count}]}}"),
+        ("histogram: t_1, by: d", "histogram: t_1"),
+        ("{random: 4, seed: 3}", "{random: 1, seed: 3}"),
+    )
+    store = run_study(study("grid", *axes), tmp_path, QUICK, block=5000).store
+    figure = pictures(store)["heat"].figure
+    figure.canvas.draw()
+    for labels in (figure.axes[0].get_xticklabels(), figure.axes[0].get_yticklabels()):
+        boxes = [label.get_window_extent() for label in labels]
+        assert len(boxes) == (count if count <= 24 else 12)
+        assert not any(a.overlaps(b) for a, b in itertools.pairwise(boxes))
