@@ -20,14 +20,15 @@ from modewright.files import OutputError
 from sweep import fork_server
 from sweep.address import Address, Credentials, address_of
 from sweep.executor import Executor, InProcess
+from sweep.override import require_left_alone
 from sweep.preparation import prepared, resampled
 from sweep.processes import Processes
+from sweep.sampling_reader import balance_fault
 from sweep.store import read_store
 from sweep.study import Study
 from sweep.study_reader import read_study
 from sweep.study_run import Progress, StudyRun, Warn, run_study
 from sweep.summary import Summary, summary_of
-from sweep.vary_reader import balance_fault
 
 if TYPE_CHECKING:
     from engine.plot import Picture
@@ -61,8 +62,7 @@ def sweep(
     cluster, `local:4` or the address of a scheduler, with `credentials` of TLS. `block` variants
     are kept at once; `samples` and `seed` replace those of the study. `warn` is told what the
     study is warned of, and which blocks were damaged; without it Python warns.
-    Raises SpecError, OutputError (a full disk: what is finished is kept), ClusterError,
-    ToolMissing, ValueError.
+    Raises SpecError, ValueError, ClusterError, ToolMissing, OutputError (what is done is kept).
     """
     place = address_of(cluster) if cluster else None
     if place and place.count:
@@ -72,11 +72,9 @@ def sweep(
     tell = warn or warnings.warn
     found = _read(study, values or {}, Project(root or Path()), tell)
     ready = prepared(_resampled(found, samples, seed, tell))
-    count = workers or os.cpu_count() or 1
-    local: Executor = Processes(count, WORKER) if count > 1 else InProcess(run_block)
     try:
         if place is None:
-            return run_study(ready, Path(out), executor or local, block, progress, tell)
+            return run_study(ready, Path(out), executor or _local(workers), block, progress, tell)
         with _on_cluster(place, credentials or Credentials()) as remote:
             return run_study(ready, Path(out), remote, block, progress, tell)
     except OSError as error:
@@ -84,14 +82,24 @@ def sweep(
         raise OutputError(f"{out}: cannot write{where}: {error.strerror}") from None
 
 
+def _local(workers: int | None) -> Executor:
+    """Return processes of this machine, one for each core; of one this process is enough."""
+    count = workers or os.cpu_count() or 1
+    return Processes(count, WORKER) if count > 1 else InProcess(run_block)
+
+
 def _read(study: str, values: Mapping[str, str], project: Project, warn: Warn) -> Study:
-    """Return a study with values of the command line; tell its warnings. Raises SpecError."""
+    """Return a study with values of the command line; tell its warnings.
+
+    Raises SpecError, and ValueError for a value of what the study gives one itself.
+    """
     document = read_document(project.path_of(study))
     scalars: dict[str, Scalar] = {
         name: command_line_value(text, name=name) for name, text in values.items()
     }
     problems = Problems()
     found = read_study(document, project, scalars, problems)
+    require_left_alone(found, scalars)
     for problem in ordered(dict.fromkeys(problems.found)):
         warn(render(problem))
     return found

@@ -11,16 +11,16 @@ from typing import Any
 
 from language.names import NAME
 from language.text import shortened, visible
+from sweep.description import Description
 from sweep.manifest import MANIFEST, TYPES, Design, Manifest, refused, seal_of
 from sweep.measure import Column
 from sweep.preparation import FORMAT
 from sweep.presentation_reader import PLOTS
 from sweep.rows_file import END, PLACE
+from sweep.sampling_reader import LARGEST_SEED, METHODS, MOST_POINTS
 from sweep.study import Presentation
-from sweep.vary_reader import MOST_POINTS
 
 COLUMN = re.compile(r"[A-Za-z]\w*(\.\w+)*", re.ASCII)
-DESIGNS = ("saltelli", "morris")
 GROUPS = ("variant", "scenario")
 
 
@@ -45,14 +45,12 @@ def _manifest(data: Any) -> Manifest:
     """Return plain data as a manifest. Raises ValueError with the place of what is wrong."""
     table = _table(data, MANIFEST)
     _part(table, "modewright")
-    if "seal" in table and table["seal"] != seal_of(table):
-        raise ValueError("it is not as it was written")
+    _require(_part(table, "seal") == seal_of(table), "it is not as it was written")
     varied = _columns(_part(table, "varied"), "varied")
     measures = _columns(_part(table, "measures"), "measures")
     names = [column.name for column in (*varied, *measures)]
     names += [*PLACE, *END]
     _require(len(set(names)) == len(names), "`varied` and `measures` have a name twice")
-    drawn = table.get("design")
     return Manifest(
         study=_text(_part(table, "study"), "study"),
         digest=_text(_part(table, "digest"), "digest"),
@@ -63,16 +61,16 @@ def _manifest(data: Any) -> Manifest:
         words=_words(_part(table, "words"), varied),
         measures=measures,
         presentation=_presentation(_part(table, "presentation"), varied, measures),
-        design=None if drawn is None else _design(drawn, varied),
+        design=_design(_part(table, "design"), varied),
+        description=_description(_part(table, "description")),
     )
 
 
 def _presentation(data: Any, varied: Sequence[Column], measures: Sequence[Column]) -> Presentation:
     table = _table(data, "presentation")
     groups = (*GROUPS, *(column.name for column in varied))
-    confidence = _part(table, "confidence")
-    is_share = isinstance(confidence, float) and math.isfinite(confidence)
-    _require(is_share and 0.5 <= confidence < 1.0, "`confidence` is no share from 0.5 to below 1")
+    confidence = _real(_part(table, "confidence"), "confidence")
+    _require(0.5 <= confidence < 1.0, "`confidence` is no share from 0.5 to below 1")
     plots = {}
     for name, plot in _table(_part(table, "plots"), "plots").items():
         _require(NAME.fullmatch(name) is not None, f"`{_shown(name)}` is no name of a picture")
@@ -103,11 +101,25 @@ def _plot(
 
 def _design(data: Any, varied: Sequence[Column]) -> Design:
     table = _table(data, "design")
-    method = _choice(_part(table, "method"), "design.method", DESIGNS)
     known = [column.name for column in varied]
-    names = _known(_part(table, "names"), "design.names", known)
-    _require(bool(names), "`design.names` is empty")
-    return Design(method, names)
+    made = Design(
+        method=_choice(_part(table, "method"), "design.method", METHODS),
+        names=_known(_part(table, "names"), "design.names", known),
+        count=_whole(_part(table, "count"), "design.count", 0, MOST_POINTS),
+        seed=_whole(_part(table, "seed"), "design.seed", 0, LARGEST_SEED),
+        replicates=_whole(_part(table, "replicates"), "design.replicates", 1, MOST_POINTS),
+    )
+    _require(bool(made.names) == bool(made.count), "`design` has points of nothing, or none")
+    _require(made.count % made.each == 0, f"`design.count` is {made.count}: some are not whole")
+    return made
+
+
+def _description(data: Any) -> Description:
+    found: dict[str, str | dict[str, str]] = {}
+    for key, said in _table(data, "description").items():
+        read = _named_texts if isinstance(said, dict) else _text
+        found[_text(key, "description")] = read(said, f"description.{key}")
+    return found
 
 
 def _columns(data: Any, where: str) -> tuple[Column, ...]:
@@ -118,7 +130,10 @@ def _columns(data: Any, where: str) -> tuple[Column, ...]:
         name = _text(_part(table, "name"), f"{here}.name")
         _require(COLUMN.fullmatch(name) is not None, f"`{here}.name` is no name")
         kind = _choice(_part(table, "type"), f"{here}.type", tuple(TYPES))
-        found.append(Column(name, kind, _text(_part(table, "unit"), f"{here}.unit")))  # type: ignore[arg-type]
+        unit, shown = (_text(_part(table, key), f"{here}.{key}") for key in ("unit", "shown"))
+        factor, offset = (_real(_part(table, key), f"{here}.{key}") for key in ("factor", "offset"))
+        _require(factor > 0.0, f"`{here}.factor` is {factor}, not above zero")
+        found.append(Column(name, kind, unit, shown, factor, offset))  # type: ignore[arg-type]
     return tuple(found)
 
 
@@ -173,6 +188,12 @@ def _whole(value: Any, where: str, low: int, high: int | None) -> int:
     limits = f"from {low} on" if high is None else f"from {low} to {high}"
     _require(is_fine, f"`{where}` is {_shown(value)}, no whole number {limits}")
     return int(value)
+
+
+def _real(value: Any, where: str) -> float:
+    is_real = isinstance(value, float) and math.isfinite(value)
+    _require(is_real, f"`{where}` is {_shown(value)}, no real number")
+    return float(value)
 
 
 def _choice(value: Any, where: str, known: Sequence[str]) -> str:

@@ -29,35 +29,36 @@ def scaled(values: Reals) -> tuple[Reals, int]:
 def mean_of(values: Reals) -> float:
     """Return the mean of values (n,), n > 0."""
     own, exponent = scaled(values)
-    return _times(math.fsum(own) / len(own), exponent)
+    return unscaled(math.fsum(own) / len(own), exponent)
 
 
 def deviation_of(values: Reals) -> float:
     """Return the standard deviation of values (n,), n > 1, as that of a sample."""
     own, exponent = scaled(values)
     mean = math.fsum(own) / len(own)
-    return _times(math.sqrt(math.fsum((own - mean) ** 2) / (len(own) - 1)), exponent)
+    return unscaled(math.sqrt(math.fsum((own - mean) ** 2) / (len(own) - 1)), exponent)
 
 
 def root_mean_square(values: Reals) -> float:
     """Return the root of the mean square of values (n,), n > 0."""
     own, exponent = scaled(values)
-    return _times(math.sqrt(math.fsum(own * own) / len(own)), exponent)
+    return unscaled(math.sqrt(math.fsum(own * own) / len(own)), exponent)
 
 
 def total_of(values: Reals) -> float:
     """Return the sum of values (n,)."""
     own, exponent = scaled(values)
-    return _times(math.fsum(own), exponent)
+    return unscaled(math.fsum(own), exponent)
 
 
 def quantiles_of(values: Reals, shares: Sequence[float]) -> list[float]:
     """Return quantiles of values (n,), n > 0, between which lines are drawn."""
     own, exponent = scaled(values)
-    return [_times(float(one), exponent) for one in np.quantile(own, shares)]
+    return [unscaled(float(one), exponent) for one in np.quantile(own, shares)]
 
 
-def _times(number: float, exponent: int) -> float:
+def unscaled(number: float, exponent: int) -> float:
+    """Return a number times a power of two; NaN where that is too large for a number."""
     try:
         return math.ldexp(number, exponent)
     except OverflowError:

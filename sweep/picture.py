@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 from engine.band import PALETTE
 from engine.plot import QUANTITIES, Picture
 from language.text import visible
+from sweep.measure import Column
 from sweep.store import Store
 from sweep.summary import group_values
-from sweep.table import Reals, Table
+from sweep.table import Reals, Table, in_unit
 
 MOST_LINES = 2000
 """Lines of parallel coordinates; of more variants evenly spread ones are drawn."""
@@ -27,6 +28,9 @@ MOST_ANNOTATED = 144
 """Cells of a heat map up to which each has its number written in it."""
 LARGEST = 1.0e300
 """Magnitudes above it are not drawn: axes have room beside the numbers, up to 1e308 in all."""
+MOST_ACROSS = 75
+"""Characters of labels, with a space each, that stand side by side below a heat map: 0.06 inch each
+in 4.8 inches."""
 
 
 def pictures(store: Store) -> dict[str, Picture]:
@@ -51,20 +55,21 @@ def _empty() -> Figure:
     return figure
 
 
-def _unit(table: Table, name: str) -> str:
+def _column(table: Table, name: str) -> Column:
     manifest = table.store.manifest
-    return next((c.unit for c in (*manifest.varied, *manifest.measures) if c.name == name), "1")
+    return next(c for c in (*manifest.varied, *manifest.measures) if c.name == name)
 
 
 def _label(table: Table, name: str) -> str:
-    unit = _unit(table, name)
-    quantity = QUANTITIES.get(unit, "")
+    column = _column(table, name)
+    quantity = QUANTITIES.get(column.unit, "")
     extra = f", {quantity}" if quantity not in ("", "number") else ""
-    return visible(f"{name}{extra} [{unit}]" if unit != "1" else name)
+    return visible(f"{name}{extra} [{column.label}]" if column.label != "1" else name)
 
 
 def _done(table: Table, name: str) -> Reals:
-    return _drawable(table.reals(name)[table.is_done])
+    """Return a column of the variants that are done, in the unit in which it is shown."""
+    return _drawable(in_unit(table.reals(name)[table.is_done], _column(table, name)))
 
 
 def _drawable(values: Reals) -> Reals:
@@ -95,7 +100,8 @@ def _heat_map(table: Table, plot: Mapping[str, Any]) -> Figure:
     figure = Figure(figsize=(7.5, 5.0), layout="constrained")
     axis = figure.subplots()
     image = axis.imshow(cells, origin="lower", aspect="auto", cmap="viridis")
-    axis.set_xticks(range(len(x_ticks)), [f"{v:.4g}" for v in x_ticks], fontsize=8)
+    names = [f"{v:.4g}" for v in x_ticks]
+    axis.set_xticks(range(len(x_ticks)), names, fontsize=8, rotation=_turned(names))
     axis.set_yticks(range(len(y_ticks)), [f"{v:.4g}" for v in y_ticks], fontsize=8)
     axis.set_xlabel(_label(table, x_name), parse_math=False)
     axis.set_ylabel(_label(table, y_name), parse_math=False)
@@ -103,6 +109,11 @@ def _heat_map(table: Table, plot: Mapping[str, Any]) -> Figure:
     bar.set_label(f"median {_label(table, measure)}", parse_math=False)
     _annotate(axis, cells)
     return figure
+
+
+def _turned(names: Sequence[str]) -> float:
+    """Return how far labels below an axis are turned [deg]: so that none is over another."""
+    return 90.0 if len(names) * (max(map(len, names), default=0) + 1) > MOST_ACROSS else 0.0
 
 
 def _annotate(axis: Axes, cells: Reals) -> None:

@@ -12,11 +12,11 @@ from engine.starting import programs_of
 from engine.stimulus import resolved
 from language.experiment import Scenario
 from language.printing import digest as program_digest
+from sweep.sampling_reader import LARGEST_SEED, MOST_POINTS
 from sweep.study import Course, Kind, Study, points_each
 from sweep.study_reader import signals_of
-from sweep.vary_reader import LARGEST_SEED, MOST_POINTS
 
-FORMAT = 1
+FORMAT = 2
 """Form of the results: those of another one are not continued."""
 
 

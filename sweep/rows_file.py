@@ -32,23 +32,22 @@ def mark_of(manifest: Manifest, block: Block) -> bytes:
 def fault_of(manifest: Manifest, block: Block, data: bytes) -> Fault:
     """Return what is wrong with the file of a block.
 
-    The digest is looked at before pyarrow sees the file. One without a digest is of a former form.
+    The digest is looked at before pyarrow sees the file; one without it was not written here.
     """
     arrow = arrow_module()
     body, digest = _without_digest(data)
-    if digest and hashlib.sha256(body).hexdigest().encode() != digest:
+    if hashlib.sha256(body).hexdigest().encode() != digest:
         return "damaged"
     try:
         file = arrow.parquet.ParquetFile(arrow.BufferReader(data))
-        marks, schema = file.metadata.metadata or {}, file.schema_arrow
+        kept, schema = file.metadata, file.schema_arrow
     except (OSError, ValueError, arrow.ArrowException):
         return "damaged"
-    mark = marks.get(b"modewright", b"")
+    mark = (kept.metadata or {}).get(b"modewright", b"")
     if mark.split(b" ")[0] != manifest.digest.encode():
         return "another"
-    fine = mark == mark_of(manifest, block) and file.metadata.num_rows == block.stop - block.start
-    fine = fine and schema.equals(_schema(manifest))
-    return "" if fine and bool(digest) == (b"digest" in marks) else "damaged"
+    fine = mark == mark_of(manifest, block) and kept.num_rows == block.stop - block.start
+    return "" if fine and schema.equals(_schema(manifest)) else "damaged"
 
 
 def parquet_of(manifest: Manifest, rows: Sequence[Row], mark: bytes) -> bytes:

@@ -5,9 +5,6 @@ from __future__ import annotations
 import math
 from fractions import Fraction
 
-import numpy as np
-
-from sweep.draw import shares_within
 from sweep.study import Distribution
 
 RESOLVED = 2.0**20
@@ -42,8 +39,10 @@ def fault_of_shape(shape: Distribution) -> tuple[str, str] | None:
         if not math.isfinite(width):
             return "range", f"the ends of `{shape.shape}` are farther apart than a number can tell"
     elif shape.within:
+        from sweep.draw import shares_within  # not above: `check` loads no numpy
+
         low, high = shares_within(shape)
-        if not high - low >= RESOLVED * float(np.spacing(high)):
+        if not high - low >= RESOLVED * math.ulp(high):
             return "range", f"`within` leaves nothing of this `{shape.shape}` that could be drawn"
     return None
 

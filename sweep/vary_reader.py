@@ -1,32 +1,29 @@
-"""Vary reader: the sections `vary`, `set` and `sampling` of a study."""
+"""Vary reader: the sections `vary` and `set` of a study."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
+from language.difference import HINT, LABEL, difference
 from language.dimension import DimensionCheck
-from language.document import Entry, Items, Node, Scalar
+from language.document import Entry, Items, Node
 from language.experiment import System
 from language.kind import Kind
 from language.names import check_name
 from language.problem import Problems, Span, nearest
 from language.reader import Reader
 from language.scope import Scope
+from language.syntax import Number
 from language.units import NO_UNIT, Unit
 from sweep.shape import fault_of_shape, log_spaced
-from sweep.study import Axis, Distribution, Sampling, Setting, Shape, Target, Varied, points_each
+from sweep.study import Axis, Distribution, Setting, Shape, Target, Varied
 from sweep.target import Place
 
 LISTS = ("values", "linspace", "logspace")
 SHAPES: tuple[Shape, ...] = ("uniform", "log_uniform", "normal", "lognormal", "choice")
 OPTIONS = ("within", "weights")
-METHODS = ("random", "latin_hypercube", "sobol", "saltelli", "morris")
-MOST_POINTS = 10_000_000
-"""Most variants of a study: at 10 000 per second a quarter of an hour, 2 GB of results."""
 MOST_ON_AXIS = 100_000
-LARGEST_SEED = 2**31 - 1
 
 
 class VaryReader(Reader):
@@ -70,7 +67,7 @@ class VaryReader(Reader):
         if place and place.type == "bool":
             words = ("false", "true")
         targets = place.targets if place else ()
-        return Varied(entry.key, course, targets, str(unit.dimension), entry.span, words)
+        return Varied(entry.key, course, targets, unit, entry.span, words)
 
     def _unknown(self, entry: Entry) -> None:
         label = f"`{entry.key}` is nothing that can vary here"
@@ -109,7 +106,7 @@ class VaryReader(Reader):
         numbers, unit = self._numbers(node, form, first, place)
         if form == "values":
             return self._axis(numbers, entry.span), unit
-        within = self._within(table.get("within"), unit, form)
+        within = self._within(table.get("within"), unit, form, place)
         weights = tuple(float(w) for w in self._plain(table.get("weights"), "weights"))
         shape = Distribution(form, tuple(map(_real, numbers)), within, weights)  # type: ignore[arg-type]
         if len(self.problems.found) == told:
@@ -132,18 +129,19 @@ class VaryReader(Reader):
         if isinstance(node, Items) and not node.nodes:
             self.problems.error("missing", node.span, f"`{what}` has at least one value")
         for item in self.items(node, what):
-            is_width = what in ("normal", "lognormal") and len(found) == 1
-            if is_width and what == "lognormal":
+            is_second = what in ("normal", "lognormal") and len(found) == 1
+            if is_second and what == "lognormal":
                 found += self._plain(Items((item,), item.span), what)
             elif place and place.type != "real":
                 unit = place.unit
                 found.append(self.value(item, what, item.span, unit, place.type, place.values))
+            elif unit and (is_second or (place and place.is_width)):
+                found.append(difference(self, item, what, item.span, unit))
             else:
                 value, own = self.quantity(item, what, item.span, unit)
                 unit = unit or own
                 found.append(value)
-                if not is_width:
-                    self._in_range(value, item.span, place)
+                self._in_range(value, item.span, place)
         return found, unit or NO_UNIT
 
     def _in_range(self, value: Fraction, span: Span, place: Place | None) -> None:
@@ -184,8 +182,12 @@ class VaryReader(Reader):
             found.append(value)
         return found
 
-    def _within(self, node: Node | None, unit: Unit, form: str) -> tuple[float, float] | None:
+    def _within(
+        self, node: Node | None, unit: Unit, form: str, place: Place | None
+    ) -> tuple[float, float] | None:
         limits = self.range(node, unit) if node else None
+        for item in self.items(node, "within") if limits and place and place.is_width else ():
+            difference(self, item, "within", item.span, unit)
         if limits and form not in ("normal", "lognormal"):
             assert node is not None
             label = f"`within` cuts a normal or lognormal; `{form}` has its ends"
@@ -217,6 +219,8 @@ class VaryReader(Reader):
             if formula:
                 check = DimensionCheck(scope, self.problems)
                 check.quantity(formula.tree, place.unit.dimension, entry.key)
+                if place.is_width and isinstance(formula.tree, Number) and formula.tree.unit.offset:
+                    self.problems.error("dimension", formula.span, LABEL, HINT)
                 unit = str(place.unit.dimension)
                 found.append(Setting(entry.key, place.targets, formula, unit))
         read = {name for setting in found for name in setting.formula.reads}
@@ -225,48 +229,6 @@ class VaryReader(Reader):
                 label = f"`{each.name}` is no parameter, and no `set` reads it"
                 self.problems.error("name", each.span, label, nearest(each.name, self.places))
         return tuple(found)
-
-    # Sampling.
-
-    def sampling(self, node: Node | None, varied: Sequence[Varied]) -> Sampling:
-        """Return how points are drawn; what contradicts `vary` is reported."""
-        drawn = [each for each in varied if each.is_drawn]
-        if node is None or isinstance(node, Scalar):
-            word = self.choice(node, "sampling", ("grid", "one_at_a_time"), "grid")
-            if drawn:
-                first = drawn[0]
-                label = f"`{first.name}` is drawn, and `sampling` does not say how many points"
-                hint = "like `sampling: {random: 200, seed: 1}`"
-                self.problems.error("missing", first.span, label, hint)
-            return Sampling(one_at_a_time=word == "one_at_a_time")
-        told = len(self.problems.found)
-        table = self.table(node, "sampling", (*METHODS, "seed"))
-        methods = [key for key in table.entries if key in METHODS]
-        if len(methods) != 1:
-            label = f"`sampling` has one of {', '.join(METHODS)}"
-            if len(self.problems.found) == told:
-                self.problems.error("form", node.span, label, "like `{sobol: 256, seed: 1}`")
-            return Sampling()
-        method = methods[0]
-        place = table.entries[method]
-        count = self.whole(place.node, method, 1, 1, MOST_POINTS)
-        if not drawn and not self.problems.has_errors:
-            label = "nothing in `vary` is drawn: `sampling` has no work"
-            self.problems.error("form", place.span, label, "`replicates` repeats with other noise")
-        unbalanced = balance_fault(method, count)
-        if unbalanced:
-            self.problems.warning("sampling", place.node.span, *unbalanced)
-        seed = self.whole(table.get("seed"), "seed", 0, 0, LARGEST_SEED)
-        count *= points_each(method, len(drawn))
-        return Sampling(method, count, seed)  # type: ignore[arg-type]
-
-
-def balance_fault(method: str, count: int) -> tuple[str, str] | None:
-    """Return what is wrong with a number of points of a sequence, and what helps; None: nothing."""
-    if method not in ("sobol", "saltelli") or not count & (count - 1):
-        return None
-    label = f"{count} is no power of 2: a Sobol sequence loses its balance"
-    return label, f"like {1 << round(math.log2(count))}"
 
 
 def _is_list(course: Axis | Distribution) -> bool:

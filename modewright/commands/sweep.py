@@ -20,6 +20,12 @@ if TYPE_CHECKING:
 
 PLOTS = "plots"
 FORMATS = ("svg", "png", "pdf")
+OF_A_RUN = {
+    "out": "--out", "workers": "--workers", "cluster": "--cluster", "tls_ca": "--tls-ca",
+    "tls_cert": "--tls-cert", "tls_key": "--tls-key", "sets": "--set", "samples": "--samples",
+    "seed": "--seed", "block": "--block",
+}  # fmt: skip
+"""Options that have no influence on a summary, by parameter."""
 OPEN_WARNING = (
     "warning: {} is not encrypted, and workers run whatever reaches their scheduler (pickles): "
     "use tls:// wherever others share the network"
@@ -30,6 +36,7 @@ TlsFile = Annotated[
 
 
 def sweep(
+    context: typer.Context,
     study: Annotated[str | None, typer.Argument(help="a study: its name or its file")] = None,
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="the folder of the results")
@@ -77,6 +84,8 @@ def sweep(
     modewright sweep --summary results --csv summary.csv --report results.html
     """
     folder = _checked_folder(study, out, summary, form)
+    if summary is not None:
+        _require_nothing_to_run(context)
     require_beside(folder, table, report)
     lost = 0
     if study is not None:
@@ -87,6 +96,15 @@ def sweep(
     _show(folder, table, report, form, as_json)
     if lost:
         raise typer.Exit(PROBLEMS)
+
+
+def _require_nothing_to_run(context: typer.Context) -> None:
+    """Refuse options that have no influence where nothing is run."""
+    given = {name: context.get_parameter_source(name) for name in OF_A_RUN}
+    used = [OF_A_RUN[name] for name, source in given.items() if source and source.name != "DEFAULT"]
+    if used:
+        label = f"it runs nothing: {', '.join(used)} would have no influence"
+        raise typer.BadParameter(label, param_hint="--summary")
 
 
 def _checked_folder(study: str | None, out: Path | None, summary: Path | None, form: str) -> Path:

@@ -13,7 +13,6 @@ from modewright.cli import app
 from modewright.exits import exit_code
 from modewright.files import OutputError
 from sweep.manifest import MANIFEST, seal_of
-from sweep.store import read_store
 from tests.sweep.laying import STUDIES, quick
 
 
@@ -29,7 +28,7 @@ def run(*arguments: str) -> int:
 
 
 def ran(*arguments: str) -> int:
-    return run(*arguments, "-j", "1")
+    return run(*arguments, *([] if "--summary" in arguments else ["-j", "1"]))
 
 
 def everything() -> dict[Path, bytes]:
@@ -103,17 +102,6 @@ def test_warnings_of_a_study_are_told(capsys: pytest.CaptureFixture[str]) -> Non
     assert "warning: 5 is no power of 2" in capsys.readouterr().err
     with pytest.warns(UserWarning, match="6 is no power of 2"):
         studies.sweep("grid", "q", samples=6, workers=1)
-
-
-def test_a_damaged_block_is_told(capsys: pytest.CaptureFixture[str]) -> None:
-    assert ran("alone", "--out", "o") == 0
-    path = read_store(Path("o")).paths()[0]
-    path.write_bytes(path.read_bytes().replace(b"done", b"fine"))
-    assert ran("--summary", "o") == 1
-    assert f"{path}:1:1: error: this block is damaged" in capsys.readouterr().err
-    assert ran("alone", "--out", "o") == 0
-    assert f"warning: {path} is damaged: its variants are comp" in capsys.readouterr().err
-    assert ran("--summary", "o") == 0
 
 
 def test_pictures_that_cannot_be_written_are_told_beside_the_summary(

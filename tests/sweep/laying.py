@@ -59,7 +59,7 @@ def quick(batch: Batch) -> BatchResult:
         event_counts=np.ones(batch.count, dtype=np.int64),
         event_times=events,
         event_kinds=numbers,
-        faults=np.zeros(batch.count, dtype=np.bool_),
+        faults={},
         stopped={},
     )
 

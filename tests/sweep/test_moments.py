@@ -14,7 +14,7 @@ import pytest
 from engine.batch import Batch, BatchResult
 from modewright.show_study import summary_json
 from sweep.executor import InProcess
-from sweep.interval import of_mean
+from sweep.interval import of_mean, of_quantile
 from sweep.moments import (
     deviation_of,
     mean_of,
@@ -57,7 +57,11 @@ def test_what_is_larger_than_any_number_is_none() -> None:
     values = np.array([LARGEST, LARGEST, -LARGEST, LARGEST])
     assert mean_of(values) == LARGEST / 2
     assert math.isnan(total_of(values[:2]))
-    assert of_mean(values, 0.95) is None
+    assert of_mean(values, np.arange(4), 0.95) is None
+    assert of_quantile(np.tile(values, 20), np.arange(80), 0.5, 0.95) == (LARGEST, LARGEST)
+    pairs = np.tile([0.5 * LARGEST, 0.4 * LARGEST], 38)  # four of them are more than any number
+    low, high = of_mean(pairs, np.arange(76) // 4, 0.95) or (0.0, 0.0)
+    assert low == high == pytest.approx(0.45 * LARGEST)
     assert quantiles_of(values, (0.0, 0.25, 1.0)) == [-LARGEST, LARGEST / 2, LARGEST]
 
 

@@ -36,13 +36,11 @@ def out(kept: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(kept, tmp_path / "out"))
 
 
-def edited(folder: Path, change: Change, sealed: bool = True) -> None:
-    """Change the manifest of a store; sealed: as if that had been written."""
+def edited(folder: Path, change: Change) -> None:
+    """Change the manifest of a store, as if that had been written."""
     data = json.loads((folder / MANIFEST).read_text())
     change(data)
     data["seal"] = seal_of(data)
-    if not sealed:
-        del data["seal"]
     (folder / MANIFEST).write_text(json.dumps(data))
 
 
@@ -81,15 +79,27 @@ def test_any_change_of_the_manifest_is_refused_and_nothing_is_removed(out: Path)
         (lambda data: data["measures"][0].update(name="status"), "have a name twice"),
         (lambda data: data["measures"][0].update(name="../x"), r"`measures\.0\.name` is no name"),
         (lambda data: data["presentation"].update(by=["zzz"]), "`by` is zzz, not one of variant"),
-        (lambda data: data["presentation"].update(confidence=2), "`confidence` is no share"),
-        (lambda data: data["presentation"].update(confidence=float("nan")), "is no share"),
+        (lambda data: data["presentation"].update(confidence=2.0), "`confidence` is no share"),
+        (lambda data: data["presentation"].update(confidence=float("nan")), "is nan, no real"),
         (lambda data: data["presentation"].update(plots=[]), "`plots` is no table"),
         (lambda data: plots(data).update({"../../x": {}}), r"`\.\./\.\./x` is no name of a pic"),
         (lambda data: plots(data).update(x={"kind": "nope", "of": []}), r"x\.kind` is nope"),
         (lambda data: plots(data)["heat"].update(of=[]), r"`plots\.heat\.of` is not one measure"),
         (lambda data: plots(data)["heat"].update(over=["w"]), "is not two things"),
-        (lambda data: data.update(design={"method": "x", "names": []}), "`design.method` is x"),
-        (lambda data: data.update(design={"method": "morris", "names": []}), "names` is empty"),
+        (lambda data: data["varied"][0].update(factor=0.0), r"factor` is 0\.0, not above zero"),
+        (lambda data: data["varied"][0].update(offset="x"), r"varied\.0\.offset` is x, no real"),
+        (lambda data: data["varied"][0].update(shown="\x1b"), r"varied\.0\.shown` is .* no text"),
+        (lambda data: data.pop("design"), "`design` is missing"),
+        (lambda data: data["design"].update(method="x"), r"`design\.method` is x, not one of"),
+        (lambda data: data["design"].update(names=[]), "`design` has points of nothing, or none"),
+        (lambda data: data["design"].update(names=["z"]), r"`design\.names` is z, not one of w"),
+        (lambda data: data["design"].update(count=-4), r"`design\.count` is -4"),
+        (lambda data: data["design"].update(method="morris"), "is 4: some are not whole"),
+        (lambda data: data["design"].update(seed=-1), r"`design\.seed` is -1"),
+        (lambda data: data["design"].update(replicates=0), r"`design\.replicates` is 0"),
+        (lambda data: data.update(description=[]), "`description` is no table"),
+        (lambda data: data["description"].update(of=3), r"`description\.of` is 3, no text"),
+        (lambda data: data["description"].update(vary={"w": "\x1b"}), r"description\.vary\.w` is"),
     ],
 )  # fmt: skip
 def test_each_part_of_the_manifest_is_checked(change: Change, told: str, out: Path) -> None:
@@ -108,16 +118,32 @@ def plots(data: dict[str, Any]) -> dict[str, Any]:
 
 
 def test_other_columns_than_those_of_the_blocks_are_told(out: Path) -> None:
-    extra = {"name": "extra", "type": "real", "unit": "1"}
-    edited(out, lambda data: data["measures"].append(extra))
+    edited(out, lambda data: data["measures"].append({**data["measures"][0], "name": "extra"}))
     with pytest.raises(SpecError, match="damaged"):
         read_store(out)
 
 
-def test_a_manifest_of_before_there_were_seals_is_read(out: Path) -> None:
-    edited(out, lambda data: None, sealed=False)
-    assert len(read_store(out).paths()) == 6
-    edited(out, lambda data: data.update(block=12), sealed=False)
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (lambda data: data.update(modewright=1), "in a form that is not known here"),
+        (lambda data: data.pop("seal"), "`seal` is missing"),
+    ],
+)
+def test_a_manifest_of_before_there_were_seals_is_refused(
+    change: Change, told: str, out: Path
+) -> None:
+    data = json.loads((out / MANIFEST).read_text())
+    change(data)
+    (out / MANIFEST).write_text(json.dumps(data))
+    before = bytes_of(out)
+    with pytest.raises(SpecError, match=told):
+        run_study(study(), out, QUICK)
+    assert bytes_of(out) == before
+
+
+def test_blocks_that_a_manifest_does_not_have_are_refused(out: Path) -> None:
+    edited(out, lambda data: data.update(block=12))
     before = bytes_of(out)
     with pytest.raises(SpecError, match="no block of the results"):
         run_study(study(), out, QUICK)
@@ -151,13 +177,13 @@ def test_a_block_with_a_corrupt_body_is_told_and_computed_again(out: Path) -> No
     assert bytes_of(out) == before
 
 
-def test_a_block_of_before_there_were_digests_counts(out: Path) -> None:
+def test_a_block_without_a_digest_is_damaged(out: Path) -> None:
     store = read_store(out)
     path, block = store.paths()[0], store.manifest.blocks[0]
     table = pyarrow.parquet.read_table(path)
     kept = {key: text for key, text in table.schema.metadata.items() if key != b"digest"}
     pyarrow.parquet.write_table(table.replace_schema_metadata(kept), path, compression="zstd")
-    assert fault_of(store.manifest, block, path.read_bytes()) == ""
+    assert fault_of(store.manifest, block, path.read_bytes()) == "damaged"
 
 
 def test_blocks_of_another_study_are_refused_and_left_where_they_are(
