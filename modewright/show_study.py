@@ -46,7 +46,8 @@ def failure_texts(summary: Summary) -> list[str]:
     ]
     rest = summary.failures[MOST_FAILURES:]
     if rest:
-        found.append(f"{sum(one.count for one in rest)} for {len(rest)} other reasons")
+        others = "1 other reason" if len(rest) == 1 else f"{len(rest)} other reasons"
+        found.append(f"{sum(one.count for one in rest)} for {others}")
     return found
 
 

@@ -18,7 +18,7 @@ from sweep.preparation import FORMAT
 from sweep.presentation_reader import PLOTS
 from sweep.rows_file import END, PLACE
 from sweep.sampling_reader import LARGEST_SEED, METHODS, MOST_POINTS
-from sweep.study import Presentation
+from sweep.study import LEAST_SURE, MOST_SURE, Presentation
 
 COLUMN = re.compile(r"[A-Za-z]\w*(\.\w+)*", re.ASCII)
 GROUPS = ("variant", "scenario")
@@ -70,7 +70,8 @@ def _presentation(data: Any, varied: Sequence[Column], measures: Sequence[Column
     table = _table(data, "presentation")
     groups = (*GROUPS, *(column.name for column in varied))
     confidence = _real(_part(table, "confidence"), "confidence")
-    _require(0.5 <= confidence < 1.0, "`confidence` is no share from 0.5 to below 1")
+    is_share = LEAST_SURE <= confidence <= MOST_SURE
+    _require(is_share, f"`confidence` is no share from {LEAST_SURE:g} to {MOST_SURE!r}")
     plots = {}
     for name, plot in _table(_part(table, "plots"), "plots").items():
         _require(NAME.fullmatch(name) is not None, f"`{_shown(name)}` is no name of a picture")

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from engine.band import PALETTE
 from engine.plot import QUANTITIES, Picture
 from language.text import visible
+from sweep.bins import bin_ends
 from sweep.measure import Column
 from sweep.store import Store
 from sweep.summary import group_values
@@ -268,9 +269,7 @@ def _histogram(table: Table, plot: Mapping[str, Any]) -> Figure:
         places, names = group_values(table, by[0])
         groups = [(f"{by[0]}: {name}", places == k) for k, name in enumerate(names)]
     kept = table.is_done[pooled.rows] & (np.abs(pooled.values) <= LARGEST)
-    ends = np.histogram_bin_edges(pooled.values[kept], bins="auto") if kept.any() else [0.0, 1.0]
-    if len(ends) > 60:
-        ends = np.linspace(ends[0], ends[-1], 61)
+    ends = bin_ends(pooled.values[kept])
     figure = Figure(figsize=(7.5, 1.0 + 2.2 * len(groups)), layout="constrained")
     axes = figure.subplots(len(groups), 1, sharex=True, squeeze=False)[:, 0]
     for axis, (title, chosen) in zip(axes, groups, strict=True):

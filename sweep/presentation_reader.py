@@ -9,7 +9,7 @@ from language.document import Entry, Node, Scalar
 from language.problem import Problems, nearest
 from language.reader import Reader
 from sweep.measure import Measure, columns_of
-from sweep.study import Axis, Kind, Presentation, Varied
+from sweep.study import LEAST_SURE, MOST_SURE, Axis, Kind, Presentation, Varied
 
 PLOTS: dict[str, tuple[str, ...]] = {
     "heat_map": ("over", "by"),
@@ -50,8 +50,8 @@ class PresentationReader(Reader):
         node = table.get("confidence")
         if node is not None:
             confidence = float(self.quantity(node, "confidence", node.span, None)[0])
-            if not 0.5 <= confidence < 1.0:
-                label = "`confidence` is a share from 0.5 to below 1, like 0.95"
+            if not LEAST_SURE <= confidence <= MOST_SURE:
+                label = f"`confidence` is a share from {LEAST_SURE:g} to {MOST_SURE!r}, like 0.95"
                 self.problems.error("range", node.span, label)
         found = {entry.key: self._plot(entry) for entry in self.named(plots, "plots")}
         return Presentation(tuple(by), confidence, found)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Sequence
+from itertools import accumulate
 
 from language.document import Node, Scalar
 from language.reader import Reader
-from sweep.study import Sampling, Varied, points_each
+from sweep.study import LEVELS, Distribution, Sampling, Varied, points_each
 
 METHODS = ("random", "latin_hypercube", "sobol", "saltelli", "morris")
 MOST_POINTS = 10_000_000
@@ -40,9 +42,28 @@ class SamplingReader(Reader):
         unbalanced = balance_fault(method, count)
         if unbalanced:
             self.problems.warning("sampling", place.node.span, *unbalanced)
+        for each in drawn if method == "morris" else ():
+            self._missed(each)
         seed = self.whole(table.get("seed"), "seed", 0, 0, LARGEST_SEED)
         count *= points_each(method, len(drawn))
         return Sampling(method, count, seed)  # type: ignore[arg-type]
+
+    def _missed(self, drawn: Varied) -> None:
+        """Warn of values of a choice that no level of a path draws."""
+        course = drawn.course
+        if not isinstance(course, Distribution) or course.shape != "choice":
+            return
+        ends = list(accumulate(course.weights or [1.0] * len(course.numbers)))
+        levels = [(k + 0.5) / LEVELS * ends[-1] for k in range(LEVELS)]
+        reached = {bisect_right(ends[:-1], level) for level in levels}
+        missed = len(course.numbers) - len(reached)
+        if missed:
+            words = "1 value" if missed == 1 else f"{missed} values"
+            label = (
+                f"paths of Morris draw {words} of `{drawn.name}` never: {LEVELS} levels see shares"
+            )
+            hint = "weights that are more alike, or `saltelli`"
+            self.problems.warning("sampling", drawn.span, f"{label} of {1 / LEVELS:g} each", hint)
 
     def _no_draw(self, node: Node | None, drawn: Sequence[Varied]) -> Sampling:
         word = self.choice(node, "sampling", ("grid", "one_at_a_time"), "grid")

@@ -16,11 +16,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sweep.design import LEVELS, STRIDE, morris_shares
+from sweep.design import STRIDE, morris_shares
 from sweep.interval import Interval
 from sweep.manifest import Design, refused
 from sweep.measure import Column
+from sweep.moments import scaled
 from sweep.store import Store
+from sweep.study import LEVELS
 from sweep.summary import group_values
 from sweep.table import Reals, Table
 
@@ -112,7 +114,7 @@ def sensitivity_of(store: Store) -> Sensitivity:
 def sobol_indices(results: Reals) -> dict[str, Reals]:
     """Return indices (d,) of results (n, d + 2) at A, B and A with a column of B."""
     a, b, mixed = results[:, :1], results[:, 1:2], results[:, 2:]
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         variance = np.var(results[:, :2])
         mean = np.mean(results[:, :2])
         first = np.mean((b - mean) * (mixed - a), axis=0) / variance
@@ -122,11 +124,12 @@ def sobol_indices(results: Reals) -> dict[str, Reals]:
 
 def morris_indices(effects: Reals) -> dict[str, Reals]:
     """Return indices (d,) of elementary effects (n, d)."""
-    return {
-        "mu_star": np.mean(np.abs(effects), axis=0),
-        "mu": np.mean(effects, axis=0),
-        "sigma": np.std(effects, axis=0, ddof=1),
-    }
+    with np.errstate(over="ignore", invalid="ignore"):  # what is too large is no number: not told
+        return {
+            "mu_star": np.mean(np.abs(effects), axis=0),
+            "mu": np.mean(effects, axis=0),
+            "sigma": np.std(effects, axis=0, ddof=1),
+        }
 
 
 def elementary_effects(results: Reals, shares: Reals) -> Reals:
@@ -139,7 +142,9 @@ def elementary_effects(results: Reals, shares: Reals) -> Reals:
     changed = np.argmax(np.abs(moved), axis=2)
     sign = np.sign(np.take_along_axis(moved, changed[:, :, None], axis=2)[:, :, 0])
     found = np.full(changed.shape, np.nan)
-    np.put_along_axis(found, changed, sign * np.diff(results, axis=1) * LEVELS / STRIDE, axis=1)
+    with np.errstate(over="ignore", invalid="ignore"):
+        steps = sign * np.diff(results, axis=1) * LEVELS / STRIDE
+    np.put_along_axis(found, changed, steps, axis=1)
     return found
 
 
@@ -152,7 +157,7 @@ def _of_measure(table: Table, design: Design, column: Column) -> Iterator[Index]
     for group, chosen in _groups(table, design):
         results = _at(samples[chosen], values[chosen], design)
         fine = np.flatnonzero(~np.isnan(results).any(axis=1))
-        used = results[fine]
+        used, _ = scaled(results[fine]) if design.method == "saltelli" else (results[fine], 0)
         estimate: Callable[[Reals], dict[str, Reals]] = sobol_indices
         if design.method == "morris":
             numbers = (fine[:, None] * design.each + np.arange(design.each)).reshape(-1)
@@ -164,10 +169,24 @@ def _of_measure(table: Table, design: Design, column: Column) -> Iterator[Index]
         if len(used) >= FEWEST:
             found, ends = estimate(used), _intervals(used, estimate, confidence)
         for place, name in enumerate(design.names):
-            own = {key: float(numbers[place]) for key, numbers in found.items()}
-            sure: dict[str, Interval] = dict.fromkeys(own)
-            sure |= {key: (float(e[0][place]), float(e[1][place])) for key, e in ends.items()}
+            own: dict[str, float] = dict.fromkeys(found, np.nan)
+            sure: dict[str, Interval] = dict.fromkeys(found)
+            if _has_moved(table.reals(name)[chosen]):
+                own = {key: float(numbers[place]) for key, numbers in found.items()}
+                sure |= {
+                    key: _interval(low[place], high[place]) for key, (low, high) in ends.items()
+                }
             yield Index(group, column.name, column.unit, name, own, sure, len(used), design.planned)
+
+
+def _has_moved(drawn: Reals) -> bool:
+    """Tell whether drawn values (n,) are not all one: of what never changed nothing is known."""
+    return len(drawn) > 0 and float(np.min(drawn)) < float(np.max(drawn))
+
+
+def _interval(low: float, high: float) -> Interval:
+    """Return an interval, None where an end is no number."""
+    return (float(low), float(high)) if np.isfinite(low) and np.isfinite(high) else None
 
 
 def _at(samples: NDArray[np.int64], values: Reals, design: Design) -> Reals:

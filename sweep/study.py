@@ -125,6 +125,12 @@ class Kind:
     courses: Mapping[str, Course] = field(repr=False)
 
 
+LEAST_SURE, MOST_SURE = 0.5, 0.999999
+"""Shares that a confidence is between: of less an interval is empty, of more without end."""
+LEVELS = 4
+"""Of each thing that varies in a path of Morris: the middles of so many equal shares."""
+
+
 @dataclass(frozen=True)
 class Presentation:
     """How results are shown: no influence on them. `plots` are options by name."""

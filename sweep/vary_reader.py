@@ -87,10 +87,10 @@ class VaryReader(Reader):
 
     def _course(self, entry: Entry, place: Place | None) -> tuple[Axis | Distribution | None, Unit]:
         first = place.unit if place else None
+        told = len(self.problems.found)
         if isinstance(entry.node, Items):
             numbers, unit = self._numbers(entry.node, entry.key, first, place)
-            return self._axis(numbers, entry.span), unit
-        told = len(self.problems.found)
+            return self._axis(numbers, entry.span, told), unit
         table = self.table(entry.node, f"vary.{entry.key}", (*LISTS, *SHAPES, *OPTIONS))
         forms = [key for key in table.entries if key in (*LISTS, *SHAPES)]
         if len(forms) != 1:
@@ -105,7 +105,7 @@ class VaryReader(Reader):
             return self._spaced(node, form, first, place)
         numbers, unit = self._numbers(node, form, first, place)
         if form == "values":
-            return self._axis(numbers, entry.span), unit
+            return self._axis(numbers, entry.span, told), unit
         within = self._within(table.get("within"), unit, form, place)
         weights = tuple(float(w) for w in self._plain(table.get("weights"), "weights"))
         shape = Distribution(form, tuple(map(_real, numbers)), within, weights)  # type: ignore[arg-type]
@@ -116,8 +116,9 @@ class VaryReader(Reader):
                 self.problems.error(kind, table.entries[form].span, label)
         return shape, unit
 
-    def _axis(self, numbers: Sequence[Fraction], span: Span) -> Axis:
-        if len(set(numbers)) < len(numbers):
+    def _axis(self, numbers: Sequence[Fraction], span: Span, told: int) -> Axis:
+        """Return an axis; one of which a value could not be read has no other fault."""
+        if len(set(numbers)) < len(numbers) and len(self.problems.found) == told:
             self.problems.error("duplicate", span, "a value stands in the list twice")
         return Axis(tuple(map(_real, numbers)))
 

@@ -10,8 +10,9 @@ import pytest
 from SALib.analyze import morris as salib_morris, sobol as salib_sobol
 
 from language.problem import SpecError
-from sweep.design import LEVELS, STRIDE, morris_shares
+from sweep.design import STRIDE, morris_shares
 from sweep.draw import drawn_values
+from sweep.moments import scaled
 from sweep.sensitivity import (
     Index,
     elementary_effects,
@@ -20,7 +21,7 @@ from sweep.sensitivity import (
     sobol_indices,
 )
 from sweep.store import read_store
-from sweep.study import Study
+from sweep.study import LEVELS, Study
 from sweep.study_run import run_study
 from sweep.table import Reals
 from tests.sweep.laying import QUICK, Backwards, content, study
@@ -131,9 +132,10 @@ def indices_of(folder: Path, design: str, *changes: tuple[str, str]) -> dict[str
 
 
 def test_a_step_that_draws_the_same_value_again_has_no_effect(tmp_path: Path) -> None:
-    """A choice of two, one of them in 9 of 10: level 1 of 4 is the other in no path at all."""
+    """A choice of two, one of them in 9 of 10: no level draws the other, so nothing is known."""
     found = indices_of(tmp_path / "a", "morris: 20", CHOSEN)
-    assert [found["x_1"].values[k] for k in ("mu_star", "mu", "sigma")] == [0.0, 0.0, 0.0]
+    assert all(math.isnan(found["x_1"].values[k]) for k in ("mu_star", "mu", "sigma"))
+    assert set(found["x_1"].intervals.values()) == {None}
     assert found["inputs.push.steps.1"].values["mu_star"] > 0.0
     even = (
         CHOSEN[0],
@@ -168,3 +170,12 @@ def test_replicates_of_a_point_have_noise_of_their_own_and_all_of_them_count(
     seeds = {(r["sample"] // 3, r["replicate"], r["seed"]) for r in rows}  # type: ignore[operator]
     assert len(seeds) == 15
     assert {seed for _, _, seed in seeds} == set(range(15))
+
+
+def test_indices_of_the_largest_numbers_are_told(recwarn: pytest.WarningsRecorder) -> None:
+    """Shares of a variance have no unit: those of a measure of 1e300 are those of one of 1."""
+    results = np.random.default_rng(1).normal(size=(64, 4))
+    plain, large = sobol_indices(scaled(results)[0]), sobol_indices(scaled(1.0e300 * results)[0])
+    for name in plain:
+        np.testing.assert_allclose(large[name], plain[name], rtol=1e-12)
+    assert not recwarn.list

@@ -7,7 +7,7 @@ from fractions import Fraction
 
 import pytest
 
-from language.problem import SpecError
+from language.problem import Problems, SpecError
 from sweep.shape import log_spaced
 from tests.sweep.laying import study
 
@@ -56,3 +56,29 @@ def test_a_picture_of_no_measure_or_of_two_is_refused() -> None:
     for of in ("[]", "[peak, t_1]"):
         with pytest.raises(SpecError, match="a `tornado` is of one measure"):
             study("grid", ("{tornado: peak}", f"{{tornado: {of}}}"))
+
+
+@pytest.mark.parametrize(
+    ("drawn", "words"),
+    [
+        ("{choice: [1 m, 20 m], weights: [1, 9]}", "1 value of `x_1` never"),
+        ("{choice: [1 m, 2 m, 3 m, 4 m, 5 m, 6 m]}", "2 values of `x_1` never"),
+        ("{choice: [1 m, 20 m], weights: [1, 3]}", ""),
+        (DRAWN, ""),
+    ],
+)
+def test_values_that_no_path_draws_are_told(drawn: str, words: str) -> None:
+    problems = Problems()
+    study("grid", (DRAWN, drawn), ("{random: 4, seed: 3}", "{morris: 4}"), problems=problems)
+    assert [words in one.label for one in problems.found] == ([True] if words else [])
+
+
+def test_a_value_that_cannot_be_read_does_not_stand_in_the_list_twice() -> None:
+    with pytest.raises(SpecError) as refused:
+        study("grid", (AXIS, "[0 1/s, 1e200 1/s, 1e201 1/s]"))
+    assert [one.kind for one in refused.value.problems if one.kind == "duplicate"] == []
+
+
+def test_a_confidence_next_to_1_is_refused() -> None:
+    with pytest.raises(SpecError, match=r"`confidence` is a share from 0\.5 to 0\.999999"):
+        study("grid", ("plots:", "summary: {confidence: 0.9999999999999999}\nplots:"))

@@ -14,6 +14,7 @@ from matplotlib.patches import Rectangle
 
 from engine.batch import Batch, BatchResult
 from modewright import show_study
+from sweep.bins import MOST_BINS, bin_ends
 from sweep.executor import InProcess
 from sweep.interval import wilson
 from sweep.picture import _binned, pictures, rank_correlation
@@ -215,3 +216,18 @@ def test_no_label_of_a_heat_map_is_over_another(count: int, tmp_path: Path) -> N
         boxes = [label.get_window_extent() for label in labels]
         assert len(boxes) == (count if count <= 24 else 12)
         assert not any(a.overlaps(b) for a, b in itertools.pairwise(boxes))
+
+
+@pytest.mark.parametrize(
+    "values", [[1.0e17], [1.0, 1.0 + 2.0**-52], [0.0, 0.0], [-1.0e300, -1.0e300], []]
+)
+def test_values_that_are_as_good_as_one_have_one_bin(values: list[float]) -> None:
+    low, high = bin_ends(np.array(values))
+    assert low < high
+    assert all(low < value < high for value in values)
+
+
+def test_bins_are_as_many_as_numpy_takes_but_not_without_end() -> None:
+    values = np.random.default_rng(5).normal(size=400)
+    np.testing.assert_allclose(bin_ends(values), np.histogram_bin_edges(values, bins="auto"))
+    assert len(bin_ends(np.append(values, 1.0e9))) == MOST_BINS + 1
