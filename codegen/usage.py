@@ -115,7 +115,7 @@ def turning(program: Program) -> dict[str, frozenset[str]]:
         known -= read ^ written
         below = reached(name, program.blocks) - {name}
         known -= read & {n for other in below for names in has[other] for n in names}
-        known -= unassigned(program, name, frozenset(read))
+        known -= unassigned(program, name, frozenset(read & known)) if read & known else set()
     return {name: frozenset(read & known) for name, (read, _) in has.items()}
 
 

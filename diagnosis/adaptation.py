@@ -34,8 +34,10 @@ def adapted(model: Estimate, series: Sequence[Series]) -> Estimate:
         return now
     now = min(now, seen_at(model, series, turned(now, series).point), key=lambda one: one.cost)
     damping = FIRST_DAMPING
+    still = np.zeros(now.outcome.joined.shape)
+    held = {one.name: still for one in model.candidate.uncertain if not one.per_recording}
     for _ in range(ROUNDS if np.isfinite(now.cost) else 0):
-        better, damping = improved(with_normal(now, series), series, damping, own_only=True)
+        better, damping = improved(with_normal(now, series, held), series, damping, own_only=True)
         if better is None:
             break
         now = better

@@ -15,14 +15,21 @@ import numpy as np
 
 from diagnosis.candidate import Candidate
 from diagnosis.gains import gains_of
-from diagnosis.normal import Columns, Normal, columns_of, normal_of, stepped
+from diagnosis.normal import Normal, foreseen, normal_of, stepped
 from diagnosis.point import Point, all_values_at, point_of, values_at
 from diagnosis.prediction import Gains, Noises, Outcome, predicted
 from diagnosis.series import Series
+from diagnosis.slopes import Columns, carried, columns_of
 
 MOST_ROUNDS = 15
 ENOUGH = 0.3
 """A round that gains less than this [nats] is the last."""
+ENOUGH_CARRIED = 2.0
+"""The same where slopes were carried along steps: then they are looked for again."""
+NOTHING = 0.05
+"""A step that is foreseen to gain less than this [nats] is not tried."""
+LITTLE = 1.0
+"""The same while candidates are screened."""
 FIRST_DAMPING = 1e-3
 LARGEST_DAMPING = 1e5
 SCREENED_ROUNDS, ROUNDS_OF_ONE = 8, 4
@@ -107,47 +114,88 @@ def estimated(
     noises: Noises,
     start: Mapping[str, float] | Point,
     rounds: int = MOST_ROUNDS,
+    known: Columns | None = None,
 ) -> Estimate:
-    """Return the point that foresees the recordings best, from `start` [SI]."""
+    """Return the point that foresees the recordings best, from `start` [SI].
+
+    Slopes are carried along steps, from `known` ones near the start if there are such; before a fit
+    is done they are looked for again, and steps are sought with these.
+    """
     point = start if isinstance(start, Point) else point_of(candidate, len(series), start)
     now = looked_at(candidate, series, noises, point)
-    damping = FIRST_DAMPING
-    for _ in range(rounds if np.isfinite(now.cost) else 0):
-        now = with_normal(now, series)
+    if not np.isfinite(now.cost):
+        return now
+    now = with_normal(now, series, known)
+    is_fresh, damping = not known, FIRST_DAMPING
+    for _ in range(rounds):
         better, damping = improved(now, series, damping)
-        if better is None:
-            break
-        renewed = looked_at(candidate, series, noises, better.point, better.outcome)
-        gained = now.cost - better.cost
-        now = renewed if renewed.cost < better.cost + ENOUGH else better
-        if gained < ENOUGH:
-            break
-    return now if now.normal else with_normal(now, series) if np.isfinite(now.cost) else now
+        gained = now.cost - better.cost if better else 0.0
+        if better:
+            renewed = looked_at(candidate, series, noises, better.point, better.outcome)
+            best = renewed if renewed.cost < better.cost + ENOUGH else better
+            now = _moved(now, better, best, series)
+        if is_fresh and gained < ENOUGH:
+            return now
+        is_fresh = gained < ENOUGH_CARRIED
+        if is_fresh:
+            now, damping = with_normal(now, series), min(damping, FIRST_DAMPING)
+    return now if is_fresh else with_normal(now, series)
+
+
+def _moved(
+    before: Estimate, after: Estimate, there: Estimate, series: Sequence[Series]
+) -> Estimate:
+    """Return an estimate `there` with the slopes of the one `before`, carried along the step after
+    which it is. The gains there may be others than those of the step.
+    """
+    first, last = before.point, after.point
+    step = Point(last.shared - first.shared, last.own - first.own)
+    columns = carried(before.candidate, before.columns, before.outcome, after.outcome, step)
+    return with_normal(there, series, columns)
 
 
 def reached(estimate: Estimate, series: Sequence[Series], known: Columns) -> Estimate:
-    """Return where some steps lead for which `known` columns of a model near it are good enough."""
-    now, damping = estimate, FIRST_DAMPING
+    """Return where some steps lead for which `known` columns of a model near it are good enough.
+
+    Slopes of what the other model has not are looked for at the start, and again where steps that
+    they are carried along lead nowhere any more.
+    """
+    if not np.isfinite(estimate.cost):
+        return estimate
+    now, damping, is_fresh = with_normal(estimate, series, known), FIRST_DAMPING, True
     early = ROUNDS_OF_ONE if len(series) == 1 else SCREENED_ROUNDS
-    for done in range(1, SCREENED_ROUNDS + 1 if np.isfinite(now.cost) else 0):
-        better, damping = improved(with_normal(now, series, known), series, damping)
-        if better is None:
-            break
-        gained, now = now.cost - better.cost, better
+    for done in range(1, SCREENED_ROUNDS + 1):
+        better, damping = improved(now, series, damping, least=LITTLE)
+        gained = now.cost - better.cost if better else 0.0
+        now = _moved(now, better, better, series) if better else now
         late = LATE_PART * (estimate.cost - now.cost) if done >= early else 0.0
         if gained < max(WORTH_A_ROUND, late):
-            break
+            if is_fresh:
+                break
+            now, damping, is_fresh = with_normal(now, series, known), FIRST_DAMPING, True
+        else:
+            is_fresh = False
     regained = looked_at(now.candidate, series, now.noises, now.point, now.outcome)
     return min(now, regained, key=lambda one: one.cost)
 
 
 def improved(
-    now: Estimate, series: Sequence[Series], damping: float, own_only: bool = False
+    now: Estimate,
+    series: Sequence[Series],
+    damping: float,
+    own_only: bool = False,
+    least: float = NOTHING,
 ) -> tuple[Estimate | None, float]:
-    """Return a better point and the damping that led there; None where there is none."""
+    """Return a better point and the damping that led there; None where there is none.
+
+    A step that is foreseen to gain less than the `least` [nats] is not tried.
+    """
     assert now.normal is not None
     while damping < LARGEST_DAMPING:
         point = stepped(now.candidate, now.point, now.normal, damping, own_only)
+        if foreseen(now.candidate, now.point, now.normal, point) < least:
+            damping *= 10.0
+            continue
         outcome = _run(now.candidate, series, point, now.gains, now.noises)
         cost = outcome.cost() + point.prior(now.candidate)
         if cost < now.cost:

@@ -70,7 +70,7 @@ def scanned(
     best = now
     for level in levels:
         noises = with_levels(now.noises, units, {name: level})
-        tried = looked_at(now.candidate, series, noises, now.point)
+        tried = looked_at(now.candidate, series, noises, now.point, now.outcome)
         best = tried if tried.cost < best.cost else best
     return best
 

@@ -8,9 +8,10 @@ import pytest
 from diagnosis.bench import Bench
 from diagnosis.estimation import estimated, looked_at, outcome_at
 from diagnosis.layers import fitting, shipped_effects
-from diagnosis.normal import STEP, Normal, columns_of, stepped
+from diagnosis.normal import Normal, stepped
 from diagnosis.point import Point, point_of
 from diagnosis.prediction import noises_of
+from diagnosis.slopes import STEP, columns_of
 from tests.diagnosis.test_estimation import TRUTH, bench, recorded
 
 __all__ = ["bench"]
