@@ -30,10 +30,10 @@ MOST_SAMPLES = 5000
 CLOSE = 1e-6
 """A gain that changes by less from sample to sample, of its largest entry, is steady."""
 LIBRARY_FLAGS = (
-    *optimised("O1"),
+    *optimised("Og"),
     *("-fno-semantic-interposition", "-shared", "-fPIC", "-w", "-Dvolatile="),
 )
-"""One file, so that all is inlined; -O2 takes 1.4 times as long to compile and is not faster. No
+"""One file, so that all is inlined; -O1 takes 1.6 times as long to compile and is not faster. No
 calibration tool writes into the page of a predictor: not volatile, a step takes 0.7 of the time."""
 MATHEMATICS = re.compile(r"ha_mathf?\.c")
 FUNCTION = re.compile(r"^(?=\w+ ha_\w+\()", re.MULTILINE)

@@ -93,8 +93,9 @@ def stepped(program: Program) -> Program:
 def module_context(program: Program, page: Page = CONSTANTS) -> dict[str, Any]:
     """Return what the templates of a Program's files read."""
     number = program.number
-    local = locals_of(program)
-    used, turned = usages(program, local, page.holds), turning(program)
+    turned = turning(program)
+    local = locals_of(program, turned)
+    used = usages(program, local, page.holds)
     kinds = {variable.name: c_type(variable, program.number) for variable in program.variables}
     called = {name.removeprefix("call ") for name in reads(program.blocks.values()) if " " in name}
     shared = _work(program, local)

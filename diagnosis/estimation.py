@@ -25,7 +25,11 @@ MOST_ROUNDS = 15
 ENOUGH = 0.3
 """A round that gains less than this [nats] is the last."""
 ENOUGH_CARRIED = 2.0
-"""The same where slopes were carried along steps: then they are looked for again."""
+"""The same where slopes were carried along steps from where they were looked for."""
+WORTH_ANEW = 1.0
+"""Steps that gain more [nats] once slopes were looked for anew have them looked for again."""
+COMPLETIONS = 3
+"""How often they are at most."""
 NOTHING = 0.05
 """A step that is foreseen to gain less than this [nats] is not tried."""
 LITTLE = 1.0
@@ -35,8 +39,10 @@ LARGEST_DAMPING = 1e5
 SCREENED_ROUNDS, ROUNDS_OF_ONE = 8, 4
 """Most rounds while candidates are screened, and those after which, on a single recording, which
 cannot tell chance from physics, a further one has to gain much."""
-LATE_PART = 0.1
-"""What is much: part of all that was gained."""
+LATE_PART, LEAST_PART = 0.1, 0.02
+"""What is much, and what any round has to gain: part of all that was gained."""
+WORTH_SLOPES = 10.0
+"""What screening has to have gained [nats] before slopes are looked for again."""
 WORTH_A_ROUND = 3.0
 """A round of screening that gains less [nats] is the last."""
 
@@ -118,28 +124,58 @@ def estimated(
 ) -> Estimate:
     """Return the point that foresees the recordings best, from `start` [SI].
 
-    Slopes are carried along steps, from `known` ones near the start if there are such; before a fit
-    is done they are looked for again, and steps are sought with these.
+    `known` are slopes of the candidate near the start, if there are such.
     """
+    return completed(followed(candidate, series, noises, start, rounds, known), series, rounds)
+
+
+def followed(
+    candidate: Candidate,
+    series: Sequence[Series],
+    noises: Noises,
+    start: Mapping[str, float] | Point,
+    rounds: int = MOST_ROUNDS,
+    known: Columns | None = None,
+) -> Estimate:
+    """Return where steps lead with slopes that are looked for once, and carried along them."""
     point = start if isinstance(start, Point) else point_of(candidate, len(series), start)
     now = looked_at(candidate, series, noises, point)
-    if not np.isfinite(now.cost):
+    return _walked(with_normal(now, series, known), series, rounds) if _is_known(now) else now
+
+
+def completed(now: Estimate, series: Sequence[Series], rounds: int = MOST_ROUNDS) -> Estimate:
+    """Return a fit that is done: slopes are looked for at its end, and steps sought with these."""
+    if not _is_known(now):
         return now
-    now = with_normal(now, series, known)
-    is_fresh, damping = not known, FIRST_DAMPING
+    for _ in range(COMPLETIONS):
+        now = with_normal(now, series)
+        further = _walked(now, series, rounds, least=ENOUGH)
+        if now.cost - further.cost < WORTH_ANEW:
+            return further
+        now = further
+    return with_normal(now, series)
+
+
+def _is_known(now: Estimate) -> bool:
+    return bool(np.isfinite(now.cost))
+
+
+def _walked(
+    now: Estimate, series: Sequence[Series], rounds: int, least: float = ENOUGH_CARRIED
+) -> Estimate:
+    """Return where steps lead until one gains less than the `least` [nats]."""
+    damping = FIRST_DAMPING
     for _ in range(rounds):
         better, damping = improved(now, series, damping)
-        gained = now.cost - better.cost if better else 0.0
-        if better:
-            renewed = looked_at(candidate, series, noises, better.point, better.outcome)
-            best = renewed if renewed.cost < better.cost + ENOUGH else better
-            now = _moved(now, better, best, series)
-        if is_fresh and gained < ENOUGH:
+        if better is None:
             return now
-        is_fresh = gained < ENOUGH_CARRIED
-        if is_fresh:
-            now, damping = with_normal(now, series), min(damping, FIRST_DAMPING)
-    return now if is_fresh else with_normal(now, series)
+        gained = now.cost - better.cost
+        renewed = looked_at(now.candidate, series, now.noises, better.point, better.outcome)
+        best = renewed if renewed.cost < better.cost + ENOUGH else better
+        now = _moved(now, better, best, series)
+        if gained < least:
+            return now
+    return now
 
 
 def _moved(
@@ -154,29 +190,36 @@ def _moved(
     return with_normal(there, series, columns)
 
 
-def reached(estimate: Estimate, series: Sequence[Series], known: Columns) -> Estimate:
+def reached(estimate: Estimate, series: Sequence[Series], known: Columns, rounds: int) -> Estimate:
     """Return where some steps lead for which `known` columns of a model near it are good enough.
 
     Slopes of what the other model has not are looked for at the start, and again where steps that
-    they are carried along lead nowhere any more.
+    they are carried along lead nowhere any more; they are there already where steps go on.
     """
     if not np.isfinite(estimate.cost):
         return estimate
-    now, damping, is_fresh = with_normal(estimate, series, known), FIRST_DAMPING, True
+    is_fresh = estimate.normal is None
+    now, damping = with_normal(estimate, series, known) if is_fresh else estimate, FIRST_DAMPING
     early = ROUNDS_OF_ONE if len(series) == 1 else SCREENED_ROUNDS
-    for done in range(1, SCREENED_ROUNDS + 1):
+    for done in range(1, rounds + 1):
         better, damping = improved(now, series, damping, least=LITTLE)
         gained = now.cost - better.cost if better else 0.0
         now = _moved(now, better, better, series) if better else now
-        late = LATE_PART * (estimate.cost - now.cost) if done >= early else 0.0
-        if gained < max(WORTH_A_ROUND, late):
-            if is_fresh:
+        part = LATE_PART if done >= early else LEAST_PART
+        whole = estimate.cost - now.cost
+        if gained < max(WORTH_A_ROUND, part * whole):
+            if is_fresh or whole < WORTH_SLOPES:
                 break
             now, damping, is_fresh = with_normal(now, series, known), FIRST_DAMPING, True
         else:
             is_fresh = False
-    regained = looked_at(now.candidate, series, now.noises, now.point, now.outcome)
-    return min(now, regained, key=lambda one: one.cost)
+    return now
+
+
+def regained(now: Estimate, series: Sequence[Series]) -> Estimate:
+    """Return an estimate with gains made where it is, if they are better than those it has."""
+    again = looked_at(now.candidate, series, now.noises, now.point, now.outcome)
+    return min(now, again, key=lambda one: one.cost)
 
 
 def improved(

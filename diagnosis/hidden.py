@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from diagnosis.adequacy import remembers
 from diagnosis.bench import Bench
-from diagnosis.estimation import Estimate, estimated, looked_at, with_normal
+from diagnosis.estimation import Estimate, followed, looked_at, with_normal
 from diagnosis.evidence import Evidence, evidence, inflation
 from diagnosis.freedom import ALL_LEVELS, SMALL_LEVEL, freed, scanned, with_levels
 from diagnosis.layers import Layer, fitting
@@ -214,7 +214,7 @@ def _quieted(bench: Bench, model: Estimate) -> Estimate:
     """Return a model fitted with next to no drift: what it explains without."""
     units = units_of(model.candidate, bench.series, model.noises, model.values(0))
     noises = with_levels(model.noises, units, dict.fromkeys(units, SMALL_LEVEL))
-    return estimated(model.candidate, bench.series, noises, model.point, ROUNDS)
+    return followed(model.candidate, bench.series, noises, model.point, ROUNDS)
 
 
 def _from_silence(bench: Bench, locus: Locus, free: Estimate) -> Locus:

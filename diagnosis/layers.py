@@ -137,11 +137,10 @@ def stepped(
     that effects `brought` at a quarter and at four times their value, and no longer than a time
     that they brought: where a rate is limited, stability is not known beforehand.
     """
-    stable = (
-        _stable(_scaled(given, brought, factor), LONGEST_STEP)
-        for factor in (Fraction(1), FAR, 1 / FAR)
-    )
-    longest = min(*stable, *_times(given, brought))
+    moved = [_scaled(given, brought, factor) for factor in (FAR, 1 / FAR)]
+    others = [one for one in moved if one.parameters != given.parameters]
+    stable = [_stable(one, LONGEST_STEP) for one in (given, *others)]
+    longest = min(*stable, *_times(given, brought), LONGEST_STEP)
     substeps = min(max(fewest, -(-period // longest)), MOST_STEPS)
     parameters = {
         name: dataclasses.replace(parameter, kind="tunable") if name in names else parameter

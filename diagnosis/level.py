@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from diagnosis.candidate import Candidate
-from diagnosis.estimation import Estimate, estimated, looked_at
+from diagnosis.estimation import Estimate, completed, followed, looked_at
 from diagnosis.gains import near, points_of
 from diagnosis.point import Point
 from diagnosis.prediction import Noises, noises_of
@@ -126,13 +126,13 @@ def settled(
 
     `columns` are slopes of the candidate near the start, if there are such.
     """
-    now = estimated(candidate, series, noises, start, known=columns)
+    now = followed(candidate, series, noises, start, known=columns)
     for _ in range(turns):
         moved = levelled(now, series, units)
         if moved.cost >= now.cost:
-            return now
-        now = estimated(candidate, series, moved.noises, moved.point, known=now.columns)
-    return now
+            break
+        now = followed(candidate, series, moved.noises, moved.point, known=now.columns)
+    return completed(now, series)
 
 
 def fitted(
@@ -173,12 +173,13 @@ def first_fit(
 
 def recalibrated(first: Estimate, series: Sequence[Series], units: Mapping[str, float]) -> Estimate:
     """Return the base fitted to recordings from a first fit, with drifts from little to much."""
-    found = []
+    found: list[Estimate] = []
     for level in FIRST_LEVELS:
         drifts = {name: level * unit for name, unit in units.items()}
         known = dataclasses.replace(first.noises, drifts=drifts)
-        start = first.point
-        found.append(settled(first.candidate, series, known, start, units, columns=first.columns))
+        near = min(found, key=lambda one: one.cost, default=first)
+        start, columns = near.point, near.columns
+        found.append(settled(first.candidate, series, known, start, units, columns=columns))
     return min(found, key=lambda one: one.cost)
 
 

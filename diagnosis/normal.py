@@ -41,18 +41,18 @@ def normal_of(candidate: Candidate, outcome: Outcome, columns: Columns) -> Norma
     known = np.isfinite(innovation)
     far = np.maximum(np.abs(innovation) / outcome.limits, 1.0)
     weight = np.where(known, 1.0 / outcome.variances / far, 0.0)
-    missed = np.where(known, innovation, 0.0)
-    jacobian = np.array([columns[name] for name in candidate.names])
-    count = len(jacobian)
-    jacobian = jacobian.reshape(count, *innovation.shape)
+    root = np.sqrt(weight)
+    errors = np.where(known, innovation * root, 0.0).reshape(-1)
+    count, seen = len(candidate.names), innovation.shape[1]
+    changes = np.empty((count, innovation.size))
+    for name, row in zip(candidate.names, changes, strict=True):
+        np.multiply(columns[name], root, out=row.reshape(innovation.shape))
     a = np.zeros((len(blocks), count, count))
     g = np.zeros((len(blocks), count))
     for place, block in enumerate(blocks):
-        error = missed[block.part].reshape(-1)
-        changes = jacobian[:, block.part].reshape(count, len(error))
-        weighted = changes * weight[block.part].reshape(-1)
-        a[place] = weighted @ changes.T
-        g[place] = weighted @ error
+        part = slice(seen * block.part.start, seen * block.part.stop)
+        a[place] = changes[:, part] @ changes[:, part].T
+        g[place] = changes[:, part] @ errors[part]
     of, fold = [np.array([getattr(b, name) for b in blocks]) for name in ("recording", "fold")]
     return Normal(a, g, is_own(candidate), of, fold)
 
@@ -89,9 +89,8 @@ def stepped(
 def foreseen(candidate: Candidate, now: Point, normal: Normal, there: Point) -> float:
     """Return what the normal equations say that a step gains [nats], priors counted."""
     step = np.where(normal.own, (there.own - now.own)[normal.of], there.shared - now.shared)
-    slope = float(np.sum(normal.g * step))
-    bend = float(np.einsum("bi,bij,bj->", step, normal.a, step, optimize=True))
-    return now.prior(candidate) - there.prior(candidate) - slope - 0.5 * bend
+    slope = normal.g + 0.5 * (normal.a @ step[:, :, None])[:, :, 0]
+    return now.prior(candidate) - there.prior(candidate) - float(np.sum(slope * step))
 
 
 def _solved(point: Point, normal: Normal, damping: float, held: NDArray[np.bool_]) -> Point:

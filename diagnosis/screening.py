@@ -12,7 +12,14 @@ import numpy as np
 from diagnosis.adaptation import turned
 from diagnosis.bench import Bench
 from diagnosis.candidate import Candidate
-from diagnosis.estimation import Estimate, looked_at, reached, seen_at
+from diagnosis.estimation import (
+    SCREENED_ROUNDS,
+    Estimate,
+    looked_at,
+    reached,
+    regained,
+    seen_at,
+)
 from diagnosis.layers import Layer
 from diagnosis.point import Point, extended
 from diagnosis.prediction import Outcome
@@ -26,6 +33,8 @@ HINT = 2.0
 """Nats that a candidate gains at least, if it is to be looked at further."""
 STARTS = 2
 """Starts of a candidate from which steps are made, the best ones."""
+RACE = 3
+"""Steps from each of them; then the better one goes on alone."""
 Known = tuple[Layer, Candidate]
 
 
@@ -153,10 +162,13 @@ def _reached(part: Part, candidate: Candidate, starts: Sequence[Point]) -> Estim
         near = here.outcome if here.outcome.is_whole else near
         found.append(turned(here, series))
     found.sort(key=lambda one: one.cost)
-    reach = [reached(here, series, columns) for here in found[:STARTS]]
-    best = min(reach, key=lambda one: one.cost)
+    race = [reached(here, series, columns, RACE) for here in found[:STARTS]]
+    best = min(race, key=lambda one: one.cost)
+    best = regained(reached(best, series, columns, SCREENED_ROUNDS - RACE), series)
     again = turned(best, series)
-    return reached(again, series, columns) if again.cost < best.cost - HINT else best
+    if again.cost > best.cost - HINT:
+        return best
+    return regained(reached(again, series, columns, SCREENED_ROUNDS), series)
 
 
 def starts_of(candidate: Candidate, base: Mapping[str, float]) -> list[dict[str, float]]:
