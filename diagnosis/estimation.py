@@ -28,8 +28,8 @@ ENOUGH_CARRIED = 2.0
 """The same where slopes were carried along steps from where they were looked for."""
 WORTH_ANEW = 1.0
 """Steps that gain more [nats] once slopes were looked for anew have them looked for again."""
-COMPLETIONS = 3
-"""How often they are at most."""
+COMPLETIONS = 12
+"""How often they are at most: a tyre's mode had not come to rest after three."""
 NOTHING = 0.05
 """A step that is foreseen to gain less than this [nats] is not tried."""
 LITTLE = 1.0
@@ -39,8 +39,8 @@ LARGEST_DAMPING = 1e5
 SCREENED_ROUNDS, ROUNDS_OF_ONE = 8, 4
 """Most rounds while candidates are screened, and those after which, on a single recording, which
 cannot tell chance from physics, a further one has to gain much."""
-LATE_PART, LEAST_PART = 0.1, 0.02
-"""What is much, and what any round has to gain: part of all that was gained."""
+LATE_PART = 0.1
+"""What is much: part of all that was gained."""
 WORTH_SLOPES = 10.0
 """What screening has to have gained [nats] before slopes are looked for again."""
 WORTH_A_ROUND = 3.0
@@ -205,9 +205,9 @@ def reached(estimate: Estimate, series: Sequence[Series], known: Columns, rounds
         better, damping = improved(now, series, damping, least=LITTLE)
         gained = now.cost - better.cost if better else 0.0
         now = _moved(now, better, better, series) if better else now
-        part = LATE_PART if done >= early else LEAST_PART
         whole = estimate.cost - now.cost
-        if gained < max(WORTH_A_ROUND, part * whole):
+        late = LATE_PART * whole if done >= early else 0.0
+        if gained < max(WORTH_A_ROUND, late):
             if is_fresh or whole < WORTH_SLOPES:
                 break
             now, damping, is_fresh = with_normal(now, series, known), FIRST_DAMPING, True
