@@ -41,8 +41,6 @@ SCREENED_ROUNDS, ROUNDS_OF_ONE = 8, 4
 cannot tell chance from physics, a further one has to gain much."""
 LATE_PART = 0.1
 """What is much: part of all that was gained."""
-WORTH_SLOPES = 10.0
-"""What screening has to have gained [nats] before slopes are looked for again."""
 WORTH_A_ROUND = 3.0
 """A round of screening that gains less [nats] is the last."""
 
@@ -193,26 +191,21 @@ def _moved(
 def reached(estimate: Estimate, series: Sequence[Series], known: Columns, rounds: int) -> Estimate:
     """Return where some steps lead for which `known` columns of a model near it are good enough.
 
-    Slopes of what the other model has not are looked for at the start, and again where steps that
-    they are carried along lead nowhere any more; they are there already where steps go on.
+    Slopes of what the other model has not are looked for at each step: carried ones did not find
+    unequal shafts, which begin far from where they fit.
     """
-    if not np.isfinite(estimate.cost):
+    if not _is_known(estimate):
         return estimate
-    is_fresh = estimate.normal is None
-    now, damping = with_normal(estimate, series, known) if is_fresh else estimate, FIRST_DAMPING
+    now, damping = estimate, FIRST_DAMPING
     early = ROUNDS_OF_ONE if len(series) == 1 else SCREENED_ROUNDS
     for done in range(1, rounds + 1):
-        better, damping = improved(now, series, damping, least=LITTLE)
-        gained = now.cost - better.cost if better else 0.0
-        now = _moved(now, better, better, series) if better else now
-        whole = estimate.cost - now.cost
-        late = LATE_PART * whole if done >= early else 0.0
+        better, damping = improved(with_normal(now, series, known), series, damping, least=LITTLE)
+        if better is None:
+            break
+        gained, now = now.cost - better.cost, better
+        late = LATE_PART * (estimate.cost - now.cost) if done >= early else 0.0
         if gained < max(WORTH_A_ROUND, late):
-            if is_fresh or whole < WORTH_SLOPES:
-                break
-            now, damping, is_fresh = with_normal(now, series, known), FIRST_DAMPING, True
-        else:
-            is_fresh = False
+            break
     return now
 
 

@@ -33,7 +33,7 @@ HINT = 2.0
 """Nats that a candidate gains at least, if it is to be looked at further."""
 STARTS = 2
 """Starts of a candidate from which steps are made, the best ones."""
-RACE = 3
+RACE = 6
 """Steps from each of them; then the better one goes on alone."""
 Known = tuple[Layer, Candidate]
 
@@ -137,7 +137,7 @@ def _on_all(bench: Bench, some: Part, base: Estimate, hint: _Hint) -> Estimate:
         return hint.found
     candidate = hint.found.candidate
     whole = Part(list(range(len(bench.series))), bench, base)
-    starts = [hint.point, *([] if hint.is_seen else _starts(whole, candidate))]
+    starts = [hint.point, *_starts(whole, candidate)]
     make = partial(_reached, whole, candidate, starts)
     given = [base.candidate, base.point, base.noises, base.columns, *starts]
     return bench.kept("screened", candidate, given, make)
