@@ -6,8 +6,8 @@ Both have the same bits. What did the work is told, with the reason where it is 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cache, partial
 from contextlib import suppress
+from functools import cache, partial
 
 from codegen.build import BuildError
 from codegen.library import library_of
