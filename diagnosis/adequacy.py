@@ -19,8 +19,10 @@ from diagnosis.layers import DRIFT, Layer, walks
 from diagnosis.level import units_of
 from diagnosis.location import places_of_freedom
 from diagnosis.naming import place_path
-from diagnosis.point import extended
+from diagnosis.normal import solution
+from diagnosis.point import bounds_of, extended
 from diagnosis.selection import Selection
+from language.effect import own_names
 from language.problem import SpecError
 
 LEFT_PART = 0.5
@@ -35,6 +37,10 @@ MEMORY_PART = 0.25
 memory, and a form that is not quite right leaves little of it."""
 TYPICAL_PART = 0.2
 """The same for the recordings, for which it is the median: a few may be far from the others."""
+
+STRAINED, STRAINED_PART = 60.0, 0.02
+"""Nats that accepted effects would gain beyond the ranges of their own parameters, and part of what
+they gained, from which on they are pulled out of these: what imitates another effect is."""
 
 PILED = 0.5
 """Part of what an effect gained that a further one gains at the same place, where neither is it."""
@@ -88,6 +94,34 @@ def piles_up(selection: Selection) -> bool:
             return True
         firsts.setdefault(path, gained)
     return False
+
+
+def is_strained(selection: Selection) -> bool:
+    """Tell whether accepted effects are pulled out of the ranges of their own parameters."""
+    gained = sum(tried.evidence.train for tried in selection.accepted if tried.evidence)
+    return strain(selection) > max(STRAINED, STRAINED_PART * gained)
+
+
+def strain(selection: Selection) -> float:
+    """Return what accepted effects would gain [nats] if their own parameters had no ranges, as the
+    normal equations foresee it; parameters of the base stay where they are at a bound.
+    """
+    model = selection.model
+    if model.normal is None:
+        return 0.0
+    candidate, shared = model.candidate, ~model.normal.own
+    brought = {
+        tried.layer.named(name)
+        for tried in selection.accepted
+        for name in own_names(tried.layer.effect.body)
+    }
+    low, high = bounds_of(candidate).T
+    at_end = (model.point.shared <= low) | (model.point.shared >= high)
+    is_brought = np.array([name in brought for name in candidate.names], dtype=bool)
+    free = shared & (is_brought | ~at_end)
+    slope = model.normal.g.sum(axis=0)[free] + model.point.shared[free]
+    matrix = model.normal.a.sum(axis=0)[np.ix_(free, free)] + np.eye(int(free.sum()))
+    return 0.5 * float(slope @ solution(matrix, slope))
 
 
 def refused(selection: Selection) -> Selection:

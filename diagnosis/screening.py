@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from typing import TypeVar
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from diagnosis.estimation import (
 from diagnosis.layers import Layer
 from diagnosis.point import Point, extended
 from diagnosis.prediction import Outcome
+from diagnosis.series import Series
 
 MOST_SCREENED = 5
 """Recordings that candidates are screened on first, spread over all."""
@@ -33,9 +35,15 @@ HINT = 2.0
 """Nats that a candidate gains at least, if it is to be looked at further."""
 STARTS = 2
 """Starts of a candidate from which steps are made, the best ones."""
-RACE = 6
+RACE = 2
 """Steps from each of them; then the better one goes on alone."""
+STRONG = 300.0
+"""Nats that one candidate gains after these steps from which on others are held against it."""
+BEHIND = 0.02
+"""Part of what the best one gains that another has to gain to go on: none was seen to overtake one
+so far ahead, and what is weak is looked for again beside what is strong."""
 Known = tuple[Layer, Candidate]
+One = TypeVar("One")
 
 
 @dataclass(frozen=True)
@@ -64,21 +72,37 @@ class Part:
 
 def promises(bench: Bench, base: Estimate, known: Sequence[Known], least: float) -> list[Promise]:
     """Return what candidates promise, the best first; one that gains `least` [nats] is looked at on
-    all recordings, unless many gain more.
+    all recordings, unless many gain more or one much more.
     """
-    some = part_of(bench, base)
-    hints = [(layer, _hinted(bench, some, candidate, base, least)) for layer, candidate in known]
-    hints.sort(key=lambda one: -one[1].gain)
-    found: list[Promise] = []
+    some, fair = part_of(bench, base), _fair(base, bench.series)
+    begun = [(layer, _begun(some, candidate)) for layer, candidate in known]
+    ahead, behind = _apart(begun, lambda one: some.base.cost - one.cost)
+    hints = [(layer, _hinted(bench, some, one, base, least)) for layer, one in ahead]
+    near, far = _apart(hints, lambda hint: hint.gain)
+    found = [Promise(layer, some.base.cost - one.cost) for layer, one in behind]
+    found += [Promise(layer, hint.gain) for layer, hint in far]
     places = {True: 0, False: 0}
-    for layer, hint in hints:
+    for layer, hint in sorted(near, key=lambda one: -one[1].gain):
         places[hint.is_seen] += 1
         start = None
         if hint.gain >= least and places[hint.is_seen] <= MOST_ON_ALL:
             start = _on_all(bench, some, base, hint)
-        gain = hint.gain if start is None else base.cost - start.cost
+        gain = hint.gain if start is None else fair - start.cost
         found.append(Promise(layer, gain, start))
     return sorted(found, key=lambda one: -one.gain)
+
+
+def _apart(
+    some: Sequence[tuple[Layer, One]], gain: Callable[[One], float]
+) -> tuple[list[tuple[Layer, One]], list[tuple[Layer, One]]]:
+    """Return candidates that are near the best one by what they `gain` [nats], and the others."""
+    gains = [gain(one) for _, one in some]
+    most = max(gains, default=0.0)
+    least = BEHIND * most if most > STRONG else -np.inf
+    return (
+        [pair for pair, each in zip(some, gains, strict=True) if each >= least],
+        [pair for pair, each in zip(some, gains, strict=True) if not each >= least],
+    )
 
 
 def part_of(bench: Bench, base: Estimate) -> Part:
@@ -92,7 +116,15 @@ def part_of(bench: Bench, base: Estimate) -> Part:
     columns = {name: np.concatenate([c[p] for p in parts]) for name, c in base.columns.items()}
     seen = seen_at(base, series, Point(base.point.shared, base.point.own[rows]))
     own = dataclasses.replace(bench, series=series)
-    return Part(rows, own, dataclasses.replace(seen, columns=columns))
+    cost = _fair(seen, series)
+    return Part(rows, own, dataclasses.replace(seen, cost=cost, columns=columns))
+
+
+def _fair(base: Estimate, series: Sequence[Series]) -> float:
+    """Return the cost [nats] of a base with gains made where it is, as those of candidates are: the
+    ones that it was left with may fit better by accident.
+    """
+    return max(base.cost, looked_at(base.candidate, series, base.noises, base.point).cost)
 
 
 @dataclass(frozen=True)
@@ -107,12 +139,21 @@ class _Hint:
     is_seen: bool = True
 
 
-def _hinted(bench: Bench, some: Part, candidate: Candidate, base: Estimate, least: float) -> _Hint:
+def _begun(some: Part, candidate: Candidate) -> Estimate:
+    """Return a candidate few steps from the best of its starts, on some recordings."""
+    make = partial(_raced, some, candidate, _starts(some, candidate))
+    base = some.base
+    given = [base.candidate, base.point, base.noises, base.columns]
+    return some.bench.kept("begun", candidate, given, make)
+
+
+def _hinted(bench: Bench, some: Part, begun: Estimate, base: Estimate, least: float) -> _Hint:
     """Return what some recordings say of a candidate; where that is nothing, what all say of where
     it starts and of where it was led to: some show themselves in few recordings alone.
     """
-    make = partial(_reached, some, candidate, _starts(some, candidate))
-    given = [some.base.candidate, some.base.point, some.base.noises, some.base.columns]
+    candidate = begun.candidate
+    make = partial(_gone_on, some, begun)
+    given = [base.candidate, base.columns, begun.point, begun.noises, begun.gains]
     found = some.bench.kept("hinted", candidate, given, make)
     gain = some.base.cost - found.cost
     whole = extended(candidate, base.candidate, base.point, {})
@@ -150,11 +191,16 @@ def _starts(part: Part, candidate: Candidate) -> list[Point]:
 
 
 def _reached(part: Part, candidate: Candidate, starts: Sequence[Point]) -> Estimate:
-    """Return a candidate some steps from the best of some starts, on a part of the recordings.
+    """Return a candidate some steps from the best of some starts, on a part of the recordings."""
+    return _gone_on(part, _raced(part, candidate, starts))
+
+
+def _raced(part: Part, candidate: Candidate, starts: Sequence[Point]) -> Estimate:
+    """Return a candidate few steps from the best of some starts.
 
     How the base's parameters act is taken from the base.
     """
-    series, columns = part.bench.series, part.base.columns
+    series = part.bench.series
     found: list[Estimate] = []
     near: Outcome | None = None
     for point in starts:
@@ -162,9 +208,14 @@ def _reached(part: Part, candidate: Candidate, starts: Sequence[Point]) -> Estim
         near = here.outcome if here.outcome.is_whole else near
         found.append(turned(here, series))
     found.sort(key=lambda one: one.cost)
-    race = [reached(here, series, columns, RACE) for here in found[:STARTS]]
-    best = min(race, key=lambda one: one.cost)
-    best = regained(reached(best, series, columns, SCREENED_ROUNDS - RACE), series)
+    race = [reached(here, series, part.base.columns, RACE) for here in found[:STARTS]]
+    return min(race, key=lambda one: one.cost)
+
+
+def _gone_on(part: Part, begun: Estimate) -> Estimate:
+    """Return a candidate some steps further, its phases turned again where that is better."""
+    series, columns = part.bench.series, part.base.columns
+    best = regained(reached(begun, series, columns, SCREENED_ROUNDS - RACE), series)
     again = turned(best, series)
     if again.cost > best.cost - HINT:
         return best

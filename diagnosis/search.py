@@ -24,7 +24,7 @@ POOR = 2.0
 """Innovations that count as one, from which on a fit is no good."""
 HINT_PART = 0.1
 """Part of what a candidate has to promise that it gains on some recordings, to be seen on all."""
-HOPELESS = 0.05
+HOPELESS = 0.25
 """A candidate that promises less than this part of what another has gained is not fitted."""
 PLAIN = 2.5
 """Nats that each number of an effect has to gain beyond its price."""
