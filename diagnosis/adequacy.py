@@ -25,7 +25,7 @@ from diagnosis.selection import Selection
 from language.effect import own_names
 from language.problem import SpecError
 
-LEFT_PART = 0.5
+LEFT_PART = 0.2
 """Part of what was gained that a freedom may gain beside it: forms differ, and noise has colour.
 
 An error of an output is none of them: a sensor follows whatever the model gets wrong."""
