@@ -17,7 +17,7 @@ from diagnosis.candidate import Candidate
 from diagnosis.gains import gains_of
 from diagnosis.normal import Normal, foreseen, normal_of, stepped
 from diagnosis.point import Point, all_values_at, point_of, values_at
-from diagnosis.prediction import Gains, Noises, Outcome, predicted
+from diagnosis.prediction import Gains, Innovations, Noises, Outcome, foreseen_at, predicted
 from diagnosis.series import Series
 from diagnosis.slopes import Columns, carried, columns_of
 
@@ -101,8 +101,8 @@ def with_normal(
     `known` are columns of a model near it, which are not looked for again.
     """
 
-    def run(point: Point) -> Outcome:
-        return _run(estimate.candidate, series, point, estimate.gains, estimate.noises)
+    def run(points: Sequence[Point]) -> list[Innovations]:
+        return innovations_at(estimate, series, points)
 
     candidate, outcome = estimate.candidate, estimate.outcome
     known = known or {}
@@ -251,6 +251,15 @@ def _run(
 def outcome_at(estimate: Estimate, series: Sequence[Series], point: Point) -> Outcome:
     """Return how a model foresees some recordings at a point, with the gains of the estimate."""
     return _run(estimate.candidate, series, point, estimate.gains, estimate.noises)
+
+
+def innovations_at(
+    estimate: Estimate, series: Sequence[Series], points: Sequence[Point]
+) -> list[Innovations]:
+    """Return what a model does not foresee at some points, with the gains of the estimate."""
+    candidate, gains = estimate.candidate, estimate.gains
+    values = [all_values_at(candidate, point)[: len(series)] for point in points]
+    return foreseen_at(candidate, series, values, gains, estimate.noises.limits) if points else []
 
 
 def seen_at(estimate: Estimate, series: Sequence[Series], point: Point) -> Estimate:

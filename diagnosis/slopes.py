@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.candidate import Candidate
 from diagnosis.point import Point, is_own
-from diagnosis.prediction import Outcome
+from diagnosis.prediction import Innovations, Outcome
 
 Reals = NDArray[np.float64]
 Columns = Mapping[str, Reals]
@@ -17,6 +17,8 @@ Columns = Mapping[str, Reals]
 MOST = 1e100
 """Bound of a change: a run that leaves all bounds tells no more than its sign, and its coordinate
 stays where it is."""
+Run = Callable[[Sequence[Point]], Sequence[Innovations]]
+"""What is not foreseen at some points."""
 STEP, LEAST_STEP = 2e-3, 1e-7
 """Change of a coordinate for a difference, in standard deviations of its prior."""
 FAR = 0.05
@@ -32,28 +34,45 @@ def columns_of(
     candidate: Candidate,
     point: Point,
     outcome: Outcome,
-    run: Callable[[Point], Outcome],
+    run: Run,
     names: Iterable[str],
 ) -> Columns:
-    """Return how innovations change with some coordinates, by forward differences of `run`."""
+    """Return how innovations change with some coordinates, by forward differences of `run`.
+
+    Those over the wide step are run together, then the narrower ones of coordinates that need them.
+    """
     scale = np.sqrt(outcome.variances)
 
-    def difference(k: int, step: float) -> tuple[Reals, float]:
-        ahead = point.moved(candidate, k, step)
-        size = float(ahead.shared[k] - point.shared[k])
-        changes = run(ahead).joined - outcome.joined
-        return _known(changes / size), _far(changes / scale)
+    def differences(steps: Mapping[int, float]) -> dict[int, tuple[Reals, float]]:
+        ahead = [point.moved(candidate, k, step) for k, step in steps.items()]
+        sizes = [float(p.shared[k] - point.shared[k]) for k, p in zip(steps, ahead, strict=True)]
+        changes = (there.joined - outcome.joined for there in run(ahead))
+        return {
+            k: (_known(change / size), _far(change / scale))
+            for k, size, change in zip(steps, sizes, changes, strict=True)
+        }
 
-    def slope(k: int) -> Reals:
-        step = STEP
-        wide, far = difference(k, step)
-        narrow = wide
-        while FAR < far < np.inf and step > LEAST_STEP:
-            step = max(step * FAR / far / 2.0, LEAST_STEP)
-            narrow, far = difference(k, step)
-        return wide if _is_alike(wide, narrow) else narrow
+    steps = {candidate.names.index(name): STEP for name in names}
+    wide = differences(steps)
+    narrow = dict(wide)
+    while steps := {
+        k: _narrower(step, narrow[k][1])
+        for k, step in steps.items()
+        if _is_too_far(step, narrow[k][1])
+    }:
+        narrow |= differences(steps)
+    return {
+        candidate.names[k]: there if _is_alike(there, narrow[k][0]) else narrow[k][0]
+        for k, (there, _) in wide.items()
+    }
 
-    return {name: slope(candidate.names.index(name)) for name in names}
+
+def _is_too_far(step: float, far: float) -> bool:
+    return FAR < far < np.inf and step > LEAST_STEP
+
+
+def _narrower(step: float, far: float) -> float:
+    return max(step * FAR / far / 2.0, LEAST_STEP)
 
 
 def _is_alike(first: Reals, second: Reals) -> bool:
