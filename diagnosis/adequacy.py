@@ -18,7 +18,7 @@ from diagnosis.freedom import WIDE_LEVELS, with_levels
 from diagnosis.layers import DRIFT, Layer, walks
 from diagnosis.level import units_of
 from diagnosis.location import places_of_freedom
-from diagnosis.naming import place_path
+from diagnosis.naming import covariance_of, place_path
 from diagnosis.normal import solution
 from diagnosis.point import bounds_of, extended
 from diagnosis.selection import Selection
@@ -41,6 +41,13 @@ TYPICAL_PART = 0.2
 STRAINED, STRAINED_PART = 60.0, 0.02
 """Nats that accepted effects would gain beyond the ranges of their own parameters, and part of what
 they gained, from which on they are pulled out of these: what imitates another effect is."""
+
+LOUD = 3.0
+"""Innovations that count as one from which on a model is inadequate, however much they did before:
+a sensor's lag that imitates its delay takes up nine tenths of what they remember."""
+
+PLAINLY = 5.0
+"""Nats that the recordings must tell an effect from what it is where it is a plainer one."""
 
 PILED = 0.5
 """Part of what an effect gained that a further one gains at the same place, where neither is it."""
@@ -75,6 +82,8 @@ def remembers_mostly(bench: Bench, selection: Selection) -> bool:
 
     Where a form is not quite right some recordings show it that drive it far.
     """
+    if inflation(selection.model, bench.series) > LOUD:
+        return True
     if not remembers(bench, selection):
         return False
     before, after = (inflations(one, bench.series) for one in (selection.base, selection.model))
@@ -100,6 +109,24 @@ def is_strained(selection: Selection) -> bool:
     """Tell whether accepted effects are pulled out of the ranges of their own parameters."""
     gained = sum(tried.evidence.train for tried in selection.accepted if tried.evidence)
     return strain(selection) > max(STRAINED, STRAINED_PART * gained)
+
+
+def is_plainer(bench: Bench, selection: Selection) -> bool:
+    """Tell whether an accepted effect may as well be a plainer one: friction that is said to rise
+    at rest, and does not.
+    """
+    model = selection.model
+    if model.normal is None:
+        return False
+    covariance, names = covariance_of(model)
+    shrink = 1.0 / inflation(model, bench.series)
+    for one, z in zip(model.candidate.uncertain, model.point.shared, strict=True):
+        if one.plain is not None and not one.per_recording:
+            k = names.index(one.name)
+            apart = float(z) - one.coordinate(one.plain)
+            if shrink * apart**2 / (2.0 * covariance[k, k]) < PLAINLY:
+                return True
+    return False
 
 
 def strain(selection: Selection) -> float:

@@ -6,7 +6,14 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from diagnosis.adequacy import is_inadequate, is_strained, piles_up, refused, remembers_mostly
+from diagnosis.adequacy import (
+    is_inadequate,
+    is_plainer,
+    is_strained,
+    piles_up,
+    refused,
+    remembers_mostly,
+)
 from diagnosis.alone import LEFT_OUT, SIMULATED, alone, forgets
 from diagnosis.bench import Bench
 from diagnosis.bootstrap import bootstrapped, kept_thresholds
@@ -108,7 +115,7 @@ def _adequate(
         return says, selection
     is_heard = says == "effect" and not is_still(selection, units)
     is_other = is_other or is_strained(selection) or piles_up(selection)
-    is_other = is_other or remembers_mostly(bench, selection)
+    is_other = is_other or remembers_mostly(bench, selection) or is_plainer(bench, selection)
     if not is_other and not (is_heard and is_inadequate(bench, selection, needed)):
         return says, selection
     names = ", ".join(tried.layer.id for tried in selection.accepted)
