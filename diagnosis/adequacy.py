@@ -42,9 +42,9 @@ STRAINED, STRAINED_PART = 60.0, 0.02
 """Nats that accepted effects would gain beyond the ranges of their own parameters, and part of what
 they gained, from which on they are pulled out of these: what imitates another effect is."""
 
-LOUD = 3.0
-"""Innovations that count as one from which on a model is inadequate, however much they did before:
-a sensor's lag that imitates its delay takes up nine tenths of what they remember."""
+LOUD, LOUD_PART = 3.0, 0.05
+"""Innovations that count as one from which on those of a model are loud, and the typical part that
+an adequate one may then leave: a sensor's lag that imitates its delay leaves a tenth."""
 
 PLAINLY = 5.0
 """Nats that the recordings must tell an effect from what it is where it is a plainer one."""
@@ -82,14 +82,13 @@ def remembers_mostly(bench: Bench, selection: Selection) -> bool:
 
     Where a form is not quite right some recordings show it that drive it far.
     """
-    if inflation(selection.model, bench.series) > LOUD:
-        return True
-    if not remembers(bench, selection):
+    is_loud = inflation(selection.model, bench.series) > LOUD
+    if not is_loud and not remembers(bench, selection):
         return False
     before, after = (inflations(one, bench.series) for one in (selection.base, selection.model))
     heard = before > MEMORY
     left = (after[heard] - 1.0) / (before[heard] - 1.0)
-    return not heard.any() or float(np.median(left)) > TYPICAL_PART
+    return not heard.any() or float(np.median(left)) > (LOUD_PART if is_loud else TYPICAL_PART)
 
 
 def piles_up(selection: Selection) -> bool:
