@@ -142,7 +142,7 @@ class Lanes:
 
 def flat(name: str) -> str:
     """Return the member of a name: its group and itself."""
-    return name.replace(".", "_")
+    return name.replace(".", "_").replace(" ", "_")
 
 
 def abreast(program: Program, looks: list[tuple[int, str]]) -> dict[str, Any] | None:

@@ -117,6 +117,7 @@ def module_context(program: Program, page: Page = CONSTANTS) -> dict[str, Any]:
         "work": [field_of(variable, number) for variable in shared],
         "scratch": scratch and _scratch(program, scratch, kinds),
         "work_type": _work_type(program, page, scratch),
+        "calls": {block: f"{block}({', '.join(used[block].parameters)})" for block in used},
         "blocks": [block for block in blocks if block["name"] not in ENTRIES],
         "entries": {block["name"]: block for block in blocks if block["name"] in ENTRIES},
         "keywords": [

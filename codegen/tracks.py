@@ -13,16 +13,21 @@ from typing import Any
 
 from codegen.abreast import LANES, Kind, Lanes, NotAbreast, flat
 from codegen.expression import LIBRARY
-from codegen.leap import DONE, LEAP, RECORD, leaping
+from codegen.leap import DONE, LEAP, RECORD, THROUGH, leaping
+from codegen.member import PAGE as MODULE_PAGE
 from codegen.names import CNames, c_member
-from codegen.source import stepped
+from codegen.source import c_program, module_context, stepped
 from codegen.statement import wrapped
 from language.functions import FUNCTIONS
-from language.operation import Assign, Block, Branch, Op, Ref
+from language.operation import Assign, Block, Branch, Call, Expr, Op, Ref
 from language.program import ModeInfo, Program
+from language.substitution import with_expressions, with_parts
+from language.traversal import block_writes
 
 PAGE = ("derived.", "calibration.")
 """What stays in all steps."""
+REAL_OF = "real_of "
+"""Before the name of a whole number: that as a real."""
 WIDTH = 96
 OVER_VECTORS = ("abs", "min", "max", "clip", "sign", "pow2")
 """Operations that the template has for all lanes at once."""
@@ -37,7 +42,8 @@ def tracks(program: Program, columns: tuple[str, ...], seen: tuple[str, ...]) ->
     if program.number != "float64" or len(program.mode_variables()) != 1:
         return None
     made = leaping(stepped(program))
-    if RECORD in made.blocks:
+    records = _records(program) if RECORD in made.blocks else {"record": ""}
+    if records is None:
         return None
     types = {one.name: one.type for one in made.variables}
     types |= {one.name: one.type for one in made.constants if not one.items}
@@ -46,13 +52,25 @@ def tracks(program: Program, columns: tuple[str, ...], seen: tuple[str, ...]) ->
         for name, kind in types.items()
         if kind in ("real", "truth")
     }
+    kinds |= {REAL_OF + name: "real" for name, kind in types.items() if kind == "whole"}
     fixed = frozenset(name for name in kinds if name.startswith("constant."))
     lanes = Lanes(made, kinds, fixed)
     leaps = [leap for mode in made.modes for leap in _leaps(lanes, mode)]
     try:
-        return _context(lanes, leaps, columns, seen) if leaps else None
+        return _context(lanes, leaps, columns, seen) | records if leaps else None
     except NotAbreast:
         return None
+
+
+def _records(program: Program) -> dict[str, Any] | None:
+    """Return how a lane records by itself what a delay reads, and goes through events behind that;
+    None where the values of a step are not in the instance.
+    """
+    context = module_context(c_program(program), MODULE_PAGE)
+    calls, scratch = context["calls"], context["scratch"]
+    if THROUGH not in calls or not (scratch and scratch["is_in_instance"]):
+        return None
+    return {"record": calls[RECORD], "through": calls[THROUGH], "work_type": context["work_type"]}
 
 
 def _context(
@@ -74,6 +92,7 @@ def _context(
     kept = [name for name in lanes.touched if not name.startswith((*PAGE, "input."))]
     own = [n for n in kept if n in written or n.startswith(("state.", "before."))]
     page = [name for name in lanes.touched if name.startswith(PAGE)]
+    recorded = set(block_writes(lanes.program.blocks.get(RECORD, ())))
     functions = dict(reversed(list(_functions(lanes))))
     return {
         "lanes": LANES,
@@ -81,6 +100,7 @@ def _context(
         "page": _places(lanes, page),
         "read": _places(lanes, kept),
         "written": _places(lanes, own),
+        "recorded": _places(lanes, [n for n in kept if n.removeprefix(REAL_OF) in recorded]),
         "inputs": [(flat(f"input.{n}"), flat(f"before.{n}"), _kind(lanes, n), n) for n in inputs],
         "states": states,
         "seen": looks,
@@ -101,7 +121,7 @@ def _kind(lanes: Lanes, name: str) -> Kind:
 def _places(lanes: Lanes, names: list[str]) -> list[tuple[str, Kind, str]]:
     """Return members with what they are and where a single instance has them."""
     place = CNames(lanes.program)
-    return [(flat(name), lanes.touched[name], place(name)) for name in names]
+    return [(flat(name), lanes.touched[name], place(name.removeprefix(REAL_OF))) for name in names]
 
 
 @dataclass
@@ -125,6 +145,7 @@ def _leaps(lanes: Lanes, mode: ModeInfo) -> Iterator[_Leap]:
     block = lanes.program.blocks.get(f"{LEAP}_{mode.name}")
     if block is None:
         return
+    block = with_expressions(block, _real)
     lanes.named.clear()
     leap, touched = _Leap(mode.number, c_member(f"mode.{mode.name}")), dict(lanes.touched)
     try:
@@ -133,6 +154,14 @@ def _leaps(lanes: Lanes, mode: ModeInfo) -> Iterator[_Leap]:
         lanes.touched = touched
         return
     yield leap
+
+
+def _real(expr: Expr) -> Expr:
+    """Return an expression that reads whole numbers as the reals that they are."""
+    match expr:
+        case Call("real", (Ref(name),)):
+            return Ref(REAL_OF + name)
+    return with_parts(expr, _real)
 
 
 def _follow(lanes: Lanes, leap: _Leap, ops: Block) -> None:

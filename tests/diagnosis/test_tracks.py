@@ -29,7 +29,8 @@ UNKNOWN = 0.2
 FIRST = 20
 LAID = {
     "": True,
-    "actuator_delay@T_em": False,
+    "actuator_delay@T_em": True,
+    "backlash@half_shaft": False,
     "actuator_lag@T_em": True,
     "coulomb_friction@w_em": True,
     "mount_compliance@half_shaft": True,
