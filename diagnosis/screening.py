@@ -116,15 +116,16 @@ def part_of(bench: Bench, base: Estimate) -> Part:
     columns = {name: np.concatenate([c[p] for p in parts]) for name, c in base.columns.items()}
     seen = seen_at(base, series, Point(base.point.shared, base.point.own[rows]))
     own = dataclasses.replace(bench, series=series)
-    cost = _fair(seen, series)
-    return Part(rows, own, dataclasses.replace(seen, cost=cost, columns=columns))
+    seen = dataclasses.replace(seen, columns=columns)
+    return Part(rows, own, dataclasses.replace(seen, cost=_fair(seen, series)))
 
 
 def _fair(base: Estimate, series: Sequence[Series]) -> float:
-    """Return the cost [nats] of a base with gains made where it is, as those of candidates are: the
-    ones that it was left with may fit better by accident.
+    """Return the cost [nats] of a base that takes the steps that candidates take, with gains made
+    where it begins: those that it was left with may fit better by accident.
     """
-    return max(base.cost, looked_at(base.candidate, series, base.noises, base.point).cost)
+    here = looked_at(base.candidate, series, base.noises, base.point)
+    return regained(reached(here, series, base.columns, SCREENED_ROUNDS), series).cost
 
 
 @dataclass(frozen=True)
