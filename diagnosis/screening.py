@@ -37,7 +37,7 @@ STARTS = 2
 """Starts of a candidate from which steps are made, the best ones."""
 RACE = 2
 """Steps from each of them; then the better one goes on alone."""
-STRONG = 300.0
+STRONG = 2000.0
 """Nats that one candidate gains after these steps from which on others are held against it."""
 BEHIND = 0.02
 """Part of what the best one gains that another has to gain to go on: none was seen to overtake one
