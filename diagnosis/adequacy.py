@@ -14,7 +14,7 @@ import numpy as np
 from diagnosis.bench import Bench
 from diagnosis.estimation import looked_at
 from diagnosis.evidence import inflation, inflations
-from diagnosis.freedom import WIDE_LEVELS, with_levels
+from diagnosis.freedom import START_LEVEL, WIDE_LEVELS, with_levels
 from diagnosis.layers import DRIFT, Layer, walks
 from diagnosis.level import units_of
 from diagnosis.location import places_of_freedom
@@ -29,6 +29,8 @@ LEFT_PART = 0.2
 """Part of what was gained that a freedom may gain beside it: forms differ, and noise has colour.
 
 An error of an output is none of them: a sensor follows whatever the model gets wrong."""
+LEFT_LEVELS = (START_LEVEL, *WIDE_LEVELS)
+"""Levels at which such a freedom is looked at."""
 
 MEMORY = 1.2
 """Innovations that count as one from which on those of a model remember."""
@@ -169,7 +171,7 @@ def _gains(bench: Bench, selection: Selection, layer: Layer, limit: float) -> bo
     units = units_of(candidate, bench.series, model.noises, model.values(0))
     point = extended(candidate, model.candidate, model.point, {})
     quiet = looked_at(candidate, bench.series, model.noises, point)
-    for level in WIDE_LEVELS if np.isfinite(quiet.cost) else ():
+    for level in LEFT_LEVELS if np.isfinite(quiet.cost) else ():
         noises = with_levels(model.noises, units, {layer.named(DRIFT): level})
         free = looked_at(candidate, bench.series, noises, point, quiet.outcome)
         if quiet.cost - free.cost > limit:
