@@ -10,9 +10,10 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
+from numpy.typing import NDArray
 
 from diagnosis.bench import Bench
-from diagnosis.estimation import looked_at
+from diagnosis.estimation import Estimate, looked_at
 from diagnosis.evidence import inflation, inflations
 from diagnosis.freedom import START_LEVEL, WIDE_LEVELS, with_levels
 from diagnosis.layers import DRIFT, Layer, walks
@@ -131,22 +132,28 @@ def is_plainer(bench: Bench, selection: Selection) -> bool:
 
 
 def strain(selection: Selection) -> float:
-    """Return what accepted effects would gain [nats] if their own parameters had no ranges, as the
-    normal equations foresee it; parameters of the base stay where they are at a bound.
+    """Return what accepted effects would gain [nats] if their own parameters that are at the end of
+    a range had none, as the normal equations foresee it.
     """
     model = selection.model
     if model.normal is None:
         return 0.0
-    candidate, shared = model.candidate, ~model.normal.own
     brought = {
         tried.layer.named(name)
         for tried in selection.accepted
         for name in own_names(tried.layer.effect.body)
     }
-    low, high = bounds_of(candidate).T
+    low, high = bounds_of(model.candidate).T
     at_end = (model.point.shared <= low) | (model.point.shared >= high)
-    is_brought = np.array([name in brought for name in candidate.names], dtype=bool)
-    free = shared & (is_brought | ~at_end)
+    is_brought = np.array([name in brought for name in model.candidate.names], dtype=bool)
+    within = ~model.normal.own & ~at_end
+    beyond = ~model.normal.own & (is_brought | ~at_end)
+    return _foreseen(model, beyond) - _foreseen(model, within)
+
+
+def _foreseen(model: Estimate, free: NDArray[np.bool_]) -> float:
+    """Return what a step of the free shared coordinates (parameters,) gains, without ranges."""
+    assert model.normal is not None
     slope = model.normal.g.sum(axis=0)[free] + model.point.shared[free]
     matrix = model.normal.a.sum(axis=0)[np.ix_(free, free)] + np.eye(int(free.sum()))
     return 0.5 * float(slope @ solution(matrix, slope))
