@@ -30,6 +30,10 @@ Task = Callable[[Mapping[str, str], bytes, int, int], Answer]
 It is sent by its name, so workers have it from their own installation.
 """
 
+HOLD: Callable[[bytes], bytes] = bytes
+"""What a worker does with the study, and then has it: of Python's own, so that workers with other
+code can do it, too, and refuse the rest.
+"""
 IN_FLIGHT = 2
 """Blocks that each thread of a worker has at most: one that is computed, one to go on with."""
 LOOK = 5.0
@@ -48,9 +52,9 @@ class Cluster:
 
     def __call__(self, study: Study, blocks: Iterable[Block]) -> Iterator[Finished]:
         """Yield each block as it is finished; closing the iterator ends the work."""
-        flight = _Flight(self)
+        flight = _Flight(self, packed(study))
         try:
-            flight.held = self.client.submit(bytes, packed(study), pure=False)
+            flight.hold()
             suspects = []
             for finished in flight.finished(blocks):
                 if finished.lost:
@@ -65,10 +69,15 @@ class Cluster:
 
 @dataclass
 class _Flight:
-    """What is under way: the study that workers hold, and the blocks that they have."""
+    """What is under way: the `study` that workers hold, and the blocks that they have.
+
+    `former` are the keys of what was held by workers that died.
+    """
 
     cluster: Cluster
+    study: bytes
     held: Any = None
+    former: set[str] = field(default_factory=set)
     under_way: dict[Future, Block] = field(default_factory=dict)
     ended: SimpleQueue[Future] = field(default_factory=lambda: SimpleQueue())
     looked: float = float("-inf")
@@ -89,7 +98,15 @@ class _Flight:
                 future = self.ended.get(timeout=LOOK)
             except Empty:
                 continue
-            yield self._result(future)
+            found = self._result(future)
+            if found:
+                yield found
+
+    def hold(self) -> None:
+        """Give the study to a worker, from which the others have it."""
+        if self.held:
+            self.former.add(self.held.key)
+        self.held = self.cluster.client.submit(HOLD, self.study, pure=False)
 
     def end(self) -> None:
         """Take back what is under way."""
@@ -135,12 +152,20 @@ class _Flight:
                 self.looked = float("-inf")
                 self._look()
 
-    def _result(self, future: Future) -> Finished:
+    def _result(self, future: Future) -> Finished | None:
+        """Return what became of a block; None where it is under way again, since a worker died of
+        another one while it was given the study.
+        """
         block = self.under_way.pop(future)
         try:
             answer = self._answer(future)
         except KilledWorker as error:
-            return Finished(block, lost=_blame(error))
+            if error.task not in (self.held.key, *self.former):
+                return Finished(block, lost=_blame(error))
+            if error.task == self.held.key:
+                self.hold()
+            self._submit(block)
+            return None
         except ImportError as error:
             raise ClusterError(f"a worker cannot import modewright: {error}") from None
         except (CancelledError, OSError):

@@ -70,6 +70,7 @@ class Reply(Future[Any]):
     def __init__(self, desk: Desk) -> None:
         super().__init__()
         self.desk = desk
+        self.key = f"reply-{id(self)}"
 
 
 def _worker() -> WorkerState:
