@@ -36,6 +36,8 @@ code can do it, too, and refuse the rest.
 """
 IN_FLIGHT = 2
 """Blocks that each thread of a worker has at most: one that is computed, one to go on with."""
+MOST_GIVEN = 10
+"""How often workers may die that were given the study: then it is the study that they die of."""
 LOOK = 5.0
 """Time [s] between two looks at how many workers there are."""
 PATIENCE = 60.0
@@ -162,6 +164,8 @@ class _Flight:
         except KilledWorker as error:
             if error.task not in (self.held.key, *self.former):
                 return Finished(block, lost=_blame(error))
+            if len(self.former) + 1 >= MOST_GIVEN:
+                return Finished(block, lost=f"{MOST_GIVEN} workers died that were given the study")
             if error.task == self.held.key:
                 self.hold()
             self._submit(block)

@@ -157,12 +157,13 @@ def _of_measure(table: Table, design: Design, column: Column) -> Iterator[Index]
     for group, chosen in _groups(table, design):
         results = _at(samples[chosen], values[chosen], design)
         fine = np.flatnonzero(~np.isnan(results).any(axis=1))
-        used, _ = scaled(results[fine]) if design.method == "saltelli" else (results[fine], 0)
+        used, _ = scaled(results[fine])  # shares of a variance have no unit
         estimate: Callable[[Reals], dict[str, Reals]] = sobol_indices
         if design.method == "morris":
             numbers = (fine[:, None] * design.each + np.arange(design.each)).reshape(-1)
             shares = morris_shares(size, numbers, design.seed)
-            used = elementary_effects(used, shares.reshape(len(fine), design.each, size))
+            shares = shares.reshape(len(fine), design.each, size)
+            used = elementary_effects(results[fine], shares)
             estimate = morris_indices
         found = {name: np.full(size, np.nan) for name in NAMES[design.method]}
         ends: dict[str, tuple[Reals, Reals]] = {}

@@ -10,9 +10,11 @@ import pytest
 
 from modewright import studies
 from modewright.cli import app
+from modewright.commands.sweep import PLOTS
 from modewright.exits import exit_code
-from modewright.files import OutputError
+from modewright.files import RESULTS, RUN, OutputError
 from sweep.manifest import MANIFEST, seal_of
+from sweep.store import BLOCKS, LOCK
 from tests.sweep.laying import STUDIES, quick
 
 
@@ -138,3 +140,8 @@ def test_names_of_a_store_reach_the_terminal_harmless(capsys: pytest.CaptureFixt
     told = capsys.readouterr()
     assert "\x1b" not in told.out + told.err
     assert "`study` is \\x1b[2Jevil, no text" in told.err
+
+
+def test_what_results_are_called_here_is_what_a_store_calls_them() -> None:
+    assert RESULTS == (MANIFEST, BLOCKS)
+    assert {PLOTS, LOCK} == set(RUN) - set(RESULTS)

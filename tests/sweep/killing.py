@@ -34,6 +34,11 @@ def held_deadly(mark: Path, data: bytes) -> bytes:
     return data
 
 
+def always_deadly(data: bytes) -> bytes:
+    os.kill(os.getpid(), signal.SIGKILL)
+    return data
+
+
 def broken(wanted: Mapping[str, str], held: bytes, start: int, stop: int) -> Answer:
     def run(batch: Batch) -> BatchResult:
         raise ZeroDivisionError("of our own")

@@ -23,7 +23,7 @@ from sweep.clustering import NOWHERE, Staff, connected
 from sweep.fingerprint import differences, fingerprint
 from sweep.processes import WorkerError
 from sweep.study_run import run_study
-from tests.sweep.killing import broken, deadly, held_deadly, older, own, quickly
+from tests.sweep.killing import always_deadly, broken, deadly, held_deadly, older, own, quickly
 from tests.sweep.laying import QUICK, quick, study
 from tests.sweep.test_study_run import bytes_of
 
@@ -75,6 +75,16 @@ def test_a_worker_that_dies_with_the_study_loses_no_block(
     assert mark.exists()
     assert (found.computed, found.lost) == (60, ())
     assert bytes_of(tmp_path / "there") == bytes_of(tmp_path / "here")
+
+
+def test_a_study_that_every_worker_dies_of_ends(
+    tmp_path: Path, client: Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(cluster, "HOLD", always_deadly)
+    monkeypatch.setattr(cluster, "MOST_GIVEN", 2)
+    found = run_study(study(), tmp_path, Cluster(client, quickly), block=30)
+    assert found.computed == 0
+    assert {why for _, why in found.lost} == {"2 workers died that were given the study"}
 
 
 def test_a_defect_in_a_worker_ends_the_run_with_its_traceback(
