@@ -91,8 +91,9 @@ class BatchResult:
 
     `measures` (count,) by name; `outputs` (count, rows) by signal over `times` (rows,), NaN behind
     the end of a run that stopped; `event_counts` (count,); `event_times` [s] and `event_kinds`
-    (count, most_events), places in `kinds`; `faults` (count,): a fault bit was set; `stopped`: why
-    a variant ended before the horizon, by its number. `note` says what did the work.
+    (count, most_events), places in `kinds`; `faults`: which fault bits were set, as `instance:
+    fault`, and `stopped`: why a variant ended before the horizon, both by its number. `note` says
+    what did the work.
     """
 
     measures: Mapping[str, Reals]
@@ -102,7 +103,7 @@ class BatchResult:
     event_counts: NDArray[np.int64]
     event_times: Reals
     event_kinds: NDArray[np.int32]
-    faults: NDArray[np.bool_]
+    faults: Mapping[int, tuple[str, ...]]
     stopped: Mapping[int, str]
     note: str = ""
 

@@ -7,36 +7,21 @@ range of a sampled instance) the interpreter does.
 from __future__ import annotations
 
 import copy
+import dataclasses
 import os
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
-from functools import partial
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from engine.adjustment import Group, ends_of, groups, require_known
-from engine.assembling import assembly_of
-from engine.batch import NO_EVENT, Batch, BatchResult, EventKind
-from engine.plan import Plan, noise_of, plan_of, why_not_planned
-from engine.planned import EVENT, Build
-from engine.variants import (
-    empty_result,
-    event_kinds,
-    first_and_last_row,
-    keep_variant,
-    run_variants,
-    variant_scenario,
-)
-from language.assembly import Assembly, ranged
-from language.program import short
+from engine.adjustment import Adjustment, Group, ends_of, groups, require_known
+from engine.batch import Batch, BatchResult
+from engine.plan import why_not_planned
+from engine.planned import Build
+from engine.planned_group import PlannedGroup
+from engine.variants import empty_result, keep_variant, run_variants, variant_scenario
 
-KINDS = ("first", "final", "max", "min", "peak", "mean", "rms")
 KEPT = 4
 """Plans of a planner: the scenarios of a study take turns."""
-CHUNK = 2000
-"""Variants of one call: their events and values are a few megabytes."""
 
 
 def planned_batch(
@@ -55,12 +40,18 @@ class PlannedBatch:
     Variants with Programs of their own are compiled group by group.
     """
 
-    def __init__(self, batch: Batch, build: Build, least: int = 0) -> None:
-        """Compile what the batch needs; `reason` says why it is left to the interpreter."""
-        self.batch = batch
+    def __init__(
+        self, batch: Batch, build: Build, least: int = 0, known: Adjustment | None = None
+    ) -> None:
+        """Compile what the batch needs; `reason` says why it is left to the interpreter.
+
+        `known` is how a batch that differs in numbers alone is carried out.
+        """
+        self.batch, self.build, self.least = batch, build, least
         self.reason: str | None = None
-        self._parts: list[_Planned] = []
-        found = groups(batch)
+        self._parts: list[PlannedGroup] = []
+        found = [Group(np.arange(batch.count), known)] if known else groups(batch)
+        like = None
         self._few = [group for group in found if _steps(group) < least]
         for group in _of_one_plan(batch, [g for g in found if _steps(g) >= least]):
             adjustment = group.adjustment
@@ -69,22 +60,34 @@ class PlannedBatch:
             self.reason = reason or _why_not_tuned(group)
             if self.reason:
                 return
-            self._parts.append(_Planned(batch, group, build))
+            like = PlannedGroup(batch, group, build, like)
+            self._parts.append(like)
         if not found:
             raise ValueError("a batch has at least one variant")
 
     def again(self, batch: Batch) -> PlannedBatch | None:
-        """Return what is planned already for a batch that differs in numbers alone, else None."""
-        if self.reason or self._few or len(self._parts) != 1 or not _is_alike(batch, self.batch):
+        """Return what is planned already for a batch that differs in numbers alone, else None.
+
+        Where inputs step at times of their own the plan of each variant is made, for the same
+        Programs; so it is where the interpreter took the few there were, whose steps then count
+        as steps of all that is compiled for.
+        """
+        if self.reason or _form(batch) != _form(self.batch):
             return None
-        (part,) = self._parts
-        ends = part.group.adjustment.ends
+        first = self._parts[0].group if self._parts else self._few[0]
+        adjustment = first.adjustment
+        if adjustment.rebuilt:
+            return None
+        ends = adjustment.ends
         for name, (low, high) in ends_of(batch).items():
             if name not in ends or not ends[name][0] <= low <= high <= ends[name][1]:
                 return None
         require_known(batch)
+        if batch.courses or self._few:
+            least = self.least - sum(map(_steps, self._few))
+            return PlannedBatch(batch, self.build, least, adjustment)
         found = copy.copy(self)
-        found.batch, found._parts = batch, [part.of(batch)]
+        found.batch, found._parts = batch, [self._parts[0].of(batch)]
         return found
 
     def carry_out(self, threads: int | None = None) -> BatchResult:
@@ -113,25 +116,33 @@ class Planner:
 
     def planned(self, batch: Batch) -> PlannedBatch:
         """Return a batch that is planned."""
-        for known in self._kept:
+        for place, known in enumerate(self._kept):
             if found := known.again(batch):
+                self._kept[place] = found
                 return found
         fresh = PlannedBatch(batch, self.build, self.least)
         self._kept = [fresh, *self._kept[: KEPT - 1]]
         return fresh
 
 
-def _is_alike(first: Batch, second: Batch) -> bool:
-    """Tell whether two batches differ in numbers, and in how many they are, alone."""
-    return not (first.courses or second.courses) and _form(first) == _form(second)
-
-
 def _form(batch: Batch) -> object:
-    """Return what a batch is but for its numbers."""
+    """Return what a batch is but for its numbers, and for how many they are.
+
+    Of inputs that step at other times in each variant it is what Programs know of them: which
+    change in between, and by what formula.
+    """
+    scenario: object = batch.scenario
+    if batch.courses:
+        moving = [
+            (name, [piece.formula for piece in stimulus.pieces])
+            for name, stimulus in batch.scenario.inputs.items()
+            if stimulus.varies
+        ]
+        scenario = dataclasses.replace(batch.scenario, inputs={}), moving
     starts = [(name, table.starts) for name, table in batch.inputs.items()]
     names = list(batch.parameters), list(batch.initial), starts, batch.seeds is None
     wanted = batch.measures, batch.outputs, batch.most_events
-    return batch.system, batch.scenario, names, wanted
+    return batch.system, scenario, names, wanted
 
 
 def _steps(group: Group) -> int:
@@ -161,155 +172,3 @@ def _why_not_tuned(group: Group) -> str | None:
         if constant and (constant.type != "real" or constant.items):
             return f"`{name}` is not a real number"
     return None
-
-
-class _Planned:
-    """The variants of a batch that share their Programs."""
-
-    def __init__(self, batch: Batch, group: Group, build: Build) -> None:
-        self.batch, self.group = batch, group
-        adjustment = group.adjustment
-        self.system, self.programs = adjustment.system, adjustment.programs
-        scenario = variant_scenario(batch, adjustment.scenario, int(group.variants[0]))
-        self.assembly = assembly_of(self.system, scenario, self.programs)
-        self.plan = plan_of(self.system, scenario, self.assembly)
-        self.library = build(self.assembly)
-        names = [column.name for column in self.assembly.columns]
-        places = dict(zip(names, self.library.columns, strict=True))
-        count = len(self.plan.rows.high)
-        spans = [first_and_last_row(m, scenario.every, count) for m in batch.measures]
-        self.fixed: dict[str, Any] = {
-            "measures": len(batch.measures),
-            "measure_columns": _wholes(places[m.signal] for m in batch.measures),
-            "measure_kinds": _wholes(KINDS.index(m.kind) for m in batch.measures),
-            "measure_firsts": _wholes(first for first, _ in spans),
-            "measure_behinds": _wholes(behind for _, behind in spans),
-            "outputs": len(batch.outputs),
-            "output_columns": _wholes(places[name] for name in batch.outputs),
-            "most_events": batch.most_events,
-            **self._tables(),
-        }
-        self.kinds = _kind_places(self.assembly, event_kinds(self.programs))
-
-    def of(self, batch: Batch) -> _Planned:
-        """Return the same for all variants of another batch."""
-        found = copy.copy(self)
-        found.batch, found.group = batch, Group(np.arange(batch.count), self.group.adjustment)
-        return found
-
-    def run(self, result: BatchResult, threads: int) -> None:
-        """Carry all out, in chunks on threads; each chunk writes its own part of the result."""
-        variants = self.group.variants
-        chunks = [variants[k : k + CHUNK] for k in range(0, len(variants), CHUNK)]
-        if threads > 1 and len(variants) > threads:
-            size = min(CHUNK, -(-len(variants) // threads))
-            chunks = [variants[k : k + size] for k in range(0, len(variants), size)]
-        with ThreadPoolExecutor(threads) as pool:
-            for left in pool.map(partial(self._chunk, result), chunks):
-                for variant in left:
-                    keep_variant(self.batch, result, variant, self.group.adjustment)
-
-    def _chunk(self, result: BatchResult, variants: NDArray[np.int64]) -> list[int]:
-        """Carry some variants out; return those that are left to the interpreter."""
-        batch, count = self.batch, len(variants)
-        rows, most = len(self.plan.rows.high), batch.most_events
-        measured = np.empty((count, len(batch.measures)))
-        kept = np.empty((count, len(batch.outputs), rows))
-        events = np.empty((count, most), dtype=EVENT)
-        counts = np.zeros(count, dtype=np.int64)
-        is_left = np.zeros(count, dtype=np.uint8)
-        faults = np.zeros((count, len(self.programs)), dtype=np.uint32)
-        plan, strides = self._noise(variants)
-        members = {
-            **self.fixed,
-            "values": self._values(variants),
-            "table_values": [
-                np.ascontiguousarray(table.values[variants], dtype=np.float64)
-                for table in self._all_tables()
-            ],
-            "noise_strides": strides,
-            "measured": measured,
-            "kept": kept,
-            "events": events,
-            "counts": counts,
-            "is_left": is_left,
-            "faults": faults,
-            "rows": np.empty((self.library.lanes, rows, self.library.width)),
-            "inputs_room": np.empty((self.library.lanes, *self.plan.inputs.shape)),
-        }
-        self.library.bound(plan, members)(0, count)
-        for place, measure in enumerate(batch.measures):
-            result.measures[measure.name][variants] = measured[:, place]
-        for place, name in enumerate(batch.outputs):
-            result.outputs[name][variants] = kept[:, place]
-        result.event_counts[variants] = counts
-        result.faults[variants] = faults.any(axis=1)
-        filled = np.arange(most) < counts[:, None]
-        result.event_times[variants] = np.where(filled, events["time"], np.nan)
-        numbers = np.where(filled, events["number"], 0)
-        result.event_kinds[variants] = np.where(filled, self.kinds[numbers], NO_EVENT)
-        return [int(variant) for variant in variants[is_left != 0]]
-
-    def _values(self, variants: NDArray[np.int64]) -> NDArray[np.float64]:
-        names = list(self.assembly.tunables())
-        found = np.empty((len(variants), len(names)))
-        arrays = {**self.batch.parameters, **self.batch.initial}
-        tuned = {place: arrays[name] for name, place in self.group.adjustment.tuned.items()}
-        for place, (owner, constant) in enumerate(names):
-            array = tuned.get((owner, short(constant.name)))
-            found[:, place] = constant.value if array is None else array[variants]
-        return found
-
-    def _noise(self, variants: NDArray[np.int64]) -> tuple[Plan, NDArray[np.int64]]:
-        strides = np.zeros(len(self.assembly.sensors) + 1, dtype=np.int64)
-        if self.batch.seeds is None or not self.plan.noise:
-            return self.plan, strides
-        noise = {}
-        for name, one in self.plan.noise.items():
-            seeds = self.batch.seeds[variants].tolist()
-            noise[name] = np.stack([noise_of(seed, name, len(one)) for seed in seeds])
-            strides[list(self.assembly.sensors).index(name)] = len(one)
-        return Plan(**{**vars(self.plan), "noise": noise}), strides
-
-    def _all_tables(self) -> list[Any]:
-        """Return the table of each column of inputs that a variant changes."""
-        lines = self.system.lines
-        sources = [lines[n].source if n in lines else n for n in self.assembly.inputs]
-        return [self.batch.inputs[s] for s in sources if s in self.batch.inputs]
-
-    def _tables(self) -> dict[str, Any]:
-        lines, tables = self.system.lines, self.batch.inputs
-        inputs, pieces, widths = [], [], []
-        for place, name in enumerate(self.assembly.inputs):
-            line = lines.get(name)
-            table = tables.get(line.source if line else name)
-            if table is not None:
-                delay = line.delay if line else 0
-                inputs.append(place)
-                widths.append(len(table.starts))
-                pieces.append(self.plan.pieces_at([start + delay for start in table.starts]))
-        return {
-            "tables": len(inputs),
-            "table_inputs": _wholes(inputs),
-            "table_pieces": pieces,
-            "table_widths": _wholes(widths),
-        }
-
-
-def _wholes(values: Any) -> NDArray[np.int64]:
-    return np.array([*values, 0], dtype=np.int64)
-
-
-def _kind_places(assembly: Assembly, kinds: Sequence[EventKind]) -> NDArray[np.int32]:
-    """Return the place among the kinds of each event number in C."""
-    found = []
-    for name, program in assembly.programs.items():
-        for info in program.transitions:
-            source, target = program.ends(info)
-            found.append(EventKind(name, info.name, source, target, info.region))
-        for variable in ranged(program):
-            found.append(EventKind(name, f"range {short(variable.name)}", kind="range"))
-        for invariant in program.invariants:
-            text, region = f"invariant {invariant.name}", invariant.region
-            found.append(EventKind(name, text, region=region, kind="invariant"))
-    return np.array([kinds.index(kind) for kind in found] or [0], dtype=np.int32)

@@ -52,7 +52,7 @@ def empty_result(batch: Batch, adjustment: Adjustment, note: str) -> BatchResult
         event_counts=np.zeros(batch.count, dtype=np.int64),
         event_times=np.full(shape, math.nan),
         event_kinds=np.full(shape, NO_EVENT, dtype=np.int32),
-        faults=np.zeros(batch.count, dtype=np.bool_),
+        faults={},
         stopped={},
         note=note,
     )
@@ -173,7 +173,9 @@ def keep_variant(
     for place, event in enumerate(run.events[: batch.most_events]):
         result.event_times[variant, place] = event.time
         result.event_kinds[variant, place] = _place(result.kinds, event)
-    result.faults[variant] = bool(run.faults)
+    if run.faults:
+        assert isinstance(result.faults, dict)
+        result.faults[variant] = run.faults
     if run.stopped is not None:
         assert isinstance(result.stopped, dict)
         result.stopped[variant] = run.stopped

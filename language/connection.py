@@ -8,6 +8,7 @@ from fractions import Fraction
 
 from language.declaration import Formula
 from language.declared import declared_kind
+from language.difference import difference
 from language.dimension import DimensionCheck
 from language.document import Entry, Node, Scalar, Table
 from language.experiment import Connection, Instance, SystemInput
@@ -133,7 +134,7 @@ class ConnectionReader(Reader):
     def _positive(self, node: Node | None, what: str, unit: Unit) -> Fraction:
         if node is None:
             return Fraction(0)
-        value, _ = self.quantity(node, what, node.span, unit)
+        value = difference(self, node, what, node.span, unit)
         if value <= 0:
             self.problems.error("range", node.span, f"`{what}` is above zero")
         return value

@@ -8,6 +8,7 @@ from collections.abc import Collection, Sequence
 from fractions import Fraction
 
 from language.declaration import Formula
+from language.difference import difference
 from language.dimension import DimensionCheck
 from language.document import Entry, Node, Scalar, Table
 from language.experiment import SystemInput
@@ -199,7 +200,7 @@ class StimulusReader(Reader):
         node = table.get("chirp")
         chirp = self.table(node, "chirp", ("from", "to", "amplitude", "frequency"))
         begin, end = self._span_of_time(chirp, "chirp")
-        amplitude, _ = self.quantity(chirp.get("amplitude"), "amplitude", chirp.span, unit)
+        amplitude = difference(self, chirp.get("amplitude"), "amplitude", chirp.span, unit)
         items = self.items(chirp.get("frequency"), "frequency")
         rates = [self.quantity(item, "frequency", item.span, PER_SECOND)[0] for item in items]
         if len(rates) != 2 or min(rates, default=Fraction(0)) < 0:

@@ -6,6 +6,7 @@ import gc
 import io
 import logging
 import os
+import signal
 import sys
 from collections.abc import Callable, Collection
 from pathlib import Path
@@ -47,7 +48,7 @@ from modewright.commands.sweep import sweep
 from modewright.commands.test import test
 from modewright.commands.trace import trace
 from modewright.console import configure
-from modewright.exits import EXIT_CODES, exit_code
+from modewright.exits import EXIT_CODES, INTERRUPTED, exit_code
 from modewright.files import require_writable
 from modewright.spread import spread
 
@@ -125,4 +126,7 @@ def main() -> None:
     words = spread(sys.argv[1:])
     completes = COMPLETION in os.environ
     run = application(None if completes else words)
-    sys.exit(exit_code(lambda: run(words, standalone_mode=False)))
+    code = exit_code(lambda: run(words, standalone_mode=False))
+    if code == INTERRUPTED:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # more of them disturb nothing but the exit
+    sys.exit(code)

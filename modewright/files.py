@@ -10,6 +10,10 @@ from pathlib import Path
 
 NEW_MODE = 0o644
 SPECS = (".yaml", ".yml")
+RESULTS = ("study.json", "blocks")
+"""What the results of a study are in their folder: sweep/store.py."""
+RUN = (*RESULTS, "plots", ".lock")
+"""What a run of a study writes into that folder."""
 
 
 class OutputError(Exception):
@@ -35,7 +39,34 @@ def require_writable(*paths: Path | None) -> None:
             continue
         if path.exists() and path.resolve().suffix in SPECS:
             raise OutputError(f"{path}: this is a spec; an output would replace it")
+        if any(_is_result(place) for place in (path.resolve(), path.resolve().parent)):
+            raise OutputError(f"{path}: this is a part of the results of a study")
         require_place(path)
+
+
+def _is_result(place: Path) -> bool:
+    folder = place.parent
+    is_store = (folder / RESULTS[0]).is_file() and (folder / RESULTS[1]).is_dir()
+    return is_store and place.name in RESULTS
+
+
+def require_beside(results: Path, *paths: Path | None) -> None:
+    """Raise OutputError, before any work is done, for outputs that a run would get mixed up with.
+
+    Its `results` are a folder that may be made by the run; an output may lie in it.
+    """
+    folder, taken = results.resolve(), set[Path]()
+    for path in paths:
+        if path is None:
+            continue
+        place = path.resolve()
+        if place in taken:
+            raise OutputError(f"{path}: this is the name of two outputs")
+        taken.add(place)
+        if any(place.is_relative_to(folder / name) for name in RUN):
+            raise OutputError(f"{path}: this is a part of the results of the study")
+        if place.parent != folder or folder.exists():
+            require_writable(path)
 
 
 def require_calibration(path: Path) -> None:

@@ -218,10 +218,13 @@ def _sequence_line(sequence: ModeSequence) -> str:
 
 def finite(values: Mapping[str, Any]) -> dict[str, Any]:
     """Return values for JSON, which has neither infinities nor NaN: they are null."""
-    return {
-        name: None if isinstance(value, float) and not math.isfinite(value) else value
-        for name, value in values.items()
-    }
+    return {name: _finite(value) for name, value in values.items()}
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, tuple | list):
+        return [_finite(each) for each in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def print_finding(console: Console, finding: Finding) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict
 from typing import Any
 
@@ -9,17 +10,21 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from language.text import visible
 from modewright.show import finite
-from modewright.show_study import interval_text, short
-from sweep.sensitivity import Index, Sensitivity
+from modewright.show_study import interval_text, progress_text, short
+from sweep.sensitivity import FEWEST, Index, Sensitivity
 
 WHOLE = {"saltelli": "blocks", "morris": "paths"}
 
 
 def print_sensitivity(console: Console, found: Sensitivity) -> None:
     """Print the indices by group and measure, the largest first."""
-    text = f"{found.study}: {found.method}, {len(found.indices)} indices"
-    console.print(text, highlight=False, markup=False)
+    text = f"{found.study}: {found.method}; {progress_text(found.counts, found.expected)}"
+    console.print(visible(text), highlight=False, markup=False)
+    if sum(found.counts.values()) < found.expected:
+        text = "unfinished: the same `modewright sweep STUDY --out DIR` goes on"
+        console.print(text, highlight=False, markup=False)
     if not found.indices:
         return
     first = found.indices[0]
@@ -30,8 +35,19 @@ def print_sensitivity(console: Console, found: Sensitivity) -> None:
         header_style="bold",
     )  # fmt: skip
     for one in ordered_indices(found):
-        table.add_row(*map(escape, one.group.values()), one.measure, escape(one.name), *_cells(one))
+        groups = (escape(visible(name)) for name in one.group.values())
+        table.add_row(*groups, one.measure, escape(one.name), *_cells(one))
     console.print(table)
+    for text in untold_texts(found):
+        console.print(text, highlight=False, markup=False)
+
+
+def untold_texts(found: Sensitivity) -> list[str]:
+    """Return a note where some indices are not told, for want of complete blocks or paths."""
+    few = sum(one.used < FEWEST for one in found.indices)
+    whole = WHOLE[found.method]
+    hint = f"fewer than {FEWEST} {whole} are complete (every point done and with the measure)"
+    return [f"{few} of {len(found.indices)} indices are not told (-): {hint}"] if few else []
 
 
 def ordered_indices(found: Sensitivity) -> list[Index]:
@@ -42,7 +58,10 @@ def ordered_indices(found: Sensitivity) -> list[Index]:
         places.setdefault((*one.group.values(), one.measure), len(places))
     return sorted(
         found.indices,
-        key=lambda one: (places[(*one.group.values(), one.measure)], -one.values[key]),
+        key=lambda one: (
+            places[(*one.group.values(), one.measure)],
+            math.inf if math.isnan(one.values[key]) else -one.values[key],
+        ),
     )
 
 
@@ -51,7 +70,10 @@ def sensitivity_json(found: Sensitivity) -> dict[str, Any]:
     return {
         "study": found.study,
         "digest": found.digest,
+        "expected": found.expected,
+        "counts": dict(found.counts),
         "method": found.method,
+        "fewest": FEWEST,
         "confidence": found.confidence,
         "indices": [
             {**asdict(one), "values": finite(one.values), "intervals": _plain(one)}

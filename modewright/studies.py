@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,17 +13,21 @@ from typing import TYPE_CHECKING
 from language.document import Scalar
 from language.load import command_line_value
 from language.missing import ToolMissing
+from language.problem import Problems, ordered, render
 from language.project import Project, read_document
 from modewright.compiled import run_block
 from modewright.files import OutputError
 from sweep import fork_server
 from sweep.address import Address, Credentials, address_of
 from sweep.executor import Executor, InProcess
+from sweep.override import require_left_alone
 from sweep.preparation import prepared, resampled
 from sweep.processes import Processes
+from sweep.sampling_reader import balance_fault
 from sweep.store import read_store
+from sweep.study import Study
 from sweep.study_reader import read_study
-from sweep.study_run import Progress, StudyRun, run_study
+from sweep.study_run import Progress, StudyRun, Warn, run_study
 from sweep.summary import Summary, summary_of
 
 if TYPE_CHECKING:
@@ -46,6 +51,7 @@ def sweep(
     samples: int | None = None,
     seed: int | None = None,
     progress: Progress | None = None,
+    warn: Warn | None = None,
     executor: Executor | None = None,
     cluster: str | None = None,
     credentials: Credentials | None = None,
@@ -54,29 +60,58 @@ def sweep(
 
     `workers` processes (all cores), 1: in this process; `cluster`: on the workers of a Dask
     cluster, `local:4` or the address of a scheduler, with `credentials` of TLS. `block` variants
-    are kept at once; `samples` and `seed` replace those of the study.
-    Raises SpecError, OutputError (a full disk: what is finished is kept), ClusterError,
-    ToolMissing, ValueError.
+    are kept at once; `samples` and `seed` replace those of the study. `warn` is told what the
+    study is warned of, and which blocks were damaged; without it Python warns.
+    Raises SpecError, ValueError, ClusterError, ToolMissing, OutputError (what is done is kept).
     """
     place = address_of(cluster) if cluster else None
     if place and place.count:
         fork_server.start(TEMPLATE)
-    project = Project(root or Path())
-    document = read_document(project.path_of(study))
-    scalars: dict[str, Scalar] = {
-        name: command_line_value(text, name=name) for name, text in (values or {}).items()
-    }
-    ready = prepared(resampled(read_study(document, project, scalars), samples, seed))
-    count = workers or os.cpu_count() or 1
-    local: Executor = Processes(count, WORKER) if count > 1 else InProcess(run_block)
+    if block is not None and block < 1:
+        raise ValueError(f"blocks of {block} variants are none")
+    tell = warn or warnings.warn
+    found = _read(study, values or {}, Project(root or Path()), tell)
+    ready = prepared(_resampled(found, samples, seed, tell))
     try:
         if place is None:
-            return run_study(ready, Path(out), executor or local, block, progress)
+            return run_study(ready, Path(out), executor or _local(workers), block, progress, tell)
         with _on_cluster(place, credentials or Credentials()) as remote:
-            return run_study(ready, Path(out), remote, block, progress)
+            return run_study(ready, Path(out), remote, block, progress, tell)
     except OSError as error:
         where = f" {error.filename}" if error.filename else ""
         raise OutputError(f"{out}: cannot write{where}: {error.strerror}") from None
+
+
+def _local(workers: int | None) -> Executor:
+    """Return processes of this machine, one for each core; of one this process is enough."""
+    count = workers or os.cpu_count() or 1
+    return Processes(count, WORKER) if count > 1 else InProcess(run_block)
+
+
+def _read(study: str, values: Mapping[str, str], project: Project, warn: Warn) -> Study:
+    """Return a study with values of the command line; tell its warnings.
+
+    Raises SpecError, and ValueError for a value of what the study gives one itself.
+    """
+    document = read_document(project.path_of(study))
+    scalars: dict[str, Scalar] = {
+        name: command_line_value(text, name=name) for name, text in values.items()
+    }
+    problems = Problems()
+    found = read_study(document, project, scalars, problems)
+    require_left_alone(found, scalars)
+    for problem in ordered(dict.fromkeys(problems.found)):
+        warn(render(problem))
+    return found
+
+
+def _resampled(study: Study, samples: int | None, seed: int | None, warn: Warn) -> Study:
+    """Return a study with points of the command line; warn of a number that suits it badly."""
+    found = resampled(study, samples, seed)
+    fault = balance_fault(found.sampling.method, samples) if samples is not None else None
+    if fault:
+        warn(f"{fault[0]}; {fault[1]}")
+    return found
 
 
 @contextmanager

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import itertools
 import re
 from collections.abc import Mapping, Sequence
@@ -11,18 +12,23 @@ from typing import Any
 import jinja2
 import numpy as np
 
-from modewright.show_sensitivity import ordered_indices
-from modewright.show_study import interval_text, short
+from language.units import shown_unit
+from modewright.show_sensitivity import WHOLE, ordered_indices, untold_texts
+from modewright.show_study import failure_texts, interval_text, short
 from sweep.block import DONE
+from sweep.manifest import Design, Manifest
+from sweep.measure import Column
 from sweep.picture import pictures
 from sweep.rows_file import arrow_module
 from sweep.sensitivity import sensitivity_of
 from sweep.store import Store
-from sweep.summary import Summary, summary_of, with_unit
+from sweep.summary import Summary, shown, summary_of
 from sweep.table import Table
 
-MOST_WORST, MOST_FAILED, MOST_INDICES = 5, 100, 300
+MOST_EXTREME, MOST_FAILED, MOST_INDICES = 5, 100, 300
 """Rows of each table that grows with the study."""
+PLAIN = Column("", "real", "1")
+"""A number whose unit stands elsewhere."""
 HEAD = re.compile(r"^.*?<svg ", re.DOTALL)
 METADATA = re.compile(r"<metadata>.*?</metadata>", re.DOTALL)
 OWN_NAME = re.compile(r"(\bid=\"|\"#|url\(#)")
@@ -38,13 +44,15 @@ def report_page(store: Store) -> bytes:
         "expected": manifest.count,
         "counts": list(summary.counts.items()),
         "varied": [column.name for column in manifest.varied],
+        "told": _told(manifest),
         **_measures(summary),
         **_sensitivity(store),
         "figures": [
             (name, _embedded(name, picture.data("svg")))
             for name, picture in pictures(store).items()
         ],
-        "worst": _worst(table),
+        "extremes": _extremes(table),
+        "reasons": failure_texts(summary),
         **_failed(table),
         "version": metadata.version("modewright"),
         "digest": manifest.digest,
@@ -53,13 +61,35 @@ def report_page(store: Store) -> bytes:
     return _page(context).encode()
 
 
+def _told(manifest: Manifest) -> list[tuple[str, list[tuple[str, str]]]]:
+    """Return what the study is, as its file says: sections, each with texts by name."""
+    found = []
+    for key, said in manifest.description.items():
+        rows = [("", said)] if isinstance(said, str) else list(said.items())
+        found.append((key, rows))
+    drawn = manifest.design
+    if drawn.count:
+        found.append(("sampling", [(drawn.method, _drawn_text(drawn)), ("seed", str(drawn.seed))]))
+    if drawn.replicates > 1:
+        found.append(("replicates", [("", str(drawn.replicates))]))
+    return found
+
+
+def _drawn_text(drawn: Design) -> str:
+    if not drawn.has_indices:
+        return f"{drawn.count} points"
+    return f"{drawn.planned} {WHOLE[drawn.method]} of {drawn.each} points"
+
+
 def _measures(summary: Summary) -> dict[str, Any]:
     lines = [
         {
-            "group": list(line.group.values()), "measure": line.measure, "unit": line.unit,
+            "group": list(line.group.values()), "measure": line.measure,
+            "unit": shown_unit(line.unit),
             "cells": [
-                line.count, short(line.median), interval_text(line.median_interval),
-                *map(short, (line.mean, line.deviation, line.p95, line.low, line.high)),
+                line.count, line.draws, short(line.median), interval_text(line.median_interval),
+                short(line.mean), interval_text(line.mean_interval),
+                *map(short, (line.deviation, line.p95, line.low, line.high)),
             ],
         }
         for line in summary.lines
@@ -68,7 +98,7 @@ def _measures(summary: Summary) -> dict[str, Any]:
         {
             "group": list(rate.group.values()), "measure": rate.measure,
             "cells": [
-                rate.hits, rate.count, short(rate.hits / rate.count) if rate.count else "-",
+                rate.hits, rate.count, rate.draws, short(rate.share),
                 interval_text(rate.interval),
             ],
         }
@@ -81,32 +111,39 @@ def _measures(summary: Summary) -> dict[str, Any]:
 
 
 def _sensitivity(store: Store) -> dict[str, Any]:
-    if store.manifest.design is None:
-        return {"indices": [], "index_heads": []}
-    found = ordered_indices(sensitivity_of(store))
-    if not found:
-        return {"indices": [], "index_heads": []}
+    sensitivity = sensitivity_of(store) if store.manifest.design.has_indices else None
+    if sensitivity is None or not sensitivity.indices:
+        return {"indices": [], "index_heads": [], "index_notes": []}
+    found = ordered_indices(sensitivity)
     heads = [*found[0].group, "measure", "of"]
     heads += [text for name in found[0].values for text in (name, "interval")]
     rows = []
     for one in found[:MOST_INDICES]:
         ends = (interval_text(one.intervals[name]) for name in one.values)
         cells = zip(map(short, one.values.values()), ends, strict=True)
-        rows.append([*one.group.values(), one.measure, one.name, *itertools.chain(*cells)])
-    return {"indices": rows, "index_heads": heads}
+        used = f"{one.used} of {one.count}"
+        rows.append([*one.group.values(), one.measure, one.name, *itertools.chain(*cells), used])
+    heads.append(WHOLE[sensitivity.method])
+    return {"indices": rows, "index_heads": heads, "index_notes": untold_texts(sensitivity)}
 
 
-def _worst(table: Table) -> list[tuple[str, str, list[list[str]]]]:
-    """Return for each measure that is a number the variants with its largest magnitudes."""
+def _extremes(table: Table) -> list[tuple[str, str, list[tuple[str, list[list[str]]]]]]:
+    """Return for each measure that is a number the variants with its highest and lowest values."""
     found = []
     for column in table.store.manifest.measures:
         if column.type not in ("real", "whole"):
             continue
-        values = np.where(table.is_done, np.abs(table.reals(column.name)), np.nan)
-        places = np.argsort(-np.where(np.isnan(values), -np.inf, values), kind="stable")
-        kept = [int(place) for place in places[:MOST_WORST] if not np.isnan(values[place])]
-        if kept:
-            found.append((column.name, column.unit, _rows(table, kept, (column.name,))))
+        values = np.where(table.is_done, table.reals(column.name), np.nan)
+        rising = np.argsort(values, kind="stable")[: int(np.sum(~np.isnan(values)))].tolist()
+        highest = rising[::-1][:MOST_EXTREME]
+        lowest = rising[: max(0, min(MOST_EXTREME, len(rising) - len(highest)))]
+        ends = [
+            (name, _rows(table, kept, (column.name,)))
+            for name, kept in (("highest", highest), ("lowest", lowest))
+            if kept
+        ]
+        if ends:
+            found.append((column.name, column.label, ends))
     return found
 
 
@@ -123,8 +160,8 @@ def _rows(table: Table, places: Sequence[int], last: Sequence[str]) -> list[list
     if not places:
         return []
     manifest = table.store.manifest
-    units = {column.name: column.unit for column in manifest.varied}
-    names = ["number", "variant", "scenario", *units, *last]
+    columns = {column.name: column for column in manifest.varied}
+    names = ["number", "variant", "scenario", *columns, *last]
     parquet, first = arrow_module().parquet, 0
     found: dict[int, dict[str, Any]] = {}
     for path in table.store.paths():
@@ -134,21 +171,22 @@ def _rows(table: Table, places: Sequence[int], last: Sequence[str]) -> list[list
             read = parquet.read_table(path, columns=names).take([p - first for p in own])
             found.update(zip(own, read.to_pylist(), strict=True))
         first += count
-    return [[_cell(found[place][name], units.get(name)) for name in names] for place in places]
+    return [[_cell(found[place][name], columns.get(name)) for name in names] for place in places]
 
 
-def _cell(value: Any, unit: str | None) -> str:
+def _cell(value: Any, column: Column | None) -> str:
     if value is None:
         return "-"
     if isinstance(value, float):
-        return with_unit(value, unit or "1")
+        return shown(value, column or PLAIN)
     return str(value)
 
 
 def _embedded(name: str, data: bytes) -> str:
     """Return an SVG as a part of a page: its names are like no other's."""
-    text = OWN_NAME.sub(rf"\g<1>{name}-", METADATA.sub("", data.decode()))
-    return HEAD.sub(f'<svg role="img" aria-label="{name}" ', text, count=1)
+    title = html.escape(name)
+    text = OWN_NAME.sub(lambda found: f"{found[1]}{title}-", METADATA.sub("", data.decode()))
+    return HEAD.sub(lambda _: f'<svg role="img" aria-label="{title}" ', text, count=1)
 
 
 def _page(context: Mapping[str, Any]) -> str:

@@ -206,8 +206,9 @@ def _result_row(study: Study, group: _Group, result: BatchResult, place: int) ->
     horizon = group.scenario.horizon
     assert horizon is not None
     found = measured(study.measures, observed(result, place, float(horizon)))
-    if result.faults[place]:
-        return _row(study, case, FAULT, "a fault bit is set", found)
+    if place in result.faults:
+        bits = ", ".join(f"`{fault}`" for fault in result.faults[place])
+        return _row(study, case, FAULT, f"a fault bit is set: {bits}", found)
     return _row(study, case, DONE, "", found)
 
 

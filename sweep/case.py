@@ -12,7 +12,7 @@ from language.experiment import System
 from language.lower import assigned
 from language.operation import Expr, Ref, Value
 from sweep.point import Point
-from sweep.study import Kind, Study, Target
+from sweep.study import Kind, Study, Target, points_each
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,8 @@ def case_of(study: Study, point: Point) -> Case:
             values.update(dict.fromkeys(setting.targets, found))
     values = {target: value for target, value in values.items() if _has(kind.system, target)}
     changed = tuple((t, v) for t, v in values.items() if t.kind not in ("parameter", "initial"))
-    seed = point.seed(scenario.seed, study.replicates)
+    each = points_each(study.sampling.method, len(study.drawn))
+    seed = point.seed(scenario.seed, study.replicates, each)
     return Case(point, values, seed, _refusal(kind, values), changed)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import os
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,6 +20,10 @@ from sweep.processes import MOST_DEATHS
 
 SECONDS = 30.0
 """How long [s] a scheduler may take to answer, and the first worker to join."""
+CLOSING = 5.0
+"""How long [s] a connection may take to end."""
+TALKATIVE = ("distributed", "tornado", "asyncio")
+"""Loggers that tell of a lost connection, each in its way."""
 NOWHERE = "127.0.0.1:0"
 """Dask serves its own pages on any free port of this machine alone."""
 NO_CREDENTIALS = (
@@ -66,13 +70,36 @@ def connected(
         if address.count:
             where = stack.enter_context(_local(address.count, staff.preload))
         security = _security(address, credentials)
+        stack.enter_context(_quiet())
         try:
-            client = stack.enter_context(Client(where, security=security, timeout=seconds))
+            client = Client(where, security=security, timeout=seconds)
         except (OSError, ValueError, RuntimeError) as error:
             reason = str(error).splitlines()[0] if str(error) else type(error).__name__
             raise ClusterError(f"{address.url}: no scheduler answers: {reason}") from None
+        stack.callback(_end, client)
         _require_workers(client, staff, seconds)
         yield client
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Leave it to us to tell what goes wrong: Dask would log it, with tracebacks."""
+    names = [name for name in logging.root.manager.loggerDict if name.split(".")[0] in TALKATIVE]
+    loggers = [logging.getLogger(name) for name in (*TALKATIVE, *names)]
+    before = [logger.level for logger in loggers]
+    for logger in loggers:
+        logger.setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        for logger, level in zip(loggers, before, strict=True):
+            logger.setLevel(level)
+
+
+def _end(client: Client) -> None:
+    """Close a client; a scheduler that does not answer any more is not waited for."""
+    with suppress(Exception):  # all is told by now, and the connection ends with us
+        client.close(timeout=CLOSING)
 
 
 @contextmanager
@@ -115,7 +142,12 @@ def _require_workers(client: Client, staff: Staff, seconds: float) -> None:
         client.wait_for_workers(1, timeout=seconds)
     except TimeoutError:
         raise ClusterError(f"no worker has joined the scheduler within {seconds:g} s") from None
-    for name, there in client.run(staff.fingerprint, on_error="return").items():
+    try:
+        found = client.run(staff.fingerprint, on_error="return", callback_timeout=seconds)
+    except OSError:
+        label = f"a worker does not tell its code, or the scheduler not answer, for {seconds:g} s"
+        raise ClusterError(label) from None
+    for name, there in found.items():
         if isinstance(there, ImportError):
             raise ClusterError(f"worker {name} cannot import modewright: {there}")
         if isinstance(there, BaseException):

@@ -10,9 +10,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from sweep.study import LEVELS
+
 Reals = NDArray[np.float64]
-LEVELS = 4
-"""Of each thing that varies in a path of Morris: the middles of so many equal shares."""
 STRIDE = LEVELS // 2
 """Levels of one step of a path; so all levels come equally often."""
 

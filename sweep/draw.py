@@ -54,17 +54,27 @@ def quantile(course: Distribution, share: Reals) -> Reals:
         return first + (second - first) * share
     if course.shape == "log_uniform":
         return np.asarray(np.exp(np.log(first) + np.log(second / first) * share))
-    from scipy.special import ndtr, ndtri  # scipy only where it is needed
+    from scipy.special import ndtri  # scipy only where it is needed
 
     is_log = course.shape == "lognormal"
     if course.within:
-        ends = np.log(np.maximum(course.within, 1e-300)) if is_log else np.asarray(course.within)
-        middle = np.log(first) if is_log else first
-        low, high = ndtr((ends - middle) / second)
+        low, high = shares_within(course)
         share = low + (high - low) * share
     deviate = ndtri(share)
     found = first * np.exp(second * deviate) if is_log else first + second * deviate
     return np.clip(found, *course.within) if course.within else np.asarray(found)
+
+
+def shares_within(course: Distribution) -> tuple[float, float]:
+    """Return the shares of a normal or lognormal at the ends of its `within`."""
+    from scipy.special import ndtr
+
+    assert course.within
+    is_log = course.shape == "lognormal"
+    first, second = course.numbers
+    ends = np.log(np.maximum(course.within, 1e-300)) if is_log else np.asarray(course.within)
+    low, high = ndtr((ends - (np.log(first) if is_log else first)) / second)
+    return float(low), float(high)
 
 
 def _shares(study: Study, samples: NDArray[np.int64]) -> Reals:

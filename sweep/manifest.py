@@ -2,35 +2,64 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from language.problem import Problems, Source, Span, SpecError
 from sweep.block import Block
+from sweep.description import Description
 from sweep.measure import Column, columns_of
 from sweep.preparation import FORMAT, digest_of
-from sweep.study import Presentation, Study, points_each
+from sweep.study import Presentation, Study, Varied, points_each
 
 MANIFEST = "study.json"
 MOST_BLOCKS = 100
 FEWEST_BLOCKS = 8
 MOST_IN_BLOCK = 5000
 LEAST_IN_BATCH = 200
+TYPES = {"real": "float64", "whole": "int64", "text": "string", "truth": "bool_", "list": "list_"}
+"""What a column may hold, and the type that pyarrow has for it; a list is one of reals."""
 
 
 @dataclass(frozen=True)
 class Design:
-    """A sampling of which indices are made: `names` are what is drawn, in its order."""
+    """How points are drawn: `names` are what is drawn, in its order; nothing: `count` is 0.
 
-    method: str
-    names: tuple[str, ...]
+    Each point comes `replicates` times, with other noise.
+    """
+
+    method: str = "random"
+    names: tuple[str, ...] = ()
+    count: int = 0
+    seed: int = 0
+    replicates: int = 1
+
+    @property
+    def each(self) -> int:
+        """How many points belong together: those of a block or a path; else each is alone."""
+        return points_each(self.method, len(self.names))
+
+    @property
+    def planned(self) -> int:
+        """How many blocks or paths there will be; else points."""
+        return self.count // self.each
+
+    @property
+    def has_indices(self) -> bool:
+        """Tell whether indices of sensitivity are made of its points."""
+        return self.each > 1
 
 
 @dataclass(frozen=True)
 class Manifest:
-    """What a store is of. `identity` are the digests of all that results depend on, by part."""
+    """What a store is of. `identity` are the digests of all that results depend on, by part.
+
+    `description` are the sections of the study, as they are written.
+    """
 
     study: str
     digest: str
@@ -41,13 +70,19 @@ class Manifest:
     words: Mapping[str, Sequence[str]]
     measures: tuple[Column, ...]
     presentation: Presentation
-    design: Design | None = None
+    design: Design = Design()
+    description: Description = field(default_factory=dict)
 
     @property
     def blocks(self) -> list[Block]:
         """All blocks in their order."""
         starts = range(0, self.count, self.block)
         return [Block(start, min(start + self.block, self.count)) for start in starts]
+
+    def has(self, block: Block) -> bool:
+        """Tell whether this is one of the blocks."""
+        is_inside = 0 <= block.start < self.count and block.start % self.block == 0
+        return is_inside and block.stop == min(block.start + self.block, self.count)
 
 
 def manifest_of(study: Study, block: int | None = None) -> Manifest:
@@ -58,18 +93,24 @@ def manifest_of(study: Study, block: int | None = None) -> Manifest:
         identity=study.identity,
         count=study.count,
         block=block or block_size(study),
-        varied=tuple(Column(varied.name, "real", varied.unit) for varied in study.varied),
+        varied=tuple(map(_column_of, study.varied)),
         words={varied.name: varied.words for varied in study.varied if varied.words},
         measures=tuple(column for measure in study.measures for column in columns_of(measure)),
         presentation=study.presentation,
         design=_design_of(study),
+        description=study.description,
     )
 
 
-def _design_of(study: Study) -> Design | None:
-    names = tuple(varied.name for varied in study.drawn)
-    method = study.sampling.method
-    return Design(method, names) if points_each(method, len(names)) > 1 else None
+def _column_of(varied: Varied) -> Column:
+    unit = varied.unit
+    factor, offset = float(unit.factor), float(unit.offset)
+    return Column(varied.name, "real", str(unit.dimension), unit.text, factor, offset)
+
+
+def _design_of(study: Study) -> Design:
+    names, sampling = tuple(varied.name for varied in study.drawn), study.sampling
+    return Design(sampling.method, names, sampling.count, sampling.seed, study.replicates)
 
 
 def block_size(study: Study) -> int:
@@ -88,7 +129,7 @@ def block_size(study: Study) -> int:
 def manifest_json(manifest: Manifest) -> bytes:
     """Return a manifest as the bytes of its file."""
     shown = manifest.presentation
-    data = {
+    data: dict[str, Any] = {
         "modewright": FORMAT,
         "study": manifest.study,
         "digest": manifest.digest,
@@ -101,43 +142,26 @@ def manifest_json(manifest: Manifest) -> bytes:
         "presentation": {
             "by": list(shown.by), "confidence": shown.confidence, "plots": dict(shown.plots),
         },
+        "design": vars(manifest.design),
+        "description": manifest.description,
     }  # fmt: skip
-    if manifest.design:
-        data["design"] = {"method": manifest.design.method, "names": list(manifest.design.names)}
+    data["seal"] = seal_of(data)
     return (json.dumps(data, indent=1) + "\n").encode()
 
 
-def read_manifest(folder: Path) -> Manifest:
-    """Return what the store in a folder is of. Raises SpecError."""
-    path = folder / MANIFEST
-    try:
-        data = json.loads(path.read_text("utf-8"))
-        if data["modewright"] != FORMAT:
-            label = "these results are in a form that is not known here"
-            raise refused(folder, "store", label, "run the study into another folder")
-        shown, drawn = data["presentation"], data.get("design")
-        return Manifest(
-            study=data["study"],
-            digest=data["digest"],
-            identity=data["identity"],
-            count=data["count"],
-            block=data["block"],
-            varied=tuple(Column(**column) for column in data["varied"]),
-            words=data["words"],
-            measures=tuple(Column(**column) for column in data["measures"]),
-            presentation=Presentation(tuple(shown["by"]), shown["confidence"], shown["plots"]),
-            design=Design(drawn["method"], tuple(drawn["names"])) if drawn else None,
-        )
-    except FileNotFoundError:
-        label = "there are no results of a study here"
-        raise refused(folder, "store", label, "modewright sweep STUDY --out DIR") from None
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        label = f"`{MANIFEST}` cannot be read: {error}"
-        raise refused(folder, "store", label) from None
+def seal_of(data: Mapping[str, Any]) -> str:
+    """Return the SHA-256 of all that a manifest says, but its own seal: a change is seen."""
+    plain = {key: value for key, value in data.items() if key != "seal"}
+    return hashlib.sha256(json.dumps(plain, sort_keys=True).encode()).hexdigest()
 
 
 def refused(folder: Path, kind: str, label: str, help: str = "") -> SpecError:
     """Return a problem of a folder, to be raised."""
     problems = Problems()
-    problems.error(kind, Span(Source(str(folder)), 1, 1), label, help)
+    problems.error(kind, start_of(folder), label, help)
     return SpecError(problems.found)
+
+
+def start_of(path: Path) -> Span:
+    """Return the place of a folder or file as a whole."""
+    return Span(Source(str(path)), 1, 1)

@@ -9,6 +9,7 @@ from typing import Literal
 from language.declaration import Formula
 from language.event_name import EventName
 from language.problem import Span
+from language.units import shown_unit
 
 SignalKind = Literal["peak", "max", "min", "mean", "rms", "final", "settling", "frequency"]
 Bound = Fraction | str | None
@@ -109,11 +110,22 @@ MATCH_PARTS = {
 
 @dataclass(frozen=True)
 class Column:
-    """A column of the store; a list is one of reals, `unit` is in SI."""
+    """A column of the store; a list is one of reals, `unit` is in SI.
+
+    It is shown in the unit `shown`: value in SI = factor * shown value + offset.
+    """
 
     name: str
     type: Literal["real", "whole", "truth", "text", "list"]
     unit: str
+    shown: str = ""
+    factor: float = 1.0
+    offset: float = 0.0
+
+    @property
+    def label(self) -> str:
+        """The unit in which it is shown, for readers."""
+        return shown_unit(self.shown or self.unit)
 
 
 def columns_of(measure: Measure) -> tuple[Column, ...]:

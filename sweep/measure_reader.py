@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from fractions import Fraction
 
 from language.declaration import Formula
+from language.difference import difference
 from language.dimension import DimensionCheck
 from language.document import Entry, Node, Scalar, Table
 from language.event_name import EventName, read_event
@@ -175,7 +176,7 @@ class MeasureReader(Reader):
         within = Fraction(0)
         if kind == "settling":
             told = len(self.problems.found)
-            within, _ = self.quantity(own.get("within"), "within", entry.span, unit)
+            within = difference(self, own.get("within"), "within", entry.span, unit)
             if within <= 0 and len(self.problems.found) == told:
                 self.problems.error("range", entry.span, "`within` of `settling` is above zero")
         by = self.choice(own.get("by"), "by", ("crossings", "spectrum"), "crossings")

@@ -15,9 +15,11 @@ from numpy.typing import NDArray
 from engine.band import PALETTE
 from engine.plot import QUANTITIES, Picture
 from language.text import visible
+from sweep.bins import bin_ends
+from sweep.measure import Column
 from sweep.store import Store
 from sweep.summary import group_values
-from sweep.table import Reals, Table
+from sweep.table import Reals, Table, in_unit
 
 MOST_LINES = 2000
 """Lines of parallel coordinates; of more variants evenly spread ones are drawn."""
@@ -25,6 +27,11 @@ BINS = 12
 """Bins along each axis of a heat map of drawn values, and of histograms at most."""
 MOST_ANNOTATED = 144
 """Cells of a heat map up to which each has its number written in it."""
+LARGEST = 1.0e300
+"""Magnitudes above it are not drawn: axes have room beside the numbers, up to 1e308 in all."""
+MOST_ACROSS = 75
+"""Characters of labels, with a space each, that stand side by side below a heat map: 0.06 inch each
+in 4.8 inches."""
 
 
 def pictures(store: Store) -> dict[str, Picture]:
@@ -37,7 +44,7 @@ def pictures(store: Store) -> dict[str, Picture]:
     for name, plot in store.manifest.presentation.plots.items():
         count = int(np.sum(table.is_done))
         figure = draw[plot["kind"]](table, plot) if count else _empty()
-        title = f"{store.manifest.study}: {name} ({count} variants)"
+        title = f"{store.manifest.study}: {name} ({count} variants{_left_out(table, plot)})"
         figure.suptitle(visible(title), x=0.01, ha="left", fontsize=11, parse_math=False)
         found[name] = Picture(figure)
     return found
@@ -49,20 +56,32 @@ def _empty() -> Figure:
     return figure
 
 
-def _unit(table: Table, name: str) -> str:
+def _column(table: Table, name: str) -> Column:
     manifest = table.store.manifest
-    return next((c.unit for c in (*manifest.varied, *manifest.measures) if c.name == name), "1")
+    return next(c for c in (*manifest.varied, *manifest.measures) if c.name == name)
 
 
 def _label(table: Table, name: str) -> str:
-    unit = _unit(table, name)
-    quantity = QUANTITIES.get(unit, "")
+    column = _column(table, name)
+    quantity = QUANTITIES.get(column.unit, "")
     extra = f", {quantity}" if quantity not in ("", "number") else ""
-    return visible(f"{name}{extra} [{unit}]" if unit != "1" else name)
+    return visible(f"{name}{extra} [{column.label}]" if column.label != "1" else name)
 
 
 def _done(table: Table, name: str) -> Reals:
-    return table.reals(name)[table.is_done]
+    """Return a column of the variants that are done, in the unit in which it is shown."""
+    return _drawable(in_unit(table.reals(name)[table.is_done], _column(table, name)))
+
+
+def _drawable(values: Reals) -> Reals:
+    return np.where(np.abs(values) <= LARGEST, values, np.nan)
+
+
+def _left_out(table: Table, plot: Mapping[str, Any]) -> str:
+    """Return how many numbers of the measures of a picture are too large for it, if any."""
+    drawn = [table.pooled(name) for name in plot["of"]]
+    count = sum(int(np.sum(np.abs(p.values[table.is_done[p.rows]]) > LARGEST)) for p in drawn)
+    return f", without {count} numbers above {LARGEST:g}" if count else ""
 
 
 # Heat map.
@@ -82,7 +101,8 @@ def _heat_map(table: Table, plot: Mapping[str, Any]) -> Figure:
     figure = Figure(figsize=(7.5, 5.0), layout="constrained")
     axis = figure.subplots()
     image = axis.imshow(cells, origin="lower", aspect="auto", cmap="viridis")
-    axis.set_xticks(range(len(x_ticks)), [f"{v:.4g}" for v in x_ticks], fontsize=8)
+    names = [f"{v:.4g}" for v in x_ticks]
+    axis.set_xticks(range(len(x_ticks)), names, fontsize=8, rotation=_turned(names))
     axis.set_yticks(range(len(y_ticks)), [f"{v:.4g}" for v in y_ticks], fontsize=8)
     axis.set_xlabel(_label(table, x_name), parse_math=False)
     axis.set_ylabel(_label(table, y_name), parse_math=False)
@@ -90,6 +110,11 @@ def _heat_map(table: Table, plot: Mapping[str, Any]) -> Figure:
     bar.set_label(f"median {_label(table, measure)}", parse_math=False)
     _annotate(axis, cells)
     return figure
+
+
+def _turned(names: Sequence[str]) -> float:
+    """Return how far labels below an axis are turned [deg]: so that none is over another."""
+    return 90.0 if len(names) * (max(map(len, names), default=0) + 1) > MOST_ACROSS else 0.0
 
 
 def _annotate(axis: Axes, cells: Reals) -> None:
@@ -105,12 +130,16 @@ def _annotate(axis: Axes, cells: Reals) -> None:
 
 
 def _binned(values: Reals) -> tuple[NDArray[np.int64], Reals]:
-    """Return the bin of each value, and the middles of the bins: the values where they are few."""
+    """Return the bin of each value, and the middles of the bins: the values where they are few.
+
+    Of many values those that are not there are in no bin: -1.
+    """
     unique, places = np.unique(values, return_inverse=True)
     if len(unique) <= 2 * BINS:
         return places.reshape(-1).astype(np.int64), unique
-    ends = np.linspace(unique[0], unique[-1], BINS + 1)
+    ends = np.linspace(np.nanmin(unique), np.nanmax(unique), BINS + 1)
     places = np.clip(np.searchsorted(ends, values, side="right") - 1, 0, BINS - 1)
+    places[np.isnan(values)] = -1
     return places.astype(np.int64), (ends[:-1] + ends[1:]) / 2.0
 
 
@@ -239,10 +268,8 @@ def _histogram(table: Table, plot: Mapping[str, Any]) -> Figure:
     if by:
         places, names = group_values(table, by[0])
         groups = [(f"{by[0]}: {name}", places == k) for k, name in enumerate(names)]
-    kept = table.is_done[pooled.rows]
-    ends = np.histogram_bin_edges(pooled.values[kept], bins="auto") if kept.any() else [0.0, 1.0]
-    if len(ends) > 60:
-        ends = np.linspace(ends[0], ends[-1], 61)
+    kept = table.is_done[pooled.rows] & (np.abs(pooled.values) <= LARGEST)
+    ends = bin_ends(pooled.values[kept])
     figure = Figure(figsize=(7.5, 1.0 + 2.2 * len(groups)), layout="constrained")
     axes = figure.subplots(len(groups), 1, sharex=True, squeeze=False)[:, 0]
     for axis, (title, chosen) in zip(axes, groups, strict=True):

@@ -25,9 +25,13 @@ class Point:
     replicate: int
     values: dict[str, float]
 
-    def seed(self, base: int, replicates: int) -> int:
-        """Return the seed of the noise: each sample and each replicate has noise of its own."""
-        return (base + self.sample * replicates + self.replicate) % LARGEST_SEED
+    def seed(self, base: int, replicates: int, each: int = 1) -> int:
+        """Return the seed of the noise: each sample and each replicate has noise of its own.
+
+        `each` samples of one block or path share it: their differences are not those of noise
+        (common random numbers; Law, Simulation Modeling and Analysis, 5th ed. 2015, section 11.2).
+        """
+        return (base + self.sample // each * replicates + self.replicate) % LARGEST_SEED
 
 
 def points_of(study: Study, start: int, stop: int) -> list[Point]:

@@ -12,10 +12,11 @@ from engine.starting import programs_of
 from engine.stimulus import resolved
 from language.experiment import Scenario
 from language.printing import digest as program_digest
+from sweep.sampling_reader import LARGEST_SEED, MOST_POINTS
 from sweep.study import Course, Kind, Study, points_each
 from sweep.study_reader import signals_of
 
-FORMAT = 1
+FORMAT = 2
 """Form of the results: those of another one are not continued."""
 
 
@@ -51,14 +52,24 @@ def program_digests(study: Study) -> dict[str, str]:
 
 
 def resampled(study: Study, samples: int | None = None, seed: int | None = None) -> Study:
-    """Return a study with another number of drawn points, or another seed. Raises ValueError."""
+    """Return a study with another number of drawn points, or another seed.
+
+    Raises ValueError for what the file of a study could not say either.
+    """
     old = study.sampling
     if (samples is not None or seed is not None) and not old.count:
         raise ValueError(f"`{study.name}` draws nothing: it has no samples and no seed")
+    if samples is not None and not 1 <= samples <= MOST_POINTS:
+        raise ValueError(f"{samples} samples are not from 1 to {MOST_POINTS}")
+    if seed is not None and not 0 <= seed <= LARGEST_SEED:
+        raise ValueError(f"the seed {seed} is not from 0 to {LARGEST_SEED}")
     each = points_each(old.method, len(study.drawn))
     count = old.count if samples is None else samples * each
     new = dataclasses.replace(old, count=count, seed=old.seed if seed is None else seed)
-    return dataclasses.replace(study, sampling=new)
+    made = dataclasses.replace(study, sampling=new)
+    if made.count > MOST_POINTS:
+        raise ValueError(f"the study would have {made.count} variants; at most {MOST_POINTS}")
+    return made
 
 
 def digest_of(identity: Mapping[str, str]) -> str:

@@ -9,7 +9,7 @@ from language.document import Entry, Node, Scalar
 from language.problem import Problems, nearest
 from language.reader import Reader
 from sweep.measure import Measure, columns_of
-from sweep.study import Axis, Kind, Presentation, Varied
+from sweep.study import LEAST_SURE, MOST_SURE, Axis, Kind, Presentation, Varied
 
 PLOTS: dict[str, tuple[str, ...]] = {
     "heat_map": ("over", "by"),
@@ -40,6 +40,7 @@ class PresentationReader(Reader):
         self.columns = [column.name for column in columns]
         self.numbers = [column.name for column in columns if column.type != "list"]
         self.is_plural = len(kinds) > 1
+        self.example = self.numbers[0] if self.numbers else "late"
 
     def presentation(self, summary: Node | None, plots: Node | None) -> Presentation:
         """Return what the sections say."""
@@ -49,8 +50,8 @@ class PresentationReader(Reader):
         node = table.get("confidence")
         if node is not None:
             confidence = float(self.quantity(node, "confidence", node.span, None)[0])
-            if not 0.5 <= confidence < 1.0:
-                label = "`confidence` is a share from 0.5 to below 1, like 0.95"
+            if not LEAST_SURE <= confidence <= MOST_SURE:
+                label = f"`confidence` is a share from {LEAST_SURE:g} to {MOST_SURE!r}, like 0.95"
                 self.problems.error("range", node.span, label)
         found = {entry.key: self._plot(entry) for entry in self.named(plots, "plots")}
         return Presentation(tuple(by), confidence, found)
@@ -72,6 +73,9 @@ class PresentationReader(Reader):
         of = self._names(
             node, kind, self.columns if kind == "histogram" else self.numbers, not many
         )
+        if kind != "parallel" and len(of) != 1 and len(self.problems.found) == told:
+            label = f"a `{kind}` is of one measure"
+            self.problems.error("form", entry.span, label, f"like `{{{kind}: {self.example}}}`")
         found: dict[str, Any] = {"kind": kind, "of": of}
         if kind == "heat_map":
             found["over"] = self._names(own.get("over"), "over", self.varied)

@@ -1,15 +1,22 @@
-"""Rows file: rows of a block as the bytes of a Parquet file."""
+"""Rows file: rows of a block as the bytes of a Parquet file, which carries a digest of itself."""
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Sequence
 from types import ModuleType
-from typing import Any
+from typing import Any, Literal
 
 from engine.arrow import arrow_for
 from sweep.block import Block, Row
-from sweep.manifest import Manifest
+from sweep.manifest import TYPES, Manifest
+
+Fault = Literal["", "damaged", "another"]
+"""What is wrong with a file: nothing; its bytes are not those written; it is of another study."""
+TAG = b"sha256:"
+NO_DIGEST = b"0" * hashlib.sha256().digest_size * 2
+"""What stands for the digest of a file, in its metadata, while that is made."""
 
 
 def block_file(manifest: Manifest, block: Block, rows: Sequence[Row]) -> bytes:
@@ -22,37 +29,81 @@ def mark_of(manifest: Manifest, block: Block) -> bytes:
     return f"{manifest.digest} {block.start}-{block.stop}".encode()
 
 
+def fault_of(manifest: Manifest, block: Block, data: bytes) -> Fault:
+    """Return what is wrong with the file of a block.
+
+    The digest is looked at before pyarrow sees the file; one without it was not written here.
+    """
+    arrow = arrow_module()
+    body, digest = _without_digest(data)
+    if hashlib.sha256(body).hexdigest().encode() != digest:
+        return "damaged"
+    try:
+        file = arrow.parquet.ParquetFile(arrow.BufferReader(data))
+        kept, schema = file.metadata, file.schema_arrow
+    except (OSError, ValueError, arrow.ArrowException):
+        return "damaged"
+    mark = (kept.metadata or {}).get(b"modewright", b"")
+    if mark.split(b" ")[0] != manifest.digest.encode():
+        return "another"
+    fine = mark == mark_of(manifest, block) and kept.num_rows == block.stop - block.start
+    return "" if fine and schema.equals(_schema(manifest)) else "damaged"
+
+
 def parquet_of(manifest: Manifest, rows: Sequence[Row], mark: bytes) -> bytes:
     """Return rows as a Parquet file that carries a mark: of what study and block it is."""
     arrow = arrow_module()
-    columns: dict[str, Any] = {
-        "number": arrow.array([row.number for row in rows], arrow.int64()),
-        "variant": arrow.array([row.variant for row in rows], arrow.string()),
-        "scenario": arrow.array([row.scenario for row in rows], arrow.string()),
-        "sample": arrow.array([row.sample for row in rows], arrow.int64()),
-        "replicate": arrow.array([row.replicate for row in rows], arrow.int64()),
-        "seed": arrow.array([row.seed for row in rows], arrow.int64()),
+    columns: dict[str, list[Any]] = {
+        name: [getattr(row, name) for row in rows] for name in (*PLACE, *END)
     }
     for column in manifest.varied:
-        cells = [row.values.get(column.name) for row in rows]
-        columns[column.name] = arrow.array(cells, arrow.float64())
-    columns["status"] = arrow.array([row.status for row in rows], arrow.string())
-    columns["message"] = arrow.array([row.message for row in rows], arrow.string())
-    types = {
-        "real": arrow.float64(), "whole": arrow.int64(), "text": arrow.string(),
-        "truth": arrow.bool_(),
-        "list": arrow.list_(arrow.float64()),
-    }  # fmt: skip
+        columns[column.name] = [row.values.get(column.name) for row in rows]
     for column in manifest.measures:
-        measured = [row.measures[column.name] for row in rows]
-        columns[column.name] = arrow.array(measured, types[column.type])
+        columns[column.name] = [row.measures[column.name] for row in rows]
     units = {column.name: column.unit for column in (*manifest.varied, *manifest.measures)}
     kept = {b"modewright": mark, b"units": json.dumps(units).encode()}
+    schema = _schema(manifest).with_metadata(kept)
+    arrays = [arrow.array(columns[field.name], field.type) for field in schema]
     sink = arrow.BufferOutputStream()
-    table = arrow.table(columns, metadata=kept)
-    arrow.parquet.write_table(table, sink, compression="zstd")
+    with arrow.parquet.ParquetWriter(sink, schema, compression="zstd") as writer:
+        writer.write_table(arrow.table(arrays, schema=schema))
+        writer.add_key_value_metadata({b"digest": TAG + NO_DIGEST})
     data: bytes = sink.getvalue().to_pybytes()
-    return data
+    first = data.rfind(TAG) + len(TAG)
+    digest = hashlib.sha256(data).hexdigest().encode()
+    return data[:first] + digest + data[first + len(digest) :]
+
+
+PLACE = {
+    "number": "whole", "variant": "text", "scenario": "text", "sample": "whole",
+    "replicate": "whole", "seed": "whole",
+}  # fmt: skip
+END = {"status": "text", "message": "text"}
+"""The columns of every store, before and after what varies."""
+
+
+def _schema(manifest: Manifest) -> Any:
+    """Return the columns of a store in their order, with the types that pyarrow has for them."""
+    arrow = arrow_module()
+    kinds = {
+        **PLACE, **{column.name: column.type for column in manifest.varied},
+        **END, **{column.name: column.type for column in manifest.measures},
+    }  # fmt: skip
+    made = {
+        kind: arrow.list_(arrow.float64()) if kind == "list" else getattr(arrow, name)()
+        for kind, name in TYPES.items()
+    }
+    return arrow.schema([(name, made[kind]) for name, kind in kinds.items()])
+
+
+def _without_digest(data: bytes) -> tuple[bytes, bytes]:
+    """Return a file as it was when its digest was made, and that; empty: it has none."""
+    place = data.rfind(TAG)
+    first = place + len(TAG)
+    last = first + len(NO_DIGEST)
+    if place < 0 or last > len(data):
+        return data, b""
+    return data[:first] + NO_DIGEST + data[last:], data[first:last]
 
 
 def arrow_module() -> ModuleType:

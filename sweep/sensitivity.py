@@ -9,17 +9,20 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sweep.design import LEVELS, STRIDE
+from sweep.design import STRIDE, morris_shares
 from sweep.interval import Interval
 from sweep.manifest import Design, refused
 from sweep.measure import Column
+from sweep.moments import scaled
 from sweep.store import Store
+from sweep.study import LEVELS
 from sweep.summary import group_values
 from sweep.table import Reals, Table
 
@@ -28,6 +31,8 @@ REPLICATES = 500
 SEED = 1
 FEWEST = 4
 """Complete blocks or paths below which nothing is told."""
+NAMES = {"saltelli": ("first", "total"), "morris": ("mu_star", "mu", "sigma")}
+"""The indices of a design."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +41,8 @@ class Index:
 
     `values` and `intervals` by name: `first`, `total` (shares of the variance), or `mu_star`, `mu`,
     `sigma` [unit of the measure]: of the change from one share to another, over their difference.
-    `used` blocks or paths of `count` are complete: every point is done and has the measure.
+    `used` blocks or paths of `count` are complete: every point is done and has the measure. Of
+    fewer than FEWEST nothing is told: the values are NaN.
     """
 
     group: Mapping[str, str]
@@ -51,10 +57,15 @@ class Index:
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """The indices of a study, and of which design they are."""
+    """The indices of a study, and of which design they are.
+
+    So many variants of those `expected` are there; `counts`: how they ended.
+    """
 
     study: str
     digest: str
+    expected: int
+    counts: Mapping[str, int]
     method: str
     confidence: float
     indices: tuple[Index, ...]
@@ -63,22 +74,22 @@ class Sensitivity:
         """Return the indices as CSV, numbers in SI."""
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
-        if self.indices:
-            first = self.indices[0]
-            ends = [f"{name}_{end}" for name in first.intervals for end in ("from", "to")]
-            names = [*first.group, "measure", "unit", "name", *first.values, *ends, "used", "count"]
-            writer.writerow(names)
+        groups = list(self.indices[0].group) if self.indices else []
+        names = NAMES[self.method]
+        ends = [f"{name}_{end}" for name in names for end in ("from", "to")]
+        writer.writerow([*groups, "measure", "unit", "name", *names, *ends, "used", "count"])
         for one in self.indices:
             ends = [str(end) for pair in one.intervals.values() for end in pair or ("", "")]
             head = [*one.group.values(), one.measure, one.unit, one.name]
-            writer.writerow([*head, *one.values.values(), *ends, one.used, one.count])
+            values = ["" if math.isnan(value) else value for value in one.values.values()]
+            writer.writerow([*head, *values, *ends, one.used, one.count])
         return text.getvalue()
 
 
 def sensitivity_of(store: Store) -> Sensitivity:
     """Return the indices of what a store holds so far. Raises SpecError, ToolMissing."""
     manifest, design = store.manifest, store.manifest.design
-    if design is None:
+    if not design.has_indices:
         label = f"the points of `{manifest.study}` are no design of which indices are made"
         hint = "draw them by `sampling: {saltelli: 256, seed: 1}`, or fewer by `{morris: 50}`"
         raise refused(store.folder, "store", label, hint)
@@ -89,14 +100,21 @@ def sensitivity_of(store: Store) -> Sensitivity:
         if column.type != "list"
         for index in _of_measure(table, design, column)
     ]
-    confidence = manifest.presentation.confidence
-    return Sensitivity(manifest.study, manifest.digest, design.method, confidence, tuple(found))
+    return Sensitivity(
+        study=manifest.study,
+        digest=manifest.digest,
+        expected=manifest.count,
+        counts=table.counts,
+        method=design.method,
+        confidence=manifest.presentation.confidence,
+        indices=tuple(found),
+    )
 
 
 def sobol_indices(results: Reals) -> dict[str, Reals]:
     """Return indices (d,) of results (n, d + 2) at A, B and A with a column of B."""
     a, b, mixed = results[:, :1], results[:, 1:2], results[:, 2:]
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         variance = np.var(results[:, :2])
         mean = np.mean(results[:, :2])
         first = np.mean((b - mean) * (mixed - a), axis=0) / variance
@@ -106,57 +124,78 @@ def sobol_indices(results: Reals) -> dict[str, Reals]:
 
 def morris_indices(effects: Reals) -> dict[str, Reals]:
     """Return indices (d,) of elementary effects (n, d)."""
-    return {
-        "mu_star": np.mean(np.abs(effects), axis=0),
-        "mu": np.mean(effects, axis=0),
-        "sigma": np.std(effects, axis=0, ddof=1),
-    }
+    with np.errstate(over="ignore", invalid="ignore"):  # what is too large is no number: not told
+        return {
+            "mu_star": np.mean(np.abs(effects), axis=0),
+            "mu": np.mean(effects, axis=0),
+            "sigma": np.std(effects, axis=0, ddof=1),
+        }
 
 
 def elementary_effects(results: Reals, shares: Reals) -> Reals:
-    """Return effects (n, d) of results (n, d + 1) at points (n, d + 1, d) of paths."""
+    """Return effects (n, d) of results (n, d + 1) at shares (n, d + 1, d) of paths.
+
+    Each step changes the share of one thing by the stride, whatever becomes of its value: one that
+    draws the same value again has no effect.
+    """
     moved = np.diff(shares, axis=1)
     changed = np.argmax(np.abs(moved), axis=2)
     sign = np.sign(np.take_along_axis(moved, changed[:, :, None], axis=2)[:, :, 0])
-    found = np.empty(changed.shape)
-    np.put_along_axis(found, changed, sign * np.diff(results, axis=1) * LEVELS / STRIDE, axis=1)
+    found = np.full(changed.shape, np.nan)
+    with np.errstate(over="ignore", invalid="ignore"):
+        steps = sign * np.diff(results, axis=1) * LEVELS / STRIDE
+    np.put_along_axis(found, changed, steps, axis=1)
     return found
 
 
 def _of_measure(table: Table, design: Design, column: Column) -> Iterator[Index]:
     """Yield the indices of a measure in each group: variant, scenario, point of the grid."""
     size = len(design.names)
-    each = size + (2 if design.method == "saltelli" else 1)
     samples = table.reals("sample").astype(np.int64)
     values = np.where(table.is_done, table.reals(column.name), np.nan)
-    count = (int(samples.max()) + 1) // each if len(samples) else 0
-    drawn = {name: table.reals(name) for name in design.names}
+    confidence = table.store.manifest.presentation.confidence
     for group, chosen in _groups(table, design):
-        results = _at(samples[chosen], values[chosen], count, each)
-        points = [_at(samples[chosen], drawn[name][chosen], count, each) for name in design.names]
-        fine = ~np.isnan(results).any(axis=1)
+        results = _at(samples[chosen], values[chosen], design)
+        fine = np.flatnonzero(~np.isnan(results).any(axis=1))
+        used, _ = scaled(results[fine])  # shares of a variance have no unit
         estimate: Callable[[Reals], dict[str, Reals]] = sobol_indices
         if design.method == "morris":
-            results = elementary_effects(results, np.stack(points, axis=2))
+            numbers = (fine[:, None] * design.each + np.arange(design.each)).reshape(-1)
+            shares = morris_shares(size, numbers, design.seed)
+            shares = shares.reshape(len(fine), design.each, size)
+            used = elementary_effects(results[fine], shares)
             estimate = morris_indices
-        used = results[fine]
-        if len(used) < FEWEST:
-            continue
-        found = estimate(used)
-        ends = _intervals(used, estimate, table.store.manifest.presentation.confidence)
+        found = {name: np.full(size, np.nan) for name in NAMES[design.method]}
+        ends: dict[str, tuple[Reals, Reals]] = {}
+        if len(used) >= FEWEST:
+            found, ends = estimate(used), _intervals(used, estimate, confidence)
         for place, name in enumerate(design.names):
-            own = {key: float(numbers[place]) for key, numbers in found.items()}
-            sure = {key: (float(e[0][place]), float(e[1][place])) for key, e in ends.items()}
-            yield Index(group, column.name, column.unit, name, own, sure, len(used), count)
+            own: dict[str, float] = dict.fromkeys(found, np.nan)
+            sure: dict[str, Interval] = dict.fromkeys(found)
+            if _has_moved(table.reals(name)[chosen]):
+                own = {key: float(numbers[place]) for key, numbers in found.items()}
+                sure |= {
+                    key: _interval(low[place], high[place]) for key, (low, high) in ends.items()
+                }
+            yield Index(group, column.name, column.unit, name, own, sure, len(used), design.planned)
 
 
-def _at(samples: NDArray[np.int64], values: Reals, count: int, each: int) -> Reals:
-    """Return values (count, each) by their place in the design, the mean over replicates."""
-    size = count * each
-    inside = samples < size
-    total = np.bincount(samples[inside], values[inside], size)
-    times = np.bincount(samples[inside], minlength=size)
-    return (total / np.where(times > 0, times, np.nan)).reshape(count, each)
+def _has_moved(drawn: Reals) -> bool:
+    """Tell whether drawn values (n,) are not all one: of what never changed nothing is known."""
+    return len(drawn) > 0 and float(np.min(drawn)) < float(np.max(drawn))
+
+
+def _interval(low: float, high: float) -> Interval:
+    """Return an interval, None where an end is no number."""
+    return (float(low), float(high)) if np.isfinite(low) and np.isfinite(high) else None
+
+
+def _at(samples: NDArray[np.int64], values: Reals, design: Design) -> Reals:
+    """Return values (n, each) by their place in the design, the mean over all replicates."""
+    total = np.bincount(samples, values, design.count)
+    times = np.bincount(samples, minlength=design.count)
+    means = total / np.where(times == design.replicates, times, np.nan)
+    return np.asarray(means.reshape(-1, design.each))
 
 
 def _groups(table: Table, design: Design) -> Iterator[tuple[dict[str, str], NDArray[np.bool_]]]:

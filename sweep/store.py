@@ -15,14 +15,27 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from language.problem import SpecError
+from language.problem import Problems, SpecError
 from sweep.block import Block, Row
-from sweep.manifest import MANIFEST, Manifest, manifest_json, read_manifest, refused
-from sweep.rows_file import arrow_module, block_file, mark_of
+from sweep.manifest import MANIFEST, Manifest, manifest_json, refused, start_of
+from sweep.manifest_reader import read_manifest
+from sweep.rows_file import arrow_module, block_file, fault_of
 
 BLOCKS = "blocks"
 LOCK = ".lock"
-NAME = re.compile(r"(\d{10})-(\d{10})\.parquet")
+NAME = re.compile(r"(\d{10})-(\d{10})\.parquet", re.ASCII)
+AGAIN = "the sweep that made these results computes them again: the same command"
+
+
+@dataclass(frozen=True)
+class Found:
+    """The blocks of a store that are there, and files of blocks that are not as they were written.
+
+    What is damaged counts as missing: it is computed again, and replaced.
+    """
+
+    whole: tuple[Block, ...]
+    damaged: tuple[Path, ...]
 
 
 @dataclass(frozen=True)
@@ -32,32 +45,42 @@ class Store:
     folder: Path
     manifest: Manifest
 
-    def finished(self) -> set[int]:
-        """Return the starts of the blocks that are there; one that cannot be read is removed."""
-        arrow = arrow_module()
-        found = set()
+    def found(self) -> Found:
+        """Return which blocks are there, as their digests tell.
+
+        Raises SpecError for what is no block of these results; it is left where it is.
+        """
+        whole, damaged, problems = [], [], Problems()
         for path, block in self._files():
             try:
-                kept = arrow.parquet.read_metadata(path)
-                mine = (kept.metadata or {}).get(b"modewright") == mark_of(self.manifest, block)
-                fine = mine and kept.num_rows == block.stop - block.start
-            except (OSError, arrow.ArrowException):
-                fine = False
-            if fine and block in self._known:
-                found.add(block.start)
+                fault = fault_of(self.manifest, block, path.read_bytes())
+            except OSError as error:
+                problems.error("store", start_of(path), f"this cannot be read: {error.strerror}")
+                continue
+            if fault == "another" or not self.manifest.has(block):
+                label = f"this is no block of the results of `{self.manifest.study}` here"
+                problems.error("store", start_of(path), label, "move it elsewhere")
+            elif fault:
+                damaged.append(path)
             else:
-                path.unlink(missing_ok=True)
-        return found
+                whole.append(block)
+        problems.stop_if_any()
+        return Found(tuple(whole), tuple(damaged))
 
-    @property
-    def _known(self) -> set[Block]:
-        return set(self.manifest.blocks)
+    def finished(self) -> set[int]:
+        """Return the starts of the blocks that are there and not damaged. Raises SpecError."""
+        return {block.start for block in self.found().whole}
 
     def _files(self) -> Iterator[tuple[Path, Block]]:
-        for path in sorted((self.folder / BLOCKS).iterdir()):
-            match = NAME.fullmatch(path.name)
+        try:
+            names = sorted(path.name for path in (self.folder / BLOCKS).iterdir())
+        except (FileNotFoundError, NotADirectoryError):
+            label = f"the folder `{BLOCKS}` is missing, and with it the results"
+            raise refused(self.folder, "store", label, AGAIN) from None
+        for name in names:
+            match = NAME.fullmatch(name)
             if match:
-                yield path, Block(int(match[1]), int(match[2]))
+                yield self.folder / BLOCKS / name, Block(int(match[1]), int(match[2]))
 
     def paths(self) -> list[Path]:
         """Return the files of the finished blocks in their order."""
@@ -111,14 +134,9 @@ def open_store(folder: Path, wanted: Manifest) -> Store:
     Raises SpecError where the folder holds results of something else, OSError, ToolMissing.
     """
     arrow_module()
-    if (folder / MANIFEST).exists():
-        there = read_manifest(folder)
-        if there.digest != wanted.digest:
-            raise _another(folder, there, wanted)
+    there = require_own(folder, wanted)
+    if there:
         wanted = dataclasses.replace(wanted, block=there.block)
-    elif folder.is_dir() and any(p.name != LOCK and p.suffix != ".part" for p in folder.iterdir()):
-        label = "this folder holds something else than the results of a study"
-        raise refused(folder, "store", label, "name another folder, or a new one")
     (folder / BLOCKS).mkdir(parents=True, exist_ok=True)
     write_whole(folder / MANIFEST, manifest_json(wanted))
     store = Store(folder, wanted)
@@ -126,10 +144,32 @@ def open_store(folder: Path, wanted: Manifest) -> Store:
     return store
 
 
+def require_own(folder: Path, wanted: Manifest) -> Manifest | None:
+    """Return what is in a folder of the same results; None: it is empty, or not there.
+
+    Raises SpecError where it holds something else.
+    """
+    if (folder / MANIFEST).exists():
+        there = read_manifest(folder)
+        if there.digest != wanted.digest:
+            raise _another(folder, there, wanted)
+        return there
+    if folder.is_dir() and any(p.name != LOCK and p.suffix != ".part" for p in folder.iterdir()):
+        label = "this folder holds something else than the results of a study"
+        raise refused(folder, "store", label, "name another folder, or a new one")
+    return None
+
+
 def read_store(folder: Path) -> Store:
-    """Open a store to read from it. Raises SpecError, ToolMissing."""
+    """Open a store to read from it. Raises SpecError: also for a damaged block; ToolMissing."""
     arrow_module()
-    return Store(folder, read_manifest(folder))
+    store = Store(folder, read_manifest(folder))
+    problems = Problems()
+    for path in store.found().damaged:
+        label = "this block is damaged: its bytes are not those that were written"
+        problems.error("store", start_of(path), label, AGAIN)
+    problems.stop_if_any()
+    return store
 
 
 @contextmanager

@@ -11,6 +11,8 @@ from language.declaration import Formula
 from language.document import Document
 from language.experiment import Scenario, System
 from language.problem import Span
+from language.units import Unit
+from sweep.description import Description
 from sweep.measure import Measure
 
 Method = Literal["random", "latin_hypercube", "sobol", "saltelli", "morris"]
@@ -64,13 +66,14 @@ class Distribution:
 class Varied:
     """Something that varies: `targets` is empty for a name that only `set` reads.
 
-    `words` are the values of an enumeration, `unit` is in SI.
+    `words` are the values of an enumeration; values are in SI, `unit` is the one they are written
+    and shown in.
     """
 
     name: str
     course: Axis | Distribution
     targets: tuple[Target, ...]
-    unit: str
+    unit: Unit
     span: Span
     words: tuple[str, ...] = ()
 
@@ -122,6 +125,12 @@ class Kind:
     courses: Mapping[str, Course] = field(repr=False)
 
 
+LEAST_SURE, MOST_SURE = 0.5, 0.999999
+"""Shares that a confidence is between: of less an interval is empty, of more without end."""
+LEVELS = 4
+"""Of each thing that varies in a path of Morris: the middles of so many equal shares."""
+
+
 @dataclass(frozen=True)
 class Presentation:
     """How results are shown: no influence on them. `plots` are options by name."""
@@ -136,7 +145,7 @@ class Study:
     """A checked study: everything that a worker needs, without its files.
 
     `every` [s] is the distance of rows, None for that of the scenarios; `identity` are digests of
-    what the results depend on, by part.
+    what the results depend on, by part; `description` are its sections as they are written.
     """
 
     name: str
@@ -151,6 +160,7 @@ class Study:
     presentation: Presentation
     identity: Mapping[str, str]
     span: Span
+    description: Description = field(default_factory=dict)
 
     @property
     def axes(self) -> tuple[Varied, ...]:

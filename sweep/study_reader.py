@@ -18,12 +18,14 @@ from language.scenario import read_scenario
 from language.system import Overrides, around, read_system
 from language.tree import put
 from language.units import SECOND, fits
+from sweep.description import description_of
 from sweep.measure import Measure, SignalMeasure
 from sweep.measure_reader import MeasureReader
 from sweep.presentation_reader import PresentationReader
+from sweep.sampling_reader import MOST_POINTS, SamplingReader
 from sweep.study import Course, Kind, Setting, Study, Varied
 from sweep.target import Place, places_of
-from sweep.vary_reader import MOST_POINTS, VaryReader
+from sweep.vary_reader import VaryReader
 
 STUDY_KEYS = tuple(
     "language study of scenarios variants vary set sampling replicates measures record summary plots".split()  # noqa: SIM905, E501
@@ -74,7 +76,7 @@ class _StudyReader(Reader):
         vary = VaryReader(self.problems, places, next(iter(systems.values())))
         varied = vary.varied(tree.get("vary"))
         settings = vary.settings(tree.get("set"), varied)
-        sampling = vary.sampling(tree.get("sampling"), varied)
+        sampling = SamplingReader(self.problems).sampling(tree.get("sampling"), varied)
         measures = MeasureReader(self.problems, list(systems.values()))
         found = measures.measures(tree.get("measures"), at)
         parts = _are_inputs(varied, settings)
@@ -96,11 +98,16 @@ class _StudyReader(Reader):
             presentation=shown.presentation(tree.get("summary"), tree.get("plots")),
             identity={**self.identity, "study": _digest(_plain(tree, SHOWN_KEYS))},
             span=at,
+            description=description_of(tree, self.overrides),
         )
+        self._check_count(study)
+        return study
+
+    def _check_count(self, study: Study) -> None:
         if study.count > MOST_POINTS:
             label = f"the study has {study.count} variants; at most {MOST_POINTS} are run"
-            self.problems.error("range", at, label, "fewer values on an axis, or drawn points")
-        return study
+            hint = "fewer values on an axis, or drawn points"
+            self.problems.error("range", study.span, label, hint)
 
     def _systems(self, tree: Table, at: Span) -> dict[str, System]:
         """The systems by the name of the variant; `base` where there are no variants."""

@@ -10,11 +10,13 @@ from pathlib import Path
 from sweep.block import Block
 from sweep.executor import Executor, Finished
 from sweep.manifest import Manifest, manifest_of
-from sweep.store import Store, locked, open_store
+from sweep.store import Store, locked, open_store, require_own
 from sweep.study import Study
 
 Progress = Callable[[int, int, int], None]
 """Told how many variants are done, how many of these were there before, and how many in all."""
+Warn = Callable[[str], None]
+"""Told in one line what is not as it should be, and does not end the run."""
 
 
 @dataclass(frozen=True)
@@ -33,12 +35,13 @@ def run_study(
     executor: Executor,
     block: int | None = None,
     progress: Progress | None = None,
+    warn: Warn | None = None,
 ) -> StudyRun:
     """Run a prepared study into a folder, or go on where another run of it ended.
 
     Raises SpecError where the folder is of another study, OSError where it cannot be written.
     """
-    return fill(manifest_of(study, block), folder, partial(executor, study), progress)
+    return fill(manifest_of(study, block), folder, partial(executor, study), progress, warn)
 
 
 def fill(
@@ -46,15 +49,18 @@ def fill(
     folder: Path,
     compute: Callable[[Iterable[Block]], Iterator[Finished]],
     progress: Progress | None = None,
+    warn: Warn | None = None,
 ) -> StudyRun:
     """Fill a store with blocks of any kind of work; what is there is not computed again.
 
-    Raises SpecError where the folder is of something else, OSError where it cannot be written.
+    What is damaged is. Raises SpecError where the folder is of something else, OSError where it
+    cannot be written.
     """
+    require_own(folder, manifest)  # before anything is made there, a lock too
     with locked(folder):
         store = open_store(folder, manifest)
         total = manifest.count
-        there = store.finished()
+        there = _whole(store, warn or _silent)
         missing = [each for each in store.manifest.blocks if each.start not in there]
         before = total - sum(each.stop - each.start for each in missing)
         done, lost = before, []
@@ -79,5 +85,13 @@ def fill(
         return StudyRun(store, before, done - before, tuple(lost))
 
 
-def _silent(done: int, before: int, total: int) -> None:
+def _whole(store: Store, warn: Warn) -> set[int]:
+    """Return the starts of the blocks that are there; tell which are damaged."""
+    found = store.found()
+    for path in found.damaged:
+        warn(f"{path} is damaged: its variants are computed again")
+    return {block.start for block in found.whole}
+
+
+def _silent(*told: object) -> None:
     """Tell nobody."""

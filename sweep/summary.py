@@ -15,26 +15,34 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sweep.interval import Interval, of_mean, of_quantile, wilson
+from sweep.failure import Failure, failures_of
+from sweep.interval import Interval, by_draw, of_mean, of_quantile, of_rate
 from sweep.measure import Column
+from sweep.moments import deviation_of, mean_of, quantiles_of, total_of
 from sweep.store import Store
-from sweep.table import Reals, Table
+from sweep.table import Reals, Table, in_unit
 
 RATES = {"missed": "truths", "first_missed": ""}
 """Parts of a match that are rates: of how many; an empty text: of the variants that have one."""
+
+NUMBERS = ("mean", "deviation", "median", "p5", "p95", "low", "high", "total")
+SHARES = ("hits", "share")
+"""What a line, and what a rate, has in a table beside its intervals."""
 
 
 @dataclass(frozen=True)
 class Line:
     """One measure in one group: `count` numbers [unit], and what they are like; NaN: too few.
 
-    `mean_interval`, `median_interval` are at the confidence of the study.
+    They come from so many independent `draws`. `mean_interval`, `median_interval` are at the
+    confidence of the study.
     """
 
     group: Mapping[str, str]
     measure: str
     unit: str
     count: int
+    draws: int
     mean: float
     mean_interval: Interval
     deviation: float
@@ -49,42 +57,57 @@ class Line:
 
 @dataclass(frozen=True)
 class Rate:
-    """How often something was the case in one group, with its Wilson interval."""
+    """How often something was the case in one group: `hits` of `count` in so many `draws`."""
 
     group: Mapping[str, str]
     measure: str
     hits: int
     count: int
+    draws: int
     interval: Interval
+
+    @property
+    def share(self) -> float:
+        """The rate; NaN without any."""
+        return self.hits / self.count if self.count else math.nan
 
 
 @dataclass(frozen=True)
 class Summary:
-    """The results of a study: how many variants ended how, lines and rates by group."""
+    """The results of a study: how many variants ended how and why, lines and rates by group."""
 
     study: str
     digest: str
     expected: int
     counts: Mapping[str, int]
+    failures: tuple[Failure, ...]
     confidence: float
     lines: tuple[Line, ...]
     rates: tuple[Rate, ...]
 
     def csv(self) -> str:
-        """Return the lines as CSV, numbers in SI."""
+        """Return lines and rates as CSV, numbers in SI; what one of them has not is empty."""
         text = io.StringIO()
-        writer = csv.writer(text, lineterminator="\n")
-        groups = list(self.lines[0].group) if self.lines else []
-        numbers = ("mean", "deviation", "median", "p5", "p95", "low", "high", "total")
-        ends = [f"{of}_{end}" for of in ("mean", "median") for end in ("from", "to")]
-        writer.writerow([*groups, "measure", "unit", "count", *numbers, *ends])
+        told: list[Line | Rate] = [*self.lines, *self.rates]
+        groups = list(told[0].group) if told else []
+        ends = [f"{of}_{end}" for of in ("mean", "median", "share") for end in ("from", "to")]
+        heads = ("measure", "unit", "count", "draws", *NUMBERS, *SHARES, *ends)
+        writer = csv.DictWriter(text, (*groups, *heads), restval="", lineterminator="\n")
+        writer.writeheader()
         for line in self.lines:
-            cells = [line.group[name] for name in groups]
-            intervals = [*(line.mean_interval or ("", "")), *(line.median_interval or ("", ""))]
-            values = [getattr(line, name) for name in numbers]
-            shown = ["" if math.isnan(value) else value for value in values]
-            writer.writerow([*cells, line.measure, line.unit, line.count, *shown, *intervals])
+            own = {name: value for name in NUMBERS if (value := getattr(line, name)) == value}
+            own |= {"measure": line.measure, "unit": line.unit, "count": line.count}
+            own |= _ends("mean", line.mean_interval) | _ends("median", line.median_interval)
+            writer.writerow({**line.group, **own, "draws": line.draws})
+        for rate in self.rates:
+            own = {"measure": rate.measure, "unit": "1", "count": rate.count, "draws": rate.draws}
+            own |= {"hits": rate.hits, "share": rate.share if rate.count else ""}
+            writer.writerow({**rate.group, **own, **_ends("share", rate.interval)})
         return text.getvalue()
+
+
+def _ends(name: str, interval: Interval) -> dict[str, float]:
+    return {f"{name}_from": interval[0], f"{name}_to": interval[1]} if interval else {}
 
 
 def summary_of(store: Store) -> Summary:
@@ -98,8 +121,9 @@ def summary_of(store: Store) -> Summary:
     for column in (each for each in manifest.measures if each.type not in ("text", "truth")):
         pooled = table.pooled(column.name)
         for name, chosen in groups:
-            values = pooled.values[chosen[pooled.rows]]
-            lines.append(_line(name, column, values, confidence))
+            own = chosen[pooled.rows]
+            draws = table.draws[pooled.rows[own]]
+            lines.append(_line(name, column, pooled.values[own], draws, confidence))
     for column in manifest.measures:
         rates += _rates(table, column, groups, confidence)
     return Summary(
@@ -107,6 +131,7 @@ def summary_of(store: Store) -> Summary:
         digest=manifest.digest,
         expected=manifest.count,
         counts=table.counts,
+        failures=failures_of(table),
         confidence=confidence,
         lines=tuple(lines),
         rates=tuple(rates),
@@ -138,41 +163,47 @@ def group_values(table: Table, name: str) -> tuple[NDArray[np.int64], list[str]]
         return table.words(name)
     manifest = table.store.manifest
     values, places = np.unique(table.reals(name), return_inverse=True)
-    unit = next(column.unit for column in manifest.varied if column.name == name)
+    column = next(column for column in manifest.varied if column.name == name)
     words = manifest.words.get(name)
-    names = [words[int(v)] if words else with_unit(float(v), unit) for v in values]
+    names = [words[int(v)] if words else shown(float(v), column) for v in values]
     return places.reshape(-1), names
 
 
-def with_unit(value: float, unit: str) -> str:
-    """Return a number with its unit, to six digits."""
+def shown(value: float, column: Column) -> str:
+    """Return a value [SI] of a column to six digits, with the unit in which it is shown."""
     if math.isnan(value):
         return "-"
-    return f"{value:.6g}" if unit == "1" else f"{value:.6g} {unit}"
+    number = f"{in_unit(value, column):.6g}"
+    return number if column.label == "1" else f"{number} {column.label}"
 
 
-def _line(group: Mapping[str, str], column: Column, values: Reals, confidence: float) -> Line:
+def _line(
+    group: Mapping[str, str],
+    column: Column,
+    values: Reals,
+    draws: NDArray[np.int64],
+    confidence: float,
+) -> Line:
     count = len(values)
     ordered = np.sort(values)
     nothing = math.nan
-    mean = math.fsum(values) / count if count else nothing
-    spread = math.fsum((values - mean) ** 2) / (count - 1) if count > 1 else nothing
-    p5, median, p95 = np.quantile(ordered, (0.05, 0.5, 0.95)) if count else (nothing,) * 3
+    p5, median, p95 = quantiles_of(ordered, (0.05, 0.5, 0.95)) if count else (nothing,) * 3
     return Line(
         group=group,
         measure=column.name,
         unit=column.unit,
         count=count,
-        mean=mean,
-        mean_interval=of_mean(values, confidence),
-        deviation=math.sqrt(spread) if count > 1 else nothing,
-        median=float(median),
-        median_interval=of_quantile(ordered, 0.5, confidence),  # type: ignore[arg-type]
-        p5=float(p5),
-        p95=float(p95),
+        draws=len(np.unique(draws)),
+        mean=mean_of(values) if count else nothing,
+        mean_interval=of_mean(values, draws, confidence),
+        deviation=deviation_of(values) if count > 1 else nothing,
+        median=median,
+        median_interval=of_quantile(values, draws, 0.5, confidence),
+        p5=p5,
+        p95=p95,
         low=float(ordered[0]) if count else nothing,
         high=float(ordered[-1]) if count else nothing,
-        total=math.fsum(values) if count else nothing,
+        total=total_of(values) if count else nothing,
     )
 
 
@@ -190,6 +221,9 @@ def _rates(
     whole = RATES.get(part, "") if column.type != "truth" else ""
     of = table.reals(f"{base}.{whole}") if whole else (hits == hits).astype(np.float64)
     for group, chosen in groups:
-        seen = int(np.nansum(hits[chosen]))
-        count = int(np.nansum(of[chosen]))
-        yield Rate(group, column.name, seen, count, wilson(seen, count, confidence))
+        known = chosen & (np.nan_to_num(of) > 0.0)
+        draws = table.draws[known]
+        own, sizes = by_draw(hits[known], draws), by_draw(of[known], draws)
+        seen, count = int(np.sum(own)), int(np.sum(sizes))
+        interval = of_rate(own, sizes, confidence)
+        yield Rate(group, column.name, seen, count, len(sizes), interval)

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sweep.block import DONE
+from sweep.measure import Column
 from sweep.rows_file import arrow_module
 from sweep.store import Store
 
 Reals = NDArray[np.float64]
+Values = TypeVar("Values", float, Reals)
 
 
 @dataclass(frozen=True)
@@ -22,6 +24,12 @@ class Pooled:
 
     values: Reals
     rows: NDArray[np.int64]
+
+
+def in_unit(values: Values, column: Column) -> Values:
+    """Return values [SI] in the unit in which their column is shown."""
+    with np.errstate(over="ignore"):
+        return (values - column.offset) / column.factor
 
 
 @dataclass(frozen=True)
@@ -36,7 +44,8 @@ class Table:
             np.asarray(part.cast("float64").to_numpy(zero_copy_only=False), dtype=np.float64)
             for part in self._parts(name)
         ]
-        return np.concatenate(parts) if parts else np.zeros(0)
+        found = np.concatenate(parts) if parts else np.zeros(0)
+        return np.where(np.isfinite(found), found, np.nan)
 
     def pooled(self, name: str) -> Pooled:
         """Return the numbers of a column of reals, whole numbers or lists; none are left out."""
@@ -76,6 +85,18 @@ class Table:
         """Tell of which variants (n_variants,) the measures count."""
         places, names = self.words("status")
         return places == names.index(DONE) if DONE in names else np.zeros(len(places), dtype=bool)
+
+    @cached_property
+    def draws(self) -> NDArray[np.int64]:
+        """Of which independent draw each variant (n_variants,) is.
+
+        A draw is a sample, or a whole block or path; where nothing is drawn, it is the noise of a
+        replicate. All points of the grid, scenarios and variants see the same draws.
+        """
+        design = self.store.manifest.design
+        if not design.count:
+            return self.reals("replicate").astype(np.int64)
+        return self.reals("sample").astype(np.int64) // design.each
 
     def _parts(self, name: str) -> list[Any]:
         parquet = arrow_module().parquet

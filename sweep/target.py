@@ -23,7 +23,10 @@ CLOCKS = ("period", "step", "offset")
 
 @dataclass(frozen=True)
 class Place:
-    """What a name means: where its values go, and what they are."""
+    """What a name means: where its values go, and what they are.
+
+    `is_width`: a difference, which is in no unit with a zero of its own.
+    """
 
     targets: tuple[Target, ...]
     unit: Unit
@@ -31,6 +34,7 @@ class Place:
     values: tuple[str, ...] = ()
     low: float | None = None
     high: float | None = None
+    is_width: bool = False
 
 
 def places_of(system: System, scenarios: list[Document]) -> dict[str, Place]:
@@ -92,7 +96,8 @@ def _sensors(system: System) -> Iterator[tuple[str, Place]]:
                 unit = (
                     TIME if is_time else Unit(str(sensor.dimension), TIME.factor, sensor.dimension)
                 )
-                yield f"{name}.{path}", Place((Target("sensor", (name, field)),), unit)
+                target = Target("sensor", (name, field))
+                yield f"{name}.{path}", Place((target,), unit, is_width=True)
 
 
 def _clocks(system: System) -> Iterator[tuple[str, Place]]:
@@ -112,7 +117,15 @@ def _inputs(system: System, document: Document) -> Iterator[tuple[str, Place]]:
             continue
         for part, unit in _parts(entry.node, thing.unit):
             path = (entry.key, *part)
-            yield "inputs." + ".".join(path), Place((Target("input", path),), unit)
+            is_width = part[-1:] == ("amplitude",)
+            own = _without_zero(unit) if is_width else unit
+            place = Place((Target("input", path),), own, is_width=is_width)
+            yield "inputs." + ".".join(path), place
+
+
+def _without_zero(unit: Unit) -> Unit:
+    """Return the unit of differences of what is in a unit: K for degC."""
+    return Unit(str(unit.dimension), unit.factor, unit.dimension) if unit.offset else unit
 
 
 def _parts(node: object, unit: Unit) -> Iterator[tuple[tuple[str, ...], Unit]]:

@@ -1,31 +1,29 @@
-"""Vary reader: the sections `vary`, `set` and `sampling` of a study."""
+"""Vary reader: the sections `vary` and `set` of a study."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
+from language.difference import HINT, LABEL, difference
 from language.dimension import DimensionCheck
-from language.document import Entry, Items, Node, Scalar
+from language.document import Entry, Items, Node
 from language.experiment import System
 from language.kind import Kind
 from language.names import check_name
 from language.problem import Problems, Span, nearest
 from language.reader import Reader
 from language.scope import Scope
+from language.syntax import Number
 from language.units import NO_UNIT, Unit
-from sweep.study import Axis, Distribution, Sampling, Setting, Shape, Target, Varied, points_each
+from sweep.shape import fault_of_shape, log_spaced
+from sweep.study import Axis, Distribution, Setting, Shape, Target, Varied
 from sweep.target import Place
 
 LISTS = ("values", "linspace", "logspace")
 SHAPES: tuple[Shape, ...] = ("uniform", "log_uniform", "normal", "lognormal", "choice")
 OPTIONS = ("within", "weights")
-METHODS = ("random", "latin_hypercube", "sobol", "saltelli", "morris")
-MOST_POINTS = 10_000_000
-"""Most variants of a study: at 10 000 per second a quarter of an hour, 2 GB of results."""
 MOST_ON_AXIS = 100_000
-LARGEST_SEED = 2**31 - 1
 
 
 class VaryReader(Reader):
@@ -69,7 +67,7 @@ class VaryReader(Reader):
         if place and place.type == "bool":
             words = ("false", "true")
         targets = place.targets if place else ()
-        return Varied(entry.key, course, targets, str(unit.dimension), entry.span, words)
+        return Varied(entry.key, course, targets, unit, entry.span, words)
 
     def _unknown(self, entry: Entry) -> None:
         label = f"`{entry.key}` is nothing that can vary here"
@@ -89,10 +87,10 @@ class VaryReader(Reader):
 
     def _course(self, entry: Entry, place: Place | None) -> tuple[Axis | Distribution | None, Unit]:
         first = place.unit if place else None
+        told = len(self.problems.found)
         if isinstance(entry.node, Items):
             numbers, unit = self._numbers(entry.node, entry.key, first, place)
-            return self._axis(numbers, entry.span), unit
-        told = len(self.problems.found)
+            return self._axis(numbers, entry.span, told), unit
         table = self.table(entry.node, f"vary.{entry.key}", (*LISTS, *SHAPES, *OPTIONS))
         forms = [key for key in table.entries if key in (*LISTS, *SHAPES)]
         if len(forms) != 1:
@@ -107,16 +105,20 @@ class VaryReader(Reader):
             return self._spaced(node, form, first, place)
         numbers, unit = self._numbers(node, form, first, place)
         if form == "values":
-            return self._axis(numbers, entry.span), unit
-        within = self._within(table.get("within"), unit, form)
+            return self._axis(numbers, entry.span, told), unit
+        within = self._within(table.get("within"), unit, form, place)
         weights = tuple(float(w) for w in self._plain(table.get("weights"), "weights"))
         shape = Distribution(form, tuple(map(_real, numbers)), within, weights)  # type: ignore[arg-type]
         if len(self.problems.found) == told:
-            self._check_shape(shape, table.entries[form].span)
+            fault = fault_of_shape(shape)
+            if fault:
+                kind, label = fault
+                self.problems.error(kind, table.entries[form].span, label)
         return shape, unit
 
-    def _axis(self, numbers: Sequence[Fraction], span: Span) -> Axis:
-        if len(set(numbers)) < len(numbers):
+    def _axis(self, numbers: Sequence[Fraction], span: Span, told: int) -> Axis:
+        """Return an axis; one of which a value could not be read has no other fault."""
+        if len(set(numbers)) < len(numbers) and len(self.problems.found) == told:
             self.problems.error("duplicate", span, "a value stands in the list twice")
         return Axis(tuple(map(_real, numbers)))
 
@@ -128,18 +130,19 @@ class VaryReader(Reader):
         if isinstance(node, Items) and not node.nodes:
             self.problems.error("missing", node.span, f"`{what}` has at least one value")
         for item in self.items(node, what):
-            is_width = what in ("normal", "lognormal") and len(found) == 1
-            if is_width and what == "lognormal":
+            is_second = what in ("normal", "lognormal") and len(found) == 1
+            if is_second and what == "lognormal":
                 found += self._plain(Items((item,), item.span), what)
             elif place and place.type != "real":
                 unit = place.unit
                 found.append(self.value(item, what, item.span, unit, place.type, place.values))
+            elif unit and (is_second or (place and place.is_width)):
+                found.append(difference(self, item, what, item.span, unit))
             else:
                 value, own = self.quantity(item, what, item.span, unit)
                 unit = unit or own
                 found.append(value)
-                if not is_width:
-                    self._in_range(value, item.span, place)
+                self._in_range(value, item.span, place)
         return found, unit or NO_UNIT
 
     def _in_range(self, value: Fraction, span: Span, place: Place | None) -> None:
@@ -166,9 +169,7 @@ class VaryReader(Reader):
             if first <= 0 or last <= 0:
                 self.problems.error("range", items[0].span, "`logspace` is between two above zero")
                 return None, unit
-            ratio = float(last / first)
-            values = [float(first) * ratio ** (k / (count - 1)) for k in range(count)]
-            return Axis((*values[:-1], _real(last))), unit
+            return Axis(log_spaced(first, last, count)), unit
         steps = [first + (last - first) * Fraction(k, count - 1) for k in range(count)]
         return Axis(tuple(map(_real, steps))), unit
 
@@ -182,39 +183,17 @@ class VaryReader(Reader):
             found.append(value)
         return found
 
-    def _within(self, node: Node | None, unit: Unit, form: str) -> tuple[float, float] | None:
+    def _within(
+        self, node: Node | None, unit: Unit, form: str, place: Place | None
+    ) -> tuple[float, float] | None:
         limits = self.range(node, unit) if node else None
+        for item in self.items(node, "within") if limits and place and place.is_width else ():
+            difference(self, item, "within", item.span, unit)
         if limits and form not in ("normal", "lognormal"):
             assert node is not None
             label = f"`within` cuts a normal or lognormal; `{form}` has its ends"
             self.problems.error("form", node.span, label)
         return (_real(limits[0]), _real(limits[1])) if limits else None
-
-    def _check_shape(self, shape: Distribution, span: Span) -> None:
-        numbers = shape.numbers
-        if shape.shape == "choice":
-            fits_weights = not shape.weights or len(shape.weights) == len(numbers)
-            if not numbers or not fits_weights or any(w <= 0 for w in shape.weights):
-                label = "a `choice` has values, and `weights` above zero, one for each, or none"
-                self.problems.error("form", span, label)
-            return
-        if shape.weights:
-            self.problems.error("form", span, f"`{shape.shape}` has no `weights`")
-        label = {
-            "uniform": "`uniform` is `[low, high]`",
-            "log_uniform": "`log_uniform` is `[low, high]`, above zero",
-            "normal": "`normal` is `[mean, standard deviation]`",
-            "lognormal": "`lognormal` is `[median, sigma of the logarithm]`",
-        }[shape.shape]  # fmt: skip
-        fine = len(numbers) == 2
-        if fine and shape.shape in ("uniform", "log_uniform"):
-            fine = numbers[0] < numbers[1]
-        elif fine:
-            fine = numbers[1] > 0.0
-        if fine and shape.shape in ("log_uniform", "lognormal"):
-            fine = numbers[0] > 0.0
-        if not fine:
-            self.problems.error("range", span, label)
 
     # What follows from what varies.
 
@@ -241,6 +220,8 @@ class VaryReader(Reader):
             if formula:
                 check = DimensionCheck(scope, self.problems)
                 check.quantity(formula.tree, place.unit.dimension, entry.key)
+                if place.is_width and isinstance(formula.tree, Number) and formula.tree.unit.offset:
+                    self.problems.error("dimension", formula.span, LABEL, HINT)
                 unit = str(place.unit.dimension)
                 found.append(Setting(entry.key, place.targets, formula, unit))
         read = {name for setting in found for name in setting.formula.reads}
@@ -249,41 +230,6 @@ class VaryReader(Reader):
                 label = f"`{each.name}` is no parameter, and no `set` reads it"
                 self.problems.error("name", each.span, label, nearest(each.name, self.places))
         return tuple(found)
-
-    # Sampling.
-
-    def sampling(self, node: Node | None, varied: Sequence[Varied]) -> Sampling:
-        """Return how points are drawn; what contradicts `vary` is reported."""
-        drawn = [each for each in varied if each.is_drawn]
-        if node is None or isinstance(node, Scalar):
-            word = self.choice(node, "sampling", ("grid", "one_at_a_time"), "grid")
-            if drawn:
-                first = drawn[0]
-                label = f"`{first.name}` is drawn, and `sampling` does not say how many points"
-                hint = "like `sampling: {random: 200, seed: 1}`"
-                self.problems.error("missing", first.span, label, hint)
-            return Sampling(one_at_a_time=word == "one_at_a_time")
-        told = len(self.problems.found)
-        table = self.table(node, "sampling", (*METHODS, "seed"))
-        methods = [key for key in table.entries if key in METHODS]
-        if len(methods) != 1:
-            label = f"`sampling` has one of {', '.join(METHODS)}"
-            if len(self.problems.found) == told:
-                self.problems.error("form", node.span, label, "like `{sobol: 256, seed: 1}`")
-            return Sampling()
-        method = methods[0]
-        place = table.entries[method]
-        count = self.whole(place.node, method, 1, 1, MOST_POINTS)
-        if not drawn and not self.problems.has_errors:
-            label = "nothing in `vary` is drawn: `sampling` has no work"
-            self.problems.error("form", place.span, label, "`replicates` repeats with other noise")
-        if method in ("sobol", "saltelli") and count & (count - 1):
-            label = f"{count} is no power of 2: a Sobol sequence loses its balance"
-            near = 1 << round(math.log2(count))
-            self.problems.warning("sampling", place.node.span, label, f"like {near}")
-        seed = self.whole(table.get("seed"), "seed", 0, 0, LARGEST_SEED)
-        count *= points_each(method, len(drawn))
-        return Sampling(method, count, seed)  # type: ignore[arg-type]
 
 
 def _is_list(course: Axis | Distribution) -> bool:

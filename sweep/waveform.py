@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sweep.measure import SignalMeasure
+from sweep.moments import mean_of, root_mean_square, scaled
 
 Reals = NDArray[np.float64]
 FEWEST = 8
@@ -33,19 +34,20 @@ def signal_number(measure: SignalMeasure, times: Reals, values: Reals) -> float 
         case "final":
             return float(values[-1])
         case "mean":
-            return math.fsum(values) / len(values)
+            return mean_of(values)
         case "rms":
-            return math.sqrt(math.fsum(values * values) / len(values))
+            return root_mean_square(values)
         case "settling":
             return settling(times, values, measure.within)
         case "frequency":
             find = by_spectrum if measure.by == "spectrum" else by_crossings
-            return find(times, values)
+            return find(times, scaled(values)[0])
 
 
 def settling(times: Reals, values: Reals, within: float) -> float:
     """Return the time [s] from the start until the signal stays in a band around its last value."""
-    outside = np.flatnonzero(np.abs(values - values[-1]) > within)
+    with np.errstate(over="ignore"):  # of a difference of the largest: it is outside
+        outside = np.flatnonzero(np.abs(values - values[-1]) > within)
     first = int(outside[-1]) + 1 if len(outside) else 0
     return float(times[first] - times[0])
 

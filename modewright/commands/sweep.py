@@ -11,7 +11,8 @@ import typer
 from modewright.commands.options import Json, Sets, usage_errors, values_of
 from modewright.console import announce, console, counted, counting
 from modewright.exits import PROBLEMS
-from modewright.files import OutputError, make_folder, require_writable, write_files
+from modewright.files import OutputError, make_folder, require_beside, write_files
+from modewright.interruption import interrupted_once
 from sweep.cluster_error import ClusterError
 
 if TYPE_CHECKING:
@@ -19,6 +20,12 @@ if TYPE_CHECKING:
 
 PLOTS = "plots"
 FORMATS = ("svg", "png", "pdf")
+OF_A_RUN = {
+    "out": "--out", "workers": "--workers", "cluster": "--cluster", "tls_ca": "--tls-ca",
+    "tls_cert": "--tls-cert", "tls_key": "--tls-key", "sets": "--set", "samples": "--samples",
+    "seed": "--seed", "block": "--block",
+}  # fmt: skip
+"""Options that have no influence on a summary, by parameter."""
 OPEN_WARNING = (
     "warning: {} is not encrypted, and workers run whatever reaches their scheduler (pickles): "
     "use tls:// wherever others share the network"
@@ -29,6 +36,7 @@ TlsFile = Annotated[
 
 
 def sweep(
+    context: typer.Context,
     study: Annotated[str | None, typer.Argument(help="a study: its name or its file")] = None,
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="the folder of the results")
@@ -75,8 +83,10 @@ def sweep(
     modewright sweep my_study.yaml --out results --cluster tls://head:8786 --tls-ca ca.pem
     modewright sweep --summary results --csv summary.csv --report results.html
     """
-    require_writable(report)
     folder = _checked_folder(study, out, summary, form)
+    if summary is not None:
+        _require_nothing_to_run(context)
+    require_beside(folder, table, report)
     lost = 0
     if study is not None:
         options: dict[str, Any] = {"block": block, "samples": samples, "seed": seed}
@@ -86,6 +96,15 @@ def sweep(
     _show(folder, table, report, form, as_json)
     if lost:
         raise typer.Exit(PROBLEMS)
+
+
+def _require_nothing_to_run(context: typer.Context) -> None:
+    """Refuse options that have no influence where nothing is run."""
+    given = {name: context.get_parameter_source(name) for name in OF_A_RUN}
+    used = [OF_A_RUN[name] for name, source in given.items() if source and source.name != "DEFAULT"]
+    if used:
+        label = f"it runs nothing: {', '.join(used)} would have no influence"
+        raise typer.BadParameter(label, param_hint="--summary")
 
 
 def _checked_folder(study: str | None, out: Path | None, summary: Path | None, form: str) -> Path:
@@ -142,15 +161,16 @@ def _run(
         done[:] = [now, total]
         progress(now, before, total)
 
-    try:
-        with counting(f"sweep {study}", "variants") as progress, usage_errors():
-            found = studies.sweep(study, out, values, **options, progress=tell)
-    except KeyboardInterrupt:
-        _tell_kept(out, *done)
-        raise
-    except (OutputError, ClusterError) as error:
-        kept = f"{done[0]} of {done[1]} variants are kept; the same command goes on"
-        raise OutputError(f"{error}; {kept}" if done[1] else str(error)) from None
+    with interrupted_once():
+        try:
+            with counting(f"sweep {study}", "variants") as progress, usage_errors():
+                found = studies.sweep(study, out, values, **options, progress=tell, warn=_warn)
+        except KeyboardInterrupt:
+            _tell_kept(out, *done)
+            raise
+        except (OutputError, ClusterError) as error:
+            kept = f"{done[0]} of {done[1]} variants are kept; the same command goes on"
+            raise OutputError(f"{error}; {kept}" if done[1] else str(error)) from None
     if not as_json:
         _tell_run(found)
     for part, reason in found.lost:
@@ -161,6 +181,11 @@ def _run(
 def _tell_kept(out: Path, now: int, total: int) -> None:
     if total:
         console_error(f"{now} of {total} variants are kept in {out}; the same command goes on")
+
+
+def _warn(text: str) -> None:
+    """Print a warning; a problem says itself that it is one."""
+    console_error(text if ": warning: " in text.split("\n")[0] else f"warning: {text}")
 
 
 def _tell_run(found: StudyRun) -> None:
@@ -176,21 +201,35 @@ def console_error(text: str) -> None:
 
 
 def _show(folder: Path, table: Path | None, report: Path | None, form: str, as_json: bool) -> None:
+    """Tell the summary; then write what is drawn, and what is asked for."""
     from modewright import show_study, studies
     from modewright.show import print_json
 
     found = studies.study_summary(folder)
-    drawn = studies.study_pictures(folder)
-    files = {folder / PLOTS / f"{name}.{form}": p.data(form) for name, p in drawn.items()}
-    if files:
-        make_folder(folder / PLOTS)
-    if table:
-        files[table] = found.csv().encode()
-    if report:
-        files[report] = studies.study_report(folder)
-    write_files(files)
     if as_json:
         print_json(show_study.summary_json(found))
     else:
         show_study.print_summary(console(), found)
-        announce(list(files))
+    written = _drawn(folder, form)
+    files = {table: found.csv().encode()} if table else {}
+    if report:
+        files[report] = studies.study_report(folder)
+    write_files(files)
+    if not as_json:
+        announce([*written, *files])
+
+
+def _drawn(folder: Path, form: str) -> list[Path]:
+    """Write the pictures of a study; where that cannot be, the summary was told all the same."""
+    from modewright import studies
+
+    drawn = studies.study_pictures(folder)
+    files = {folder / PLOTS / f"{name}.{form}": p.data(form) for name, p in drawn.items()}
+    try:
+        if files:
+            make_folder(folder / PLOTS)
+        write_files(files)
+    except OutputError as error:
+        _warn(f"the pictures are not written: {error}")
+        return []
+    return list(files)

@@ -91,7 +91,7 @@ def test_a_lane_that_leaves_its_range_or_ends_does_not_disturb_the_others() -> N
     start = np.array([310.0, 2500.0, 311.0, 312.0, 2395.0])
     batch = batch_of(system, scenario, initial={"plant.w_em": start})
     mine = planned_batch(batch, quick, 1)
-    assert list(mine.faults)[:4] == [False, True, False, False]
+    assert 1 in mine.faults and not {0, 2, 3} & set(mine.faults)
     assert_same_batch(mine, run_variants(batch))
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import re
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import pytest
@@ -12,8 +14,10 @@ from engine.variants import run_variants
 from modewright import study_page
 from modewright.cli import app
 from modewright.exits import exit_code
-from sweep.executor import InProcess
+from sweep.block import Block
+from sweep.executor import Finished, InProcess
 from sweep.store import read_store
+from sweep.study import Study
 from sweep.study_run import run_study
 from tests.sweep.laying import QUICK, study
 
@@ -24,7 +28,7 @@ def test_a_study_is_one_page_that_asks_for_no_other_file(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out, page = tmp_path / "out", tmp_path / "out.html"
-    made = study("grid", DESIGN)
+    made = study("grid", DESIGN, ("of:", "about: a swing that is pushed\nof:"))
     run_study(made, out, QUICK)
     arguments = ["sweep", "--summary", str(out), "--report", str(page)]
     assert exit_code(lambda: app(arguments, standalone_mode=False)) == 0
@@ -38,7 +42,14 @@ def test_a_study_is_one_page_that_asks_for_no_other_file(
     assert read_store(out).manifest.digest in text
     for part in (
         "mu_star",
-        "peak [m]: the largest magnitudes",
+        "peak [m]: the highest",
+        "peak [m]: the lowest",
+        "a swing that is pushed",
+        "<code>{uniform: [0.5 m, 1.5 m]}</code>",
+        "x_0: <code>x_1</code>",
+        "t_1: <code>{time: below}</code>",
+        "6 paths of 3 points",
+        "6 of 6",
         "None of those",
         "system of variant",
     ):
@@ -68,6 +79,30 @@ def test_indices_are_told_to_people_and_machines(
     found = json.loads(capsys.readouterr().out)
     assert {one["name"] for one in found["indices"]} == {"x_1", "inputs.push.steps.1"}
     assert len(found["indices"][0]["intervals"]["mu_star"]) == 2
+    assert (found["expected"], found["counts"]) == (270, {"done": 270})
+
+
+def test_an_unfinished_study_and_what_cannot_be_told_yet_are_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """12 variants of a path of 3, at 15 points of the grid: 4 paths of 6 at the first of them."""
+
+    def some(study: Study, blocks: Iterable[Block]) -> Iterator[Finished]:
+        yield from QUICK(study, list(blocks)[:4])
+
+    out, table = tmp_path / "out", tmp_path / "indices.csv"
+    made = study("grid", DESIGN)
+    for count, run in ((0, lambda study, blocks: iter(())), (12, some)):
+        run_study(made, out, run, block=3)
+        command = ["sensitivity", str(out), "--csv", str(table)]
+        assert exit_code(lambda: app(command, standalone_mode=False)) == 0  # noqa: B023
+        told = " ".join(capsys.readouterr().out.split())
+        assert f"{count} of 270 variants" in told
+        assert "unfinished: the same `modewright sweep STUDY --out DIR` goes on" in told
+        assert ("fewer than 4 paths are complete" in told) == (count == 0)
+        rows = list(csv.DictReader(table.read_text().splitlines()))
+        assert {(row["used"], row["count"]) for row in rows} == {(str(count // 3), "6")}
+        assert all((row["mu_star"] == "") == (count == 0) for row in rows)
 
 
 def test_a_study_without_a_design_says_what_is_missing(
@@ -76,3 +111,10 @@ def test_a_study_without_a_design_says_what_is_missing(
     run_study(study(), tmp_path, QUICK)
     assert exit_code(lambda: app(["sensitivity", str(tmp_path)], standalone_mode=False)) == 1
     assert "sampling: {saltelli: 256, seed: 1}" in capsys.readouterr().err
+
+
+def test_a_name_is_no_markup_of_the_page() -> None:
+    data = b'<?xml version="1.0"?><svg width="1"><path id="p"/><use href="#p"/></svg>'
+    text = study_page._embedded('"><script>\\1', data)
+    assert "<script>" not in text
+    assert text.startswith('<svg role="img" aria-label="&quot;&gt;&lt;script&gt;\\1" ')

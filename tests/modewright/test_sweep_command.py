@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -26,7 +27,8 @@ def _quick_in_the_project(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def run(*arguments: str) -> int:
-    return exit_code(lambda: app(["sweep", *arguments, "-j", "1"], standalone_mode=False))
+    one = [] if "--summary" in arguments else ["-j", "1"]
+    return exit_code(lambda: app(["sweep", *arguments, *one], standalone_mode=False))
 
 
 def test_a_study_is_run_summed_up_and_drawn(
@@ -38,7 +40,7 @@ def test_a_study_is_run_summed_up_and_drawn(
     assert "5 variants computed" in told
     assert "alone: 5 of 5 variants: 5 done" in told
     assert [path.name for path in (tmp_path / "out" / "plots").iterdir()] == ["matters.svg"]
-    assert Path(table).read_text().startswith("measure,unit,count,mean,")
+    assert Path(table).read_text().startswith("measure,unit,count,draws,mean,")
     assert run("alone", "--out", out) == 0
     assert "0 variants computed, 5 were there" in capsys.readouterr().out
     assert run("--summary", out, "--json", "--format", "png") == 0
@@ -99,6 +101,58 @@ def test_values_of_the_command_line_belong_to_the_results(
     assert not (tmp_path / "other").exists()
 
 
+def turned_bit(path: Path) -> bytes:
+    """The last bit of the last page of the last column turned: only the digest shows that."""
+    import pyarrow.parquet
+
+    group = pyarrow.parquet.read_metadata(path).row_group(0)
+    column = group.column(group.num_columns - 1)
+    begin = column.dictionary_page_offset or column.data_page_offset
+    data = bytearray(path.read_bytes())
+    data[begin + column.total_compressed_size - 1] ^= 1
+    return bytes(data)
+
+
+def cut_off(path: Path) -> bytes:
+    """As of a disk that lost the end."""
+    return path.read_bytes()[:-100]
+
+
+def test_a_value_for_what_the_study_varies_is_refused_with_the_reason(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = str(tmp_path / "out")
+    for value, told in (
+        ("d=0.3 1/s", "`d` varies in this study"),
+        ("x_0=2 m", "`x_0` follows from `set` in this study"),
+    ):
+        assert run("grid", "--out", out, "--set", value) == 2
+        assert told in " ".join(capsys.readouterr().err.replace("│", " ").split())
+    assert not (tmp_path / "out").exists()
+    assert run("alone", "--out", out, "--set", "w=2.5 rad/s") == 0  # that of all others
+
+
+@pytest.mark.parametrize("damage", [turned_bit, cut_off])
+def test_a_damaged_block_is_told_and_computed_again(
+    damage: Callable[[Path], bytes], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = str(tmp_path / "out")
+    assert run("alone", "--out", out, "--block", "2") == 0
+    path = read_store(tmp_path / "out").paths()[1]
+    good = path.read_bytes()
+    path.write_bytes(damage(path))
+    capsys.readouterr()
+    assert run("--summary", out) == 1
+    told = capsys.readouterr().err
+    assert f"{path}:1:1: error: this block is damaged: its bytes" in told
+    assert "[MW704]" in told and "computes them again: the same command" in told
+    assert run("alone", "--out", out) == 0
+    again = capsys.readouterr()
+    assert f"warning: {path} is damaged: its variants are computed again" in again.err
+    assert "2 variants computed, 3 were there" in again.out
+    assert path.read_bytes() == good
+
+
 @pytest.mark.parametrize(
     ("arguments", "code"),
     [
@@ -107,6 +161,13 @@ def test_values_of_the_command_line_belong_to_the_results(
         (("grid", "--summary", "x"), 2),
         (("grid", "--out", "x", "--format", "bmp"), 2),
         (("--summary", "nothing_there"), 1),
+        (("--summary", "x", "--out", "y"), 2),
+        (("--summary", "x", "--set", "w=2 rad/s"), 2),
+        (("--summary", "x", "--workers", "0"), 2),
+        (("--summary", "x", "--block", "3"), 2),
+        (("--summary", "x", "--cluster", "local:2"), 2),
+        (("--summary", "x", "--seed", "0"), 2),
+        (("grid", "--out", "x", "--set", "w=2 rad/s"), 2),
         (("swing", "--out", "x"), 1),
     ],
 )

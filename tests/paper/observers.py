@@ -115,7 +115,7 @@ def _row(table: Table, cruise: Table, scheme: str, period: float, is_matched: bo
         count=count,
         reported=len(first),
         median=float(np.median(first)),
-        median_interval=of_quantile(np.sort(first).tolist(), 0.5, 0.95),
+        median_interval=of_quantile(first, np.arange(len(first)), 0.5, 0.95),
         p5=float(np.percentile(first, 5)),
         p95=float(np.percentile(first, 95)),
         absolute_median=float(np.median(np.abs(first))),

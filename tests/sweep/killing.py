@@ -26,6 +26,19 @@ def deadly(mark: Path, wanted: Mapping[str, str], held: bytes, start: int, stop:
     return quickly(wanted, held, start, stop)
 
 
+def held_deadly(mark: Path, data: bytes) -> bytes:
+    """The first worker that is given the study ends."""
+    if not mark.exists():
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return data
+
+
+def always_deadly(data: bytes) -> bytes:
+    os.kill(os.getpid(), signal.SIGKILL)
+    return data
+
+
 def broken(wanted: Mapping[str, str], held: bytes, start: int, stop: int) -> Answer:
     def run(batch: Batch) -> BatchResult:
         raise ZeroDivisionError("of our own")

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from engine.batch import Batch, BatchResult, EventKind
-from language.problem import Source
+from language.problem import Problems, Source
 from language.project import Project, document_of, read_document
 from sweep.block import Block
 from sweep.executor import Finished, InProcess
@@ -22,8 +22,8 @@ from sweep.study_reader import read_study
 STUDIES = Path(__file__).parent.parent / "data" / "studies"
 
 
-def study(name: str = "grid", *changes: tuple[str, str]) -> Study:
-    """Return a prepared study of the tests, with texts in its file replaced."""
+def study(name: str = "grid", *changes: tuple[str, str], problems: Problems | None = None) -> Study:
+    """Return a prepared study of the tests, with texts in its file replaced; fills `problems`."""
     project = Project(STUDIES)
     path = project.path_of(name)
     text = path.read_text("utf-8")
@@ -32,7 +32,7 @@ def study(name: str = "grid", *changes: tuple[str, str]) -> Study:
         text = text.replace(old, new)
     source = Source(str(path), tuple(text.split("\n")))
     document = document_of(source, text) if changes else read_document(path)
-    return prepared(read_study(document, project))
+    return prepared(read_study(document, project, problems=problems))
 
 
 def quick(batch: Batch) -> BatchResult:
@@ -59,7 +59,7 @@ def quick(batch: Batch) -> BatchResult:
         event_counts=np.ones(batch.count, dtype=np.int64),
         event_times=events,
         event_kinds=numbers,
-        faults=np.zeros(batch.count, dtype=np.bool_),
+        faults={},
         stopped={},
     )
 

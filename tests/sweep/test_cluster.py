@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 from distributed import Client, LocalCluster, Security
 
+from sweep import cluster
 from sweep.address import Address, Credentials, address_of
 from sweep.block import Block
 from sweep.cluster import Cluster
@@ -22,7 +23,7 @@ from sweep.clustering import NOWHERE, Staff, connected
 from sweep.fingerprint import differences, fingerprint
 from sweep.processes import WorkerError
 from sweep.study_run import run_study
-from tests.sweep.killing import broken, deadly, older, own, quickly
+from tests.sweep.killing import always_deadly, broken, deadly, held_deadly, older, own, quickly
 from tests.sweep.laying import QUICK, quick, study
 from tests.sweep.test_study_run import bytes_of
 
@@ -61,6 +62,29 @@ def test_who_dies_is_survived_and_what_workers_die_of_is_told(
     again = run_study(made, tmp_path / "there", Cluster(client, quickly))
     assert (again.before, again.computed) == (50, 10)
     assert bytes_of(tmp_path / "there") == bytes_of(tmp_path / "here")
+
+
+def test_a_worker_that_dies_with_the_study_loses_no_block(
+    tmp_path: Path, client: Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It died of a block, or was killed: what is given to others again is the study, too."""
+    made, mark = study(), tmp_path / "mark"
+    run_study(made, tmp_path / "here", QUICK, block=10)
+    monkeypatch.setattr(cluster, "HOLD", functools.partial(held_deadly, mark))
+    found = run_study(made, tmp_path / "there", Cluster(client, quickly), block=10)
+    assert mark.exists()
+    assert (found.computed, found.lost) == (60, ())
+    assert bytes_of(tmp_path / "there") == bytes_of(tmp_path / "here")
+
+
+def test_a_study_that_every_worker_dies_of_ends(
+    tmp_path: Path, client: Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(cluster, "HOLD", always_deadly)
+    monkeypatch.setattr(cluster, "MOST_GIVEN", 2)
+    found = run_study(study(), tmp_path, Cluster(client, quickly), block=30)
+    assert found.computed == 0
+    assert {why for _, why in found.lost} == {"2 workers died that were given the study"}
 
 
 def test_a_defect_in_a_worker_ends_the_run_with_its_traceback(

@@ -31,7 +31,7 @@ class Desk:
         self.waiting: list[tuple[Reply, Callable[[], Any]]] = []
         self.status = "running"
 
-    def nthreads(self) -> dict[str, int]:
+    def nthreads(self, callback_timeout: float) -> dict[str, int]:
         return {"worker": self.threads}
 
     def submit(self, function: Any, *arguments: Any, pure: bool) -> Reply:
@@ -70,6 +70,7 @@ class Reply(Future[Any]):
     def __init__(self, desk: Desk) -> None:
         super().__init__()
         self.desk = desk
+        self.key = f"reply-{id(self)}"
 
 
 def _worker() -> WorkerState:

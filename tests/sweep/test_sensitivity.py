@@ -10,16 +10,18 @@ import pytest
 from SALib.analyze import morris as salib_morris, sobol as salib_sobol
 
 from language.problem import SpecError
-from sweep.design import LEVELS, STRIDE, morris_shares
+from sweep.design import STRIDE, morris_shares
 from sweep.draw import drawn_values
+from sweep.moments import scaled
 from sweep.sensitivity import (
+    Index,
     elementary_effects,
     morris_indices,
     sensitivity_of,
     sobol_indices,
 )
 from sweep.store import read_store
-from sweep.study import Study
+from sweep.study import LEVELS, Study
 from sweep.study_run import run_study
 from sweep.table import Reals
 from tests.sweep.laying import QUICK, Backwards, content, study
@@ -113,3 +115,67 @@ def test_points_that_are_no_design_have_no_indices(tmp_path: Path) -> None:
     run_study(study(), tmp_path, QUICK)
     with pytest.raises(SpecError, match="no design of which indices are made"):
         sensitivity_of(read_store(tmp_path))
+
+
+CHOSEN = ("x_1: {uniform: [0.5 m, 1.5 m]}", "x_1: {choice: [1 m, 20 m], weights: [1, 9]}")
+IDLE = ("set: {x_0: x_1}", "set: {x_0: x_1 + 0 * idle}")
+DRAWN_IDLE = ("  inputs.push", "  idle: {uniform: [0 m, 1 m]}\n  inputs.push")
+
+
+def indices_of(folder: Path, design: str, *changes: tuple[str, str]) -> dict[str, Index]:
+    """Return those of `final` at the first point of the grid, by name: half of a sum with noise."""
+    made = study("grid", (RANDOM, f"sampling: {{{design}, seed: 3}}"), *changes)
+    run_study(made, folder, QUICK)
+    found = sensitivity_of(read_store(folder)).indices
+    group = found[0].group
+    return {i.name: i for i in found if i.group == group and i.measure == "final"}
+
+
+def test_a_step_that_draws_the_same_value_again_has_no_effect(tmp_path: Path) -> None:
+    """A choice of two, one of them in 9 of 10: no level draws the other, so nothing is known."""
+    found = indices_of(tmp_path / "a", "morris: 20", CHOSEN)
+    assert all(math.isnan(found["x_1"].values[k]) for k in ("mu_star", "mu", "sigma"))
+    assert set(found["x_1"].intervals.values()) == {None}
+    assert found["inputs.push.steps.1"].values["mu_star"] > 0.0
+    even = (
+        CHOSEN[0],
+        CHOSEN[1].replace("[1, 9]", "[1, 3]"),
+    )  # one level of four: half of all steps
+    found = indices_of(tmp_path / "b", "morris: 20", even)
+    shares = morris_shares(2, np.arange(60), 3).reshape(20, 3, 2)
+    changed = (shares[:, :, 0].min(axis=1) < 0.25).mean()
+    assert 0.2 < changed < 0.8
+    assert found["x_1"].values["mu_star"] == pytest.approx(changed * (19.0 / 2.0) / 0.5)
+    assert found["x_1"].values["mu"] == pytest.approx(changed * (19.0 / 2.0) / 0.5)
+
+
+@pytest.mark.parametrize("design", ["morris: 16", "saltelli: 16"])
+def test_what_has_no_influence_is_not_blamed_for_noise(design: str, tmp_path: Path) -> None:
+    """The runner adds a number that the seed makes to each result: all of a path have one."""
+    found = indices_of(tmp_path, design, IDLE, DRAWN_IDLE)["idle"]
+    assert set(found.values.values()) == {0.0}
+    assert all(interval == (0.0, 0.0) for interval in found.intervals.values())
+    rows = content(read_store(tmp_path))
+    each = 4 if "morris" in design else 5
+    seeds = {(row["sample"] // each, row["seed"]) for row in rows}  # type: ignore[operator]
+    assert len(seeds) == 16 == len({seed for _, seed in seeds})
+
+
+def test_replicates_of_a_point_have_noise_of_their_own_and_all_of_them_count(
+    tmp_path: Path,
+) -> None:
+    found = indices_of(tmp_path, "morris: 5", ("set:", "replicates: 3\nset:"))
+    assert all(i.used == i.count == 5 for i in found.values())
+    rows = content(read_store(tmp_path))
+    seeds = {(r["sample"] // 3, r["replicate"], r["seed"]) for r in rows}  # type: ignore[operator]
+    assert len(seeds) == 15
+    assert {seed for _, _, seed in seeds} == set(range(15))
+
+
+def test_indices_of_the_largest_numbers_are_told(recwarn: pytest.WarningsRecorder) -> None:
+    """Shares of a variance have no unit: those of a measure of 1e300 are those of one of 1."""
+    results = np.random.default_rng(1).normal(size=(64, 4))
+    plain, large = sobol_indices(scaled(results)[0]), sobol_indices(scaled(1.0e300 * results)[0])
+    for name in plain:
+        np.testing.assert_allclose(large[name], plain[name], rtol=1e-12)
+    assert not recwarn.list

@@ -235,7 +235,7 @@ def test_what_cannot_be_simulated_is_a_value_of_its_row(tmp_path: Path) -> None:
     assert told[3.0][0] == "stopped" and "state `x` is" in str(told[3.0][1])
     assert told[9.0] == ("refused", "`plant.k` = 9 is outside its range [0, 5]")
     faulty = {row["k_now"]: row for row in rows}[4.0]
-    assert (faulty["status"], faulty["message"]) == ("fault", "a fault bit is set")
+    assert (faulty["status"], faulty["message"]) == ("fault", "a fault bit is set: `eye: range_u`")
     assert all(row["final"] is None for row in rows if row["status"] in ("stopped", "refused"))
 
 

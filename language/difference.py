@@ -1,0 +1,26 @@
+"""Difference: a literal that is the width of something, not a point of a scale."""
+
+from __future__ import annotations
+
+import dataclasses
+from fractions import Fraction
+
+from language.document import Node
+from language.problem import Span
+from language.reader import Reader
+from language.units import Unit
+
+LABEL = "a temperature in degC is a point, not a difference"
+HINT = "write a difference in K"
+
+
+def difference(reader: Reader, node: Node | None, what: str, span: Span, unit: Unit) -> Fraction:
+    """Return a literal in SI; a bare number is in `unit`, whose zero has no influence.
+
+    One with a unit that has a zero of its own (degC) is a point: reported.
+    """
+    own_zero = dataclasses.replace(unit, offset=Fraction(0))
+    value, own = reader.quantity(node, what, span, own_zero)
+    if own.offset:
+        reader.problems.error("dimension", node.span if node else span, LABEL, HINT)
+    return value

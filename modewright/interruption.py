@@ -1,0 +1,34 @@
+"""Interruption: Ctrl-C once, however often it is pressed."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+PATIENCE = 15.0
+"""Time [s] that a work has to end after Ctrl-C; then another one interrupts that too."""
+
+
+@contextmanager
+def interrupted_once() -> Iterator[None]:
+    """Let the first Ctrl-C interrupt; those that follow do not disturb how the work ends."""
+    is_ours = threading.current_thread() is threading.main_thread()
+    if not is_ours or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield
+        return
+    first: list[float] = []
+
+    def interrupt(*given: object) -> None:
+        if first and time.monotonic() < first[0] + PATIENCE:
+            return
+        first[:] = [time.monotonic()]
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGINT, interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)

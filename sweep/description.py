@@ -1,0 +1,34 @@
+"""Description: what a study says of itself, as texts for the readers of its results."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from language.document import Node, Scalar, Table
+from language.text import visible
+from language.tree import one_line
+
+Description = Mapping[str, str | Mapping[str, str]]
+"""The sections of a study by key: a text, or texts by name."""
+SECTIONS = ("about", "of", "scenarios", "variants", "vary", "set", "measures", "record")
+NAMED = ("vary", "set", "measures")
+"""Sections that are told name by name."""
+
+
+def description_of(tree: Table, overrides: Mapping[str, Scalar]) -> Description:
+    """Return what the sections of a study say, as they are written, and what `--set` does."""
+    found: dict[str, str | dict[str, str]] = {}
+    for key in SECTIONS:
+        node = tree.get(key)
+        if isinstance(node, Table) and key in NAMED:
+            found[key] = {entry.key: _text_of(entry.node) for entry in node}
+        elif node is not None:
+            found[key] = _text_of(node)
+    if overrides:
+        found["--set"] = {name: _text_of(scalar) for name, scalar in overrides.items()}
+    return found
+
+
+def _text_of(node: Node) -> str:
+    """Return a node as one line; what is not seen is written as an escape."""
+    return visible(" ".join(one_line(node).split()))
