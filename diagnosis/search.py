@@ -18,8 +18,9 @@ from diagnosis.point import point_of
 from diagnosis.screening import HINT, promises
 from language.effect import own_names
 
-FULL_FITS = 7
-"""Candidates that are fitted to the end, best foreseen first."""
+FULL_FITS, FITS_BESIDE = 7, 4
+"""Candidates that are fitted to the end, best foreseen first: alone, and beside what was accepted,
+where most of what the others promise is explained."""
 POOR = 2.0
 """Innovations that count as one, from which on a fit is no good."""
 HINT_PART = 0.1
@@ -69,13 +70,14 @@ def searched(
     possible = ((layer, _possible(bench, base, layer)) for layer in layers)
     known = [(layer, candidate) for layer, candidate in possible if candidate is not None]
     found: list[Tried] = []
+    fits = FITS_BESIDE if base.candidate.layers else FULL_FITS
     for place, promise in enumerate(promises(bench, base, known, least)):
         gain, layer, start = promise.gain, promise.layer, promise.start
         best = max((one.evidence.train for one in found if one.evidence), default=0.0)
-        if start is None or place >= FULL_FITS or gain < max(worth, HOPELESS * best):
+        if start is None or place >= fits or gain < max(worth, HOPELESS * best):
             found.append(Tried(layer, gain))
             continue
-        given = (base.noises, start.point, units, start.cost - WORTH)
+        given = (base.noises, start.point, start.columns, units, start.cost - WORTH)
         make = partial(_fitted, bench, base, start, units)
         estimate = bench.kept("fitted", start.candidate, given, make)
         if not np.isfinite(estimate.cost):
