@@ -14,7 +14,7 @@ from language.traversal import walk
 
 WHY = {
     COVARIANCE_RANGE: "a variance was outside its range",
-    EVENT_LIMIT: "more transitions in a tick than events: the rest is dropped",
+    EVENT_LIMIT: "more transitions in a tick than `events`: the rest is dropped",
     LIVELOCK: "transitions at an instant did not end: no more are taken",
     MICRO_STEP_LIMIT: "transitions of a tick did not end: no more are taken",
     REWIND_LIMIT: "a rewind would go back further than ticks are kept",

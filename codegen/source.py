@@ -103,15 +103,17 @@ def module_context(program: Program, page: Page = CONSTANTS) -> dict[str, Any]:
     if scratch and scratch.block != STEP:
         used = with_own(program, used, scratch)
     own = apart(program)
-    inside = [tuple(m.name for m in modes) for modes in (program.modes, program.run_modes)]
+    modes, run_modes = ([m.name for m in of] for of in (program.modes, program.run_modes))
+    keywords = {name: _keyword(name, own) for name in program.blocks}
     blocks = [
         {
-            **_block(program, name, local[name], turned[name], used, kinds, page, scratch, keyword),
-            "purpose": purpose(name, *inside),
-            "keyword": keyword,
+            **_block(
+                program, name, local[name], turned[name], used, kinds, page, scratch, keywords[name]
+            ),
+            "purpose": purpose(name, modes, run_modes),
+            "keyword": keywords[name],
         }
         for name in _callees_first(program)
-        for keyword in [_keyword(name, own)]
     ]
     return {
         **_names(program),

@@ -150,7 +150,7 @@ class Writer:
 def _told(info: TransitionInfo) -> str:
     """Return when a transition is due, with the key of its wait."""
     if info.tunable:
-        return f"ticks in a row: {info.key}.wait"
+        return f"due after more in a row than {info.key}.wait"
     return f"due at {info.ticks + 1} in a row: {info.key}.wait, {float(1000 * info.wait):g} ms"
 
 

@@ -98,12 +98,14 @@ def motion_variables(field: Field, method: Method) -> list[Variable]:
     found = [
         Variable("work.h", "real", "s", about="step to flow over"),
         Variable("work.elapsed", "real", "s", about="part of the step until a crossing"),
-        Variable("work.crossed", "truth", about="a guard is true at the end of the step"),
+        Variable("work.crossed", "truth", about="a guard has turned true in the step"),
         Variable("work.s", "real", "s", about="time since the start of the step"),
         Variable("work.low", "real", "s"),
         Variable("work.high", "real", "s"),
         Variable("work.halving", "whole"),
-        Variable("work.is_before_end", "truth", about="a guard is true before the end of the step"),
+        Variable(
+            "work.is_before_end", "truth", about="a guard turns true before the end of the step"
+        ),
         Variable("work.term", "whole"),
         *(Variable(f"work.guard_{k}_at_high", "truth") for k in field.slots),
     ]

@@ -73,7 +73,7 @@ static inline void jump_always(void)
     /* nothing to do */
 }
 
-/* Takes the inputs of now, each within its range: what is outside at the nearer end */
+/* Takes the inputs of now, each within its range */
 static inline void latch(cruise_driver_Self *self, const cruise_driver_In *in)
 {
     if (ha_within(in->w_w, -50.0, 300.0)) {

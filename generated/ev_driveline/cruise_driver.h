@@ -16,7 +16,7 @@ enum {
     cruise_driver_MODE_always = 0
 };
 
-/* Latched fault bits; what is outside its range is set to the end of it */
+/* Latched fault bits */
 #define cruise_driver_FAULT_range_w_w (1UL << 0) /* w_w was outside its range */
 
 /* The calibration page: tunable parameters */

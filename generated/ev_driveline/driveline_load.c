@@ -772,7 +772,7 @@ static inline void move_coast_contact(driveline_load_Self *self, driveline_load_
     self->state.T_l = work->end_T_l;
 }
 
-/* Takes the inputs of now, each within its range: what is outside at the nearer end */
+/* Takes the inputs of now, each within its range */
 static inline void latch(driveline_load_Self *self, const driveline_load_In *in)
 {
     const bool changed_slope = in->slope != self->before.slope;

@@ -264,7 +264,7 @@ estimator_CALIBRATION const volatile estimator_Cal estimator_default_cal = {
     },
 };
 
-/* Inputs one by one: a bit for each outside its range; a NaN is its lower end */
+/* Inputs one by one: a fault bit for each that is not within its range */
 static RARELY void latch_each(estimator_Self *self, const estimator_In *in)
 {
     if (ha_within(in->y_em, -400.0, 2400.0)) {
@@ -1456,7 +1456,7 @@ static inline void compare_stamps(estimator_Self *self, const volatile estimator
     }
 }
 
-/* Takes the inputs of now, each within its range: what is outside at the nearer end */
+/* Takes the inputs of now, each within its range */
 static inline void latch(estimator_Self *self, const estimator_In *in)
 {
     if (ha_within(in->y_em, -400.0, 2400.0) && ha_within(in->y_w, -50.0, 300.0)

@@ -31,8 +31,8 @@ enum {
     estimator_RUN_coast_contact = -1
 };
 
-/* Latched fault bits; what is outside its range is set to the end of it */
-#define estimator_FAULT_event_limit (1UL << 0) /* more transitions in a tick than events: the rest is dropped */
+/* Latched fault bits */
+#define estimator_FAULT_event_limit (1UL << 0) /* more transitions in a tick than `events`: the rest is dropped */
 #define estimator_FAULT_stale_calibration (1UL << 1) /* solved numbers belong to another calibration */
 #define estimator_FAULT_range_y_em (1UL << 2) /* y_em was outside its range */
 #define estimator_FAULT_range_y_w (1UL << 3) /* y_w was outside its range */
@@ -282,7 +282,7 @@ typedef struct {
     bool guard_1; /* a guard of the active mode, in the order of its transitions */
     double h; /* s; step to flow over */
     double elapsed; /* s; part of the step until a crossing */
-    bool crossed; /* a guard is true at the end of the step */
+    bool crossed; /* a guard has turned true in the step */
     double s; /* s; time since the start of the step */
     double end_w_w; /* rad/s */
     double series_w_w[14]; /* rad/s */

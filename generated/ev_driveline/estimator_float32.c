@@ -257,7 +257,7 @@ estimator_float32_CALIBRATION const volatile estimator_float32_Cal estimator_flo
     },
 };
 
-/* Inputs one by one: a bit for each outside its range; a NaN is its lower end */
+/* Inputs one by one: a fault bit for each that is not within its range */
 static RARELY void latch_each(estimator_float32_Self *self, const estimator_float32_In *in)
 {
     if (ha_withinf(in->y_em, -400.0F, 2400.0F)) {
@@ -1896,7 +1896,7 @@ static inline void compare_stamps(estimator_float32_Self *self,
     }
 }
 
-/* Takes the inputs of now, each within its range: what is outside at the nearer end */
+/* Takes the inputs of now, each within its range */
 static inline void latch(estimator_float32_Self *self, const estimator_float32_In *in)
 {
     if (ha_withinf(in->y_em, -400.0F, 2400.0F) && ha_withinf(in->y_w, -50.0F, 300.0F)

@@ -262,7 +262,7 @@ estimator_written_CALIBRATION const volatile estimator_written_Cal estimator_wri
     },
 };
 
-/* Inputs one by one: a bit for each outside its range; a NaN is its lower end */
+/* Inputs one by one: a fault bit for each that is not within its range */
 static RARELY void latch_each(estimator_written_Self *self, const estimator_written_In *in)
 {
     if (ha_within(in->y_em, -400.0, 2400.0)) {
@@ -1473,7 +1473,7 @@ static inline void compare_stamps(estimator_written_Self *self,
     }
 }
 
-/* Takes the inputs of now, each within its range: what is outside at the nearer end */
+/* Takes the inputs of now, each within its range */
 static inline void latch(estimator_written_Self *self, const estimator_written_In *in)
 {
     if (ha_within(in->y_em, -400.0, 2400.0) && ha_within(in->y_w, -50.0, 300.0)

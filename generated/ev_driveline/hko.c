@@ -241,7 +241,7 @@ hko_CALIBRATION const volatile hko_Cal hko_default_cal = {
     },
 };
 
-/* Inputs one by one: a bit for each outside its range; a NaN is its lower end */
+/* Inputs one by one: a fault bit for each that is not within its range */
 static RARELY void latch_each(hko_Self *self, const hko_In *in)
 {
     if (ha_within(in->y_em, -400.0, 2400.0)) {
@@ -2889,7 +2889,7 @@ static inline void compare_stamps(hko_Self *self, const volatile hko_Cal *cal)
     }
 }
 
-/* Takes the inputs of now, each within its range: what is outside at the nearer end */
+/* Takes the inputs of now, each within its range */
 static inline void latch(hko_Self *self, const hko_In *in)
 {
     if (ha_within(in->y_em, -400.0, 2400.0) && ha_within(in->y_w, -50.0, 300.0)

@@ -41,7 +41,7 @@ supervisor_CALIBRATION const volatile supervisor_Cal supervisor_default_cal = {
     .v_creep = 1.6666666F,
 };
 
-/* Inputs one by one: a bit for each outside its range; a NaN is its lower end */
+/* Inputs one by one: a fault bit for each that is not within its range */
 static RARELY void latch_each(supervisor_Self *self, const supervisor_In *in)
 {
     if (in->key <= supervisor_key_crank) {
@@ -1788,7 +1788,7 @@ static inline void jump(supervisor_Self *self, const volatile supervisor_Cal *ca
     }
 }
 
-/* Takes the inputs of now, each within its range: what is outside at the nearer end */
+/* Takes the inputs of now, each within its range */
 static inline void latch(supervisor_Self *self, const supervisor_In *in)
 {
     if ((in->key <= supervisor_key_crank) && ha_withinf(in->U_dc, 0.0F, 500.0F)

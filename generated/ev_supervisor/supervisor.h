@@ -76,7 +76,7 @@ enum {
     supervisor_key_crank = 2
 };
 
-/* Latched fault bits; what is outside its range is set to the end of it */
+/* Latched fault bits */
 #define supervisor_FAULT_micro_step_limit (1UL << 0) /* transitions of a tick did not end: no more are taken */
 #define supervisor_FAULT_range_key (1UL << 1) /* key was outside its range */
 #define supervisor_FAULT_range_U_dc (1UL << 2) /* U_dc was outside its range */

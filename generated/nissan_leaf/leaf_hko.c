@@ -241,7 +241,7 @@ leaf_hko_CALIBRATION const volatile leaf_hko_Cal leaf_hko_default_cal = {
     },
 };
 
-/* Inputs one by one: a bit for each outside its range; a NaN is its lower end */
+/* Inputs one by one: a fault bit for each that is not within its range */
 static RARELY void latch_each(leaf_hko_Self *self, const leaf_hko_In *in)
 {
     if (ha_within(in->y_em, -400.0, 2400.0)) {
@@ -2894,7 +2894,7 @@ static inline void compare_stamps(leaf_hko_Self *self, const volatile leaf_hko_C
     }
 }
 
-/* Takes the inputs of now, each within its range: what is outside at the nearer end */
+/* Takes the inputs of now, each within its range */
 static inline void latch(leaf_hko_Self *self, const leaf_hko_In *in)
 {
     if (ha_within(in->y_em, -400.0, 2400.0) && ha_within(in->y_w, -50.0, 300.0)

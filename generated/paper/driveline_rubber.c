@@ -810,7 +810,7 @@ static inline void move_coast_contact(driveline_rubber_Self *self, driveline_rub
     self->state.T_r_rubber = work->end_T_r_rubber;
 }
 
-/* Takes the inputs of now, each within its range: what is outside at the nearer end */
+/* Takes the inputs of now, each within its range */
 static inline void latch(driveline_rubber_Self *self, const driveline_rubber_In *in)
 {
     const bool changed_slope = in->slope != self->before.slope;

@@ -712,7 +712,7 @@ static inline void move_coast_contact(driveline_twisted_Self *self, driveline_tw
     self->state.theta_b = work->end_theta_b;
 }
 
-/* Takes the inputs of now, each within its range: what is outside at the nearer end */
+/* Takes the inputs of now, each within its range */
 static inline void latch(driveline_twisted_Self *self, const driveline_twisted_In *in)
 {
     const bool changed_slope = in->slope != self->before.slope;

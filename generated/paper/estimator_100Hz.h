@@ -24,7 +24,7 @@ enum {
 #define estimator_100Hz_FIRED_gap_coast 3U
 #define estimator_100Hz_FIRED_coast_gap 4U
 
-/* Latched fault bits; what is outside its range is set to the end of it */
+/* Latched fault bits */
 #define estimator_100Hz_FAULT_stale_calibration (1UL << 0) /* solved numbers belong to another calibration */
 #define estimator_100Hz_FAULT_range_y_em (1UL << 1) /* y_em was outside its range */
 #define estimator_100Hz_FAULT_range_y_w (1UL << 2) /* y_w was outside its range */

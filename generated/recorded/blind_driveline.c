@@ -763,7 +763,7 @@ static inline void move_coast_contact(blind_driveline_Self *self, blind_drivelin
     self->state.w_s = work->end_w_s;
 }
 
-/* Takes the inputs of now, each within its range: what is outside at the nearer end */
+/* Takes the inputs of now, each within its range */
 static inline void latch(blind_driveline_Self *self, const blind_driveline_In *in)
 {
     self->before.T_em = in->T_em;

@@ -24,7 +24,7 @@ enum {
 #define blind_driveline_FIRED_no_contact_coast_contact 3U
 #define blind_driveline_FIRED_coast_contact_no_contact 4U
 
-/* Latched fault bits; what is outside its range is set to the end of it */
+/* Latched fault bits */
 #define blind_driveline_FAULT_zeno (1UL << 0) /* more transitions than a step may have: its rest is dropped */
 #define blind_driveline_FAULT_livelock (1UL << 1) /* transitions at an instant did not end: no more are taken */
 
@@ -68,7 +68,7 @@ typedef struct {
     bool event; /* a guard changed or a wait ended */
     double h; /* s; step to flow over */
     double elapsed; /* s; part of the step until a crossing */
-    bool crossed; /* a guard is true at the end of the step */
+    bool crossed; /* a guard has turned true in the step */
     double s; /* s; time since the start of the step */
     double end_w_em; /* rad/s */
     double series_w_em[3]; /* rad/s */

@@ -46,7 +46,7 @@ static inline void guards_always(void)
     /* nothing to do */
 }
 
-/* Takes the inputs of now, each within its range: what is outside at the nearer end */
+/* Takes the inputs of now, each within its range */
 static inline void latch(bmw_i3_Self *self, const bmw_i3_In *in)
 {
     self->before.T_em = in->T_em;

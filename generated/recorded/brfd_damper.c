@@ -380,7 +380,7 @@ static inline void move_slip_lo(brfd_damper_Self *self, brfd_damper_Work *work)
     self->state.z = work->end_z;
 }
 
-/* Takes the inputs of now, each within its range: what is outside at the nearer end */
+/* Takes the inputs of now, each within its range */
 static inline void latch(brfd_damper_Self *self, const brfd_damper_In *in)
 {
     self->before.v = in->v;

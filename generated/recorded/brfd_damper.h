@@ -24,7 +24,7 @@ enum {
 #define brfd_damper_FIRED_slip_up_stick 3U
 #define brfd_damper_FIRED_slip_lo_stick 4U
 
-/* Latched fault bits; what is outside its range is set to the end of it */
+/* Latched fault bits */
 #define brfd_damper_FAULT_zeno (1UL << 0) /* more transitions than a step may have: its rest is dropped */
 #define brfd_damper_FAULT_livelock (1UL << 1) /* transitions at an instant did not end: no more are taken */
 
@@ -59,7 +59,7 @@ typedef struct {
     bool event; /* a guard changed or a wait ended */
     double h; /* s; step to flow over */
     double elapsed; /* s; part of the step until a crossing */
-    bool crossed; /* a guard is true at the end of the step */
+    bool crossed; /* a guard has turned true in the step */
     double s; /* s; time since the start of the step */
     double end_z; /* m */
     double series_z[3]; /* m */

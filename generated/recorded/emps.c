@@ -47,7 +47,7 @@ static inline void guards_always(void)
     /* nothing to do */
 }
 
-/* Takes the inputs of now, each within its range: what is outside at the nearer end */
+/* Takes the inputs of now, each within its range */
 static inline void latch(emps_Self *self, const emps_In *in)
 {
     self->before.q_ref = in->q_ref;

@@ -50,7 +50,7 @@ static inline void guards_always(void)
     /* nothing to do */
 }
 
-/* Takes the inputs of now, each within its range: what is outside at the nearer end */
+/* Takes the inputs of now, each within its range */
 static inline void latch(leaf_motor_side_Self *self, const leaf_motor_side_In *in)
 {
     self->before.T_em = in->T_em;

@@ -58,7 +58,7 @@ static inline void guards_always(void)
     /* nothing to do */
 }
 
-/* Takes the inputs of now, each within its range: what is outside at the nearer end */
+/* Takes the inputs of now, each within its range */
 static inline void latch(leaf_vehicle_Self *self, const leaf_vehicle_In *in)
 {
     self->before.T_em = in->T_em;

@@ -16,7 +16,7 @@ enum {
     leaf_vehicle_MODE_always = 0
 };
 
-/* Latched fault bits; what is outside its range is set to the end of it */
+/* Latched fault bits */
 #define leaf_vehicle_FAULT_zeno (1UL << 0) /* more transitions than a step may have: its rest is dropped */
 #define leaf_vehicle_FAULT_livelock (1UL << 1) /* transitions at an instant did not end: no more are taken */
 

@@ -54,10 +54,11 @@ def test_a_transition_is_called_by_its_source_and_its_name() -> None:
 @pytest.mark.parametrize("name", SHIPPED)
 def test_each_fault_bit_says_why_it_is_set(name: str) -> None:
     made = program(name)
-    for fault in made.faults:
+    header = c_files(made)[f"{name}.h"]
+    for bit, fault in enumerate(made.faults):
         why = why_set(made, fault)
         assert why
-        assert f"_FAULT_{fault} " in c_files(made)[f"{name}.h"].split(f" /* {why} */")[0]
+        assert f"#define {name}_FAULT_{fault} (1UL << {bit}) /* {why} */\n" in header
 
 
 def test_a_count_says_when_its_transition_is_due() -> None:

@@ -108,7 +108,7 @@ static NOT_INLINED void update_heating(heater_Self *self)
     }
 }
 
-/* Takes the inputs of now, each within its range: what is outside at the nearer end */
+/* Takes the inputs of now, each within its range */
 static inline void latch(heater_Self *self, const heater_In *in)
 {
     if ((in->T >= 200.0) && (in->T <= 500.0)) {

@@ -21,7 +21,7 @@ enum {
 #define heater_FIRED_rest_heating 1U
 #define heater_FIRED_heating_rest 2U
 
-/* Latched fault bits; what is outside its range is set to the end of it */
+/* Latched fault bits */
 #define heater_FAULT_range_T (1UL << 0) /* T was outside its range */
 #define heater_FAULT_range_heat (1UL << 1) /* heat was outside its range */
 
