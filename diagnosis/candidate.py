@@ -31,16 +31,20 @@ START = "start_of_{}"
 
 @dataclass(frozen=True)
 class Candidate:
-    """A compiled model: `layers` over the base, its recipe, and its library."""
+    """A compiled model: `layers` over the base, its recipe, and its library.
+
+    `levels` are those of its noises, where a fit may move these beside its parameters.
+    """
 
     layers: tuple[Layer, ...]
     recipe: Recipe
     predictor: Predictor
+    levels: tuple[Uncertain, ...] = ()
 
     @property
     def uncertain(self) -> tuple[Uncertain, ...]:
-        """The parameters that a fit may move."""
-        return self.recipe.uncertain
+        """What a fit may move: parameters, behind them levels."""
+        return self.recipe.uncertain + self.levels
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -124,7 +128,7 @@ def _compiled(
     started = _with_starts(made, seen)
     starts = [name for name in started.parameters if name not in made.parameters]
     names = [*(one.name for one in uncertain), *starts]
-    fewest = fewest_steps(made, layers, seen)
+    fewest = fewest_steps(made, layers, seen, period)
     program, substeps = stepped(started, names, brought, period, fewest)
     columns = columns_of(program, seen)
     ranges = [made.states[name].range for name in columns.states]

@@ -8,7 +8,7 @@ from functools import partial
 
 from diagnosis.bench import Bench
 from diagnosis.candidate import Candidate
-from diagnosis.estimation import Estimate, estimated, looked_at
+from diagnosis.estimation import Estimate, followed, looked_at, looked_like
 from diagnosis.layers import DRIFT, Layer
 from diagnosis.level import FIRST_LEVELS, units_of
 from diagnosis.point import extended, point_of
@@ -44,16 +44,16 @@ def freed(bench: Bench, base: Estimate, layer: Layer | None = None) -> Estimate:
 def _freed(bench: Bench, base: Estimate, candidate: Candidate, layer: Layer | None) -> Estimate:
     """Return a candidate with the drift of a layer free, its parameters fitted."""
     name = layer.named(DRIFT) if layer else None
-    units = units_of(candidate, bench.series, base.noises, base.values(0))
+    units = units_of(candidate, bench.series, base.values(0))
     levels = dict.fromkeys(units, SMALL_LEVEL) | ({name: START_LEVEL} if name else {})
     noises = with_levels(base.noises, units, levels)
     found = []
     near = extended(candidate, base.candidate, base.point, {})
     for point in (near, point_of(candidate, len(bench.series), {})):
-        now = looked_at(candidate, bench.series, noises, point)
+        now = looked_like(candidate, bench.series, noises, point, base)
         found.append(scanned(now, bench.series, units, name, WIDE_LEVELS))
     now = min(found, key=lambda one: one.cost)
-    now = estimated(candidate, bench.series, now.noises, now.point, ROUNDS)
+    now = followed(candidate, bench.series, now.noises, now.point, ROUNDS)
     return scanned(now, bench.series, units, name, NEAR_LEVELS)
 
 
@@ -70,7 +70,7 @@ def scanned(
     best = now
     for level in levels:
         noises = with_levels(now.noises, units, {name: level})
-        tried = looked_at(now.candidate, series, noises, now.point)
+        tried = looked_at(now.candidate, series, noises, now.point, now.outcome)
         best = tried if tried.cost < best.cost else best
     return best
 

@@ -6,13 +6,26 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from diagnosis.adequacy import is_inadequate, piles_up, refused, remembers_mostly
+from diagnosis.adequacy import (
+    is_inadequate,
+    is_strained,
+    piles_up,
+    refused,
+    remembers_mostly,
+)
 from diagnosis.alone import LEFT_OUT, SIMULATED, alone, forgets
 from diagnosis.bench import Bench
 from diagnosis.bootstrap import bootstrapped, kept_thresholds
 from diagnosis.case import Case
 from diagnosis.description import Description, described
-from diagnosis.doubt import explains_more, is_doubtful, is_still, selected_formula
+from diagnosis.doubt import (
+    explains_more,
+    is_doubtful,
+    is_still,
+    leaves_much,
+    left_over,
+    selected_formula,
+)
 from diagnosis.estimation import Estimate
 from diagnosis.hidden import with_hidden
 from diagnosis.layers import has_parameters
@@ -21,6 +34,7 @@ from diagnosis.location import located, unexplained
 from diagnosis.locus import Locus
 from diagnosis.naming import verdict_id
 from diagnosis.place_sentence import place_sentence
+from diagnosis.plainer import may_be_plainer, plainer_ones
 from diagnosis.search import Tell
 from diagnosis.selection import Selection, selected
 from diagnosis.series import Series
@@ -32,6 +46,8 @@ CLEAR = 1.0
 """A rival of another name within this of the best [nats] makes the verdict ambiguous."""
 HIDDEN = 6.0
 """Times the threshold that an input must gain that acts in windows."""
+FREEDOM = 4.0
+"""Times the threshold that free drifts must gain where effects are to be something else."""
 UNKNOWN = 8.0
 """Times the threshold that a free drift must gain where no effect was accepted."""
 
@@ -65,20 +81,22 @@ def _judged_by_observer(case: Case, raw: Bench, ways: Sequence[Way], tell: Tell)
     thresholds = _thresholds(case, *better_way(ways), raw.series, tell)
     most = max(USUAL, thresholds.most)
     bench, base, selection = chosen(ways, thresholds, tell)
-    units = units_of(base.candidate, bench.series, base.noises, base.values(0))
+    units = units_of(base.candidate, bench.series, base.values(0))
     loci = located(bench, base)
     tell(place_sentence(loci, bench))
     selection, loci = with_hidden(bench, selection, loci, HIDDEN * most, tell)
     left = unexplained(bench, selection.base, loci)
     says = _says(selection, left, bench, most)
     formula = None
-    if is_doubtful(says, selection, left, bench, most, units):
+    over = left_over(bench, selection, units) if says == "effect" else 0.0
+    if is_doubtful(says, selection, left, over, most):
         formula = described(bench, selection.base, loci, units, most, tell)
     if formula is not None and explains_more(formula, selection):
         says, selection = "unknown", selected_formula(selection, formula)
     else:
         formula = None
-        says, selection = _adequate(bench, selection, says, UNKNOWN * most, units, tell)
+        is_other = says == "effect" and leaves_much(selection, over, most)
+        says, selection = _adequate(bench, selection, says, FREEDOM * most, units, is_other, tell)
     return Judgement(bench, base, selection, loci, says, thresholds, formula)
 
 
@@ -88,18 +106,41 @@ def _adequate(
     says: Says,
     needed: float,
     units: Mapping[str, float],
+    is_other: bool,
     tell: Tell,
 ) -> tuple[Says, Selection]:
-    """Return a verdict, or `unknown` without effects that leave much of it unexplained."""
+    """Return a verdict, or `unknown` without effects that leave much of it unexplained.
+
+    `is_other` where what they leave over at their places is known to be much.
+    """
     if not selection.accepted or any(not has_parameters(t.layer) for t in selection.accepted):
         return says, selection
     is_heard = says == "effect" and not is_still(selection, units)
-    is_other = remembers_mostly(bench, selection) or piles_up(selection)
-    if not is_other and not (is_heard and is_inadequate(bench, selection, needed)):
+    why = (
+        "terms at their places explain much beside them" if is_other else _why_not(selection, bench)
+    )
+    if not why and is_heard and is_inadequate(bench, selection, needed):
+        why = "free drifts explain much beside them"
+    if not why:
         return says, selection
     names = ", ".join(tried.layer.id for tried in selection.accepted)
-    tell(f"much is left unexplained beside {names}: it is something else")
+    tell(f"taken back: {names}: {why}, so it is something else")
     return "unknown", refused(selection)
+
+
+def _why_not(selection: Selection, bench: Bench) -> str:
+    """Return why accepted effects are something else; nothing where they seem to be right."""
+    first = selection.accepted[0]
+    if is_strained(selection):
+        return "they are pulled out of their ranges"
+    if piles_up(selection):
+        return "two at one place gain alike"
+    if remembers_mostly(bench, selection):
+        return "most recordings remember what is left"
+    is_known = any(plainer_ones(first, selection.first_round))
+    if not is_known and may_be_plainer(selection.model, first.layer, bench.series):
+        return "the first may as well be a plainer one"
+    return ""
 
 
 def _judged_by_simulation(
@@ -130,7 +171,7 @@ def _thresholds(
         return case.thresholds
     kept = kept_thresholds(bench, raw)
     if kept is None and case.bootstrap == "made":
-        units = units_of(base.candidate, bench.series, base.noises, base.values(0))
+        units = units_of(base.candidate, bench.series, base.values(0))
         kept = bootstrapped(bench, base, units, raw, tell)
     found = kept or case.thresholds
     tell(f"thresholds of {found.text} nats, {found.origin}")

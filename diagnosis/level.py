@@ -12,11 +12,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from diagnosis.candidate import Candidate
-from diagnosis.estimation import Estimate, estimated, looked_at
+from diagnosis.estimation import Estimate, followed, looked_at
 from diagnosis.gains import near, points_of
 from diagnosis.point import Point
 from diagnosis.prediction import Noises, noises_of
 from diagnosis.series import Series
+from diagnosis.slopes import Columns
+from diagnosis.tuning import FARTHEST, tuned
 
 REACH = 0.2
 """Seconds in which a drift of one unit shows."""
@@ -30,16 +32,15 @@ FAR = 4.0
 """Standard deviations beyond which an innovation counts as that far."""
 SCALE = 1.5
 """Factor by which the noise of inputs or of a signal is changed at a time."""
-FARTHEST = 2.5
-"""Factor by which it may be another one than was measured."""
 ENOUGH = 2.0
 """Another level is taken where it gains this much [nats]."""
 
 
 def units_of(
-    candidate: Candidate, series: Sequence[Series], noises: Noises, start: Mapping[str, float]
+    candidate: Candidate, series: Sequence[Series], start: Mapping[str, float]
 ) -> dict[str, float]:
-    """Return the unit [SI] of each drift of a candidate."""
+    """Return the unit [SI] of each drift of a candidate, for the noise that was measured."""
+    seen_noise = noises_of(series, {}).seen
     mode, seen_there = next(iter(points_of(candidate, series, None).items()))
     page = candidate.page(start, series[0])
     linear = near(candidate, page, mode, seen_there.states, seen_there.inputs)
@@ -49,7 +50,7 @@ def units_of(
     ahead = linear.c @ np.linalg.matrix_power(linear.phi, count)
     found = {}
     for name in candidate.drifts:
-        seen = np.abs(ahead[:, candidate.predictor.states.index(name)]) / noises.seen
+        seen = np.abs(ahead[:, candidate.predictor.states.index(name)]) / seen_noise
         found[name] = 1.0 / max(float(np.max(seen)), 1e-12)
     return found
 
@@ -74,10 +75,10 @@ def levelled(
                 if not tried.cost < now.cost - ENOUGH:
                     break
                 now, here = tried, here + direction
-    return _tuned(now, series)
+    return _scaled_noises(now, series)
 
 
-def _tuned(now: Estimate, series: Sequence[Series]) -> Estimate:
+def _scaled_noises(now: Estimate, series: Sequence[Series]) -> Estimate:
     """Return an estimate with the noise of its inputs, then of each signal, scaled.
 
     Not far from what was measured: a model that lacks something would trust in its signals alone.
@@ -118,16 +119,15 @@ def settled(
     noises: Noises,
     start: Mapping[str, float] | Point,
     units: Mapping[str, float],
-    turns: int = 3,
+    columns: Columns | None = None,
+    like: Estimate | None = None,
 ) -> Estimate:
-    """Return parameters and drifts found in turns, until neither gains."""
-    now = estimated(candidate, series, noises, start)
-    for _ in range(turns):
-        moved = levelled(now, series, units)
-        if moved.cost >= now.cost:
-            return now
-        now = estimated(candidate, series, moved.noises, moved.point)
-    return now
+    """Return parameters and levels found together, from levels that fit where parameters lead.
+
+    `columns` are slopes of the candidate near the start, `like` a model near it, if there are such.
+    """
+    now = followed(candidate, series, noises, start, known=columns, like=like)
+    return tuned(levelled(now, series, units), series, units)
 
 
 def fitted(
@@ -137,6 +137,8 @@ def fitted(
     start: Mapping[str, float] | Point,
     units: Mapping[str, float],
     known: float = -np.inf,
+    columns: Columns | None = None,
+    like: Estimate | None = None,
 ) -> Estimate:
     """Return a fit with next to no drift at first, or a better one with those that `noises` has.
 
@@ -144,13 +146,12 @@ def fitted(
     The other one is tried where the first does not come below a `known` cost [nats].
     """
     quiet = {**noises.drifts, **{name: QUIET * unit for name, unit in units.items()}}
-    first = settled(
-        candidate, series, dataclasses.replace(noises, drifts=quiet), start, units, turns=2
-    )
+    still = dataclasses.replace(noises, drifts=quiet)
+    first = settled(candidate, series, still, start, units, columns, like)
     is_quiet = all(noises.drifts.get(name, 0.0) <= quiet[name] for name in units)
     if is_quiet or first.cost < known:
         return first
-    second = settled(candidate, series, noises, start, units, turns=1)
+    second = settled(candidate, series, noises, start, units, columns, like)
     return min(first, second, key=lambda one: one.cost)
 
 
@@ -161,18 +162,20 @@ def first_fit(
 
     How far innovations usually are out, beyond which they count no more, is known after it.
     """
-    first = settled(candidate, series, noises_of(series, units), {}, units, turns=1)
+    first = settled(candidate, series, noises_of(series, units), {}, units)
     limits = FAR * np.maximum(first.outcome.robust(), 1e-12)
     return dataclasses.replace(first, noises=dataclasses.replace(first.noises, limits=limits))
 
 
 def recalibrated(first: Estimate, series: Sequence[Series], units: Mapping[str, float]) -> Estimate:
     """Return the base fitted to recordings from a first fit, with drifts from little to much."""
-    found = []
+    found: list[Estimate] = []
     for level in FIRST_LEVELS:
         drifts = {name: level * unit for name, unit in units.items()}
         known = dataclasses.replace(first.noises, drifts=drifts)
-        found.append(settled(first.candidate, series, known, first.point, units))
+        near = min(found, key=lambda one: one.cost, default=first)
+        start, columns = near.point, near.columns
+        found.append(settled(first.candidate, series, known, start, units, columns, near))
     return min(found, key=lambda one: one.cost)
 
 

@@ -69,9 +69,9 @@ def _without(
     if candidate is None:
         return None
     start = extended(candidate, found.model.candidate, found.model.point, {})
-    given = (found.base.noises, start, units, 1)
-    make = partial(settled, candidate, bench.series, *given)
-    return bench.kept("settled", candidate, given, make)
+    given = (found.base.noises, start, units)
+    make = partial(settled, candidate, bench.series, *given, like=found.model)
+    return bench.kept("settled", candidate, (*given, found.model.gains), make)
 
 
 def _credited(

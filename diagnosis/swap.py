@@ -12,11 +12,14 @@ from diagnosis.bench import Bench
 from diagnosis.estimation import Estimate
 from diagnosis.evidence import evidence
 from diagnosis.level import fitted
+from diagnosis.plainer import may_be_plainer
 from diagnosis.point import extended
 from diagnosis.search import Tell, Tried
 
 CLEARLY = 3.0
 """Nats by which the model must be better with the other effect."""
+NEARLY = 0.5
+"""Part of what an accepted effect gains that another one gained alone, if it may stand for it."""
 
 
 def swapped(
@@ -35,21 +38,28 @@ def swapped(
     for k, old in enumerate(accepted[:-1]):
         for rival in rivals:
             ids = {tried.layer.id for tried in kept}
-            if rival.estimate is None or rival.layer.place != old.layer.place:
-                continue
-            if rival.layer.id in ids:
+            if rival.layer.id in ids or not _may_stand_for(rival, old):
                 continue
             layers = [rival.layer if tried is kept[k] else tried.layer for tried in kept]
             candidate = bench.possible(layers)
-            if candidate is None:
+            if candidate is None or rival.estimate is None:
                 continue
             start = extended(candidate, rival.estimate.candidate, rival.estimate.point, {})
             start = extended(candidate, model.candidate, model.point, start)
-            tried = fitted(candidate, bench.series, model.noises, start, units)
+            tried = fitted(candidate, bench.series, model.noises, start, units, like=model)
+            if may_be_plainer(tried, rival.layer, bench.series):
+                continue
             if _gain(tried, model, bench) > CLEARLY:
                 tell(f"{rival.layer.id} goes better with the others than {kept[k].layer.id}")
                 kept[k], model = rival, tried
     return kept, model
+
+
+def _may_stand_for(rival: Tried, old: Tried) -> bool:
+    """Tell whether a rival is at the place of an accepted effect, and gained not much less."""
+    if rival.evidence is None or old.evidence is None or rival.layer.place != old.layer.place:
+        return False
+    return rival.evidence.train > NEARLY * old.evidence.train
 
 
 def _gain(new: Estimate, old: Estimate, bench: Bench) -> float:

@@ -12,8 +12,8 @@ from functools import partial
 
 from diagnosis.bench import Bench
 from diagnosis.estimation import Estimate
-from diagnosis.level import first_fit, recalibrated, units_of
-from diagnosis.prediction import noises_of
+from diagnosis.level import first_fit, recalibrated, settled, units_of
+from diagnosis.point import extended
 from diagnosis.search import Tell, Tried
 from diagnosis.selection import Selection, selected
 from diagnosis.series import paced, require_one_pace
@@ -36,7 +36,7 @@ def ways_of(bench: Bench, tell: Tell = lambda text: None) -> list[Way]:
         own = tuple(settled_at_start(one) for one in paced_ones)
         way = dataclasses.replace(bench, series=own)
         candidate = way.candidate(())
-        units = units_of(candidate, own, noises_of(own, {}), {})
+        units = units_of(candidate, own, {})
         make = partial(first_fit, candidate, own, units)
         first = way.kept("first fit", candidate, [units], make)
         way = dataclasses.replace(way, series=started(first, own))
@@ -64,14 +64,32 @@ def better_way(ways: Sequence[Way]) -> Way:
 def chosen(
     ways: Sequence[Way], thresholds: Thresholds, tell: Tell = lambda text: None
 ) -> tuple[Bench, Estimate, Selection]:
-    """Return the way in which the recordings are foreseen best with what is missing, and that."""
-    found = []
+    """Return the way in which the recordings are foreseen best with what is missing, and that.
+
+    Where something was accepted in one way another is gone only if that fits better there.
+    """
+    found: list[tuple[float, Bench, Estimate, Selection]] = []
     known: tuple[Tried, ...] = ()
     for bench, base in ways:
-        units = units_of(base.candidate, bench.series, base.noises, base.values(0))
+        if any(not _fits_better(bench, base, selection) for *_, selection in found):
+            continue
+        units = units_of(base.candidate, bench.series, base.values(0))
         selection = selected(bench, base, units, thresholds, tell, known=known)
         known = selection.first_round if selection.accepted else ()
         cost = selection.model.cost + thresholds.usual * len(selection.accepted)
         found.append((cost, bench, base, selection))
     _, bench, base, selection = min(found, key=lambda one: one[0])
     return bench, base, selection
+
+
+def _fits_better(bench: Bench, base: Estimate, selection: Selection) -> bool:
+    """Tell whether what was accepted in another way fits better in this one; nothing may."""
+    candidate = bench.possible([tried.layer for tried in selection.accepted])
+    if candidate is None or not selection.accepted:
+        return True
+    model = selection.model
+    units = units_of(base.candidate, bench.series, base.values(0))
+    start = extended(candidate, model.candidate, model.point, {})
+    given = (model.noises, start, units)
+    make = partial(settled, candidate, bench.series, *given)
+    return bench.kept("settled", candidate, given, make).cost < model.cost

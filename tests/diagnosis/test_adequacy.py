@@ -4,16 +4,25 @@ from __future__ import annotations
 
 import dataclasses
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from diagnosis.adequacy import is_inadequate, piles_up, refused, remembers, remembers_mostly
+from diagnosis.adequacy import (
+    is_inadequate,
+    is_strained,
+    piles_up,
+    refused,
+    remembers,
+    remembers_mostly,
+    strain,
+)
 from diagnosis.bench import Bench
 from diagnosis.estimation import Estimate, estimated
 from diagnosis.evidence import evidence, inflations
 from diagnosis.joined import burnt
-from diagnosis.layers import fitting
+from diagnosis.layers import effects_in, fitting
 from diagnosis.level import settled, units_of
 from diagnosis.search import Tried
 from diagnosis.selection import Selection
@@ -21,6 +30,7 @@ from diagnosis.series import Series
 from diagnosis.stirring import resting, stirring
 from tests.diagnosis.test_estimation import bench
 from tests.diagnosis.test_location import based, with_effect
+from tests.language.making import ROOT
 
 __all__ = ["bench"]
 NEEDED = 50.0
@@ -40,7 +50,7 @@ def accepting(bench: Bench, rubbing: Bench, effect: str, base: Estimate | None =
     """Return a selection that has accepted an effect for what is recorded, over a base."""
     layers = {layer.id: layer for e in bench.effects for layer in fitting(bench.document, e)}
     base = base or based(rubbing)
-    units = units_of(base.candidate, rubbing.series, base.noises, base.values(0))
+    units = units_of(base.candidate, rubbing.series, base.values(0))
     candidate = rubbing.candidate((layers[effect],))
     model = settled(candidate, rubbing.series, base.noises, base.values(0), units)
     known = evidence(model, base, rubbing.series)
@@ -68,6 +78,8 @@ def test_innovations_remember_what_is_still_missing(
     quiet = dataclasses.replace(base, noises=dataclasses.replace(base.noises, drifts={}))
     alone = estimated(quiet.candidate, rubbing.series, quiet.noises, quiet.point)
     selection = accepting(bench, rubbing, effect, alone)
+    start = selection.model.candidate, rubbing.series, quiet.noises, selection.model.point
+    selection = dataclasses.replace(selection, model=estimated(*start))
     assert remembers(rubbing, selection) is does
     assert remembers_mostly(rubbing, selection) is does
 
@@ -136,3 +148,17 @@ def test_a_few_recordings_in_which_much_is_left_do_not_speak_for_all(
         selection = dataclasses.replace(right, model=model)
         assert remembers(rubbing, selection)
         assert remembers_mostly(rubbing, selection) is mostly
+
+
+@pytest.mark.parametrize(("most", "strained"), [(100, False), (2, True)])
+def test_what_is_pulled_out_of_its_range_is_something_else(
+    bench: Bench, rubbing: Bench, most: int, strained: bool, tmp_path: Path
+) -> None:
+    """Friction of which no more than a fifth may act would gain much beyond that."""
+    text = (ROOT / "spec" / "effects" / "coulomb_friction.yaml").read_text()
+    limited = text.replace("range: [0, 100]", f"range: [0, {most}]")
+    (tmp_path / "coulomb_friction.yaml").write_text(limited)
+    own = dataclasses.replace(rubbing, effects=effects_in(tmp_path), _made={})
+    selection = accepting(own, own, "coulomb_friction@w_em")
+    assert is_strained(selection) is strained
+    assert (strain(selection) < 1.0) is not strained

@@ -14,7 +14,6 @@ from diagnosis.estimation import Estimate
 from diagnosis.evidence import evidence
 from diagnosis.layers import fitting, shipped_effects
 from diagnosis.level import first_fit, recalibrated, units_of
-from diagnosis.prediction import noises_of
 from diagnosis.series import Series
 from diagnosis.shuffle import Cycles, Shuffle, _cycles, _wave, shuffle_of
 from diagnosis.shuffle_picture import shuffle_picture
@@ -51,7 +50,7 @@ def bench_of(hidden: bool) -> Bench:
 def fitted(bench: Bench) -> tuple[Estimate, dict[str, Estimate]]:
     """Return the recalibrated base, and it with each effect."""
     candidate = bench.candidate(())
-    units = units_of(candidate, bench.series, noises_of(bench.series, {}), {})
+    units = units_of(candidate, bench.series, {})
     base = recalibrated(first_fit(candidate, bench.series, units), bench.series, units)
     found = {}
     for effect in bench.effects:
@@ -108,7 +107,7 @@ def test_without_a_step_there_is_none_and_a_clean_one_is_followed() -> None:
         dataclasses.replace(one, inputs=np.zeros_like(one.inputs)) for one in bench.series
     )
     candidate = bench.candidate(())
-    units = units_of(candidate, bench.series, noises_of(bench.series, {}), {})
+    units = units_of(candidate, bench.series, {})
     base = recalibrated(first_fit(candidate, bench.series, units), bench.series, units)
     assert shuffle_of(base, quiet) is None
     clean = shuffle_of(base, bench.series)
