@@ -58,6 +58,8 @@ class Lanes:
     blocks: dict[str, list[str]] = field(default_factory=dict)
     touched: dict[str, Kind] = field(default_factory=dict)
     called: dict[str, int] = field(default_factory=dict)
+    named: dict[str, tuple[str, Kind]] = field(default_factory=dict)
+    """What stands for values that have been made, with their kinds."""
 
     def block(self, name: str, ops: Block) -> None:
         """Print a block, after those that it runs."""
@@ -86,6 +88,8 @@ class Lanes:
                 return "truth"
             case Value(value) if isinstance(value, float):
                 return "real"
+            case Ref(name) if name in self.named:
+                return self.named[name][1]
             case Ref(name) if name in self.kinds:
                 return self.kinds[name]
             case Unary("not", _) | Binary("and" | "or", _, _) | Compare():
@@ -104,6 +108,8 @@ class Lanes:
                 return "EVERY_LANE" if value else "NO_LANE"
             case Value(value):
                 return f"EACH({literal(value, 'float64')})"
+            case Ref(name) if name in self.named:
+                return self.named[name][0]
             case Ref(name) if name in self.fixed:
                 return f"EACH({CNames(self.program)(name)})"
             case Ref(name):
@@ -136,7 +142,7 @@ class Lanes:
 
 def flat(name: str) -> str:
     """Return the member of a name: its group and itself."""
-    return name.replace(".", "_")
+    return name.replace(".", "_").replace(" ", "_")
 
 
 def abreast(program: Program, looks: list[tuple[int, str]]) -> dict[str, Any] | None:

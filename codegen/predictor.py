@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import re
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
@@ -18,10 +17,12 @@ from codegen.build import compile_program, compiler, compiler_version, optimised
 from codegen.cache import key_of, stored
 from codegen.harness import tunable
 from codegen.lean import lean
+from codegen.loading import loaded
 from codegen.names import c_member, c_type
 from codegen.rendering import render
 from codegen.runs import Prediction, Recorded, Runs
 from codegen.source import c_files
+from codegen.tracks import tracks
 from language.program import Program, short
 
 Reals = NDArray[np.float64]
@@ -30,10 +31,11 @@ MOST_SAMPLES = 5000
 CLOSE = 1e-6
 """A gain that changes by less from sample to sample, of its largest entry, is steady."""
 LIBRARY_FLAGS = (
-    *optimised("O1"),
-    *("-fno-semantic-interposition", "-shared", "-fPIC", "-w"),
+    *optimised("Og"),
+    *("-fno-semantic-interposition", "-shared", "-fPIC", "-w", "-Dvolatile="),
 )
-"""One file, so that all is inlined; -O2 takes 1.4 times as long to compile and is not faster."""
+"""One file, so that all is inlined; -O1 takes 1.6 times as long to compile and is not faster. No
+calibration tool writes into the page of a predictor: not volatile, a step takes 0.7 of the time."""
 MATHEMATICS = re.compile(r"ha_mathf?\.c")
 FUNCTION = re.compile(r"^(?=\w+ ha_\w+\()", re.MULTILINE)
 
@@ -75,7 +77,7 @@ class Predictor:
         self.inputs = columns.inputs
         self.modes = columns.modes
         self.page = columns.page
-        self._library = _loaded(library)
+        self._library = loaded(library)
 
     def differences(
         self,
@@ -182,7 +184,7 @@ class Predictor:
         Innovations beyond `limits` (seen,) count in proportion. The other arrays are those of
         `predict`.
         """
-        starts, samples = recorded.starts, len(recorded.inputs)
+        samples = len(recorded.inputs)
         whole = Prediction(
             np.full((samples, len(self.seen)), np.nan),
             np.full((samples, len(self.seen)), np.nan),
@@ -190,18 +192,60 @@ class Predictor:
             np.zeros(samples, dtype=np.int16),
             samples,
         )
-        done, count = np.empty(len(pages), dtype=np.int64), len(pages)
-        squares, counts = np.empty((count, len(self.seen))), np.empty((count, len(self.seen)))
-        self._library.modewright_predict_all(
-            *(_at(a) for a in (pages, recorded.inputs, recorded.measured, first_gains)),
-            *(len(first_gains), _at(gains), count, _at(starts), _at(recorded.linear), substeps),
-            *(_at(a) for a in (whole.innovations, whole.seen, whole.states, whole.modes, done)),
-        )
+        done = np.empty(len(pages), dtype=np.int64)
+        told = (whole.innovations, whole.seen, whole.states, whole.modes, done)
+        self._follow(pages, 1, recorded, (first_gains, gains), substeps, told)
+        squares, counts = self.squares(whole.innovations, recorded, limits)
+        return Runs(whole, recorded.starts, done, squares, counts)
+
+    def predict_points(
+        self,
+        pages: Reals,
+        recorded: Recorded,
+        first_gains: Reals,
+        gains: Reals,
+        substeps: int,
+    ) -> tuple[Reals, NDArray[np.int64]]:
+        """Follow several recordings at several points, with `pages` (points, recordings, tunables).
+
+        Return the innovations (points, samples, seen), and how many samples were done (points,
+        recordings). The other arrays are those of `predict`.
+        """
+        points = len(pages)
+        innovations = np.full((points, len(recorded.inputs), len(self.seen)), np.nan)
+        done = np.empty(pages.shape[:2], dtype=np.int64)
+        told = (innovations, None, None, None, done)
+        self._follow(pages, points, recorded, (first_gains, gains), substeps, told)
+        return innovations, done
+
+    def squares(self, innovations: Reals, recorded: Recorded, limits: Reals) -> tuple[Reals, Reals]:
+        """Return the sums of the squares of innovations (samples, seen) that count, and how many
+        they are (recordings, seen); those beyond `limits` (seen,) count in proportion.
+        """
+        shape = (len(recorded.linear), len(self.seen))
+        squares, counts = np.empty(shape), np.empty(shape)
         self._library.modewright_squares(
-            *(_at(whole.innovations), count, _at(starts), _at(recorded.skips)),
+            *(_at(innovations), shape[0], _at(recorded.starts), _at(recorded.skips)),
             *(_at(np.ascontiguousarray(limits)), _at(squares), _at(counts)),
         )
-        return Runs(whole, starts, done, squares, counts)
+        return squares, counts
+
+    def _follow(
+        self,
+        pages: Reals,
+        points: int,
+        recorded: Recorded,
+        gains: tuple[Reals, Reals],
+        substeps: int,
+        told: Sequence[NDArray[Any] | None],
+    ) -> None:
+        first, steady = gains
+        starts, linear = recorded.starts, recorded.linear
+        self._library.modewright_predict_all(
+            *(_at(a) for a in (pages, recorded.inputs, recorded.measured, first)),
+            *(len(first), _at(steady), points, len(linear), _at(starts), _at(linear), substeps),
+            *(None if a is None else _at(a) for a in told),
+        )
 
 
 def _at(values: NDArray[Any]) -> int:
@@ -220,6 +264,7 @@ def built(program: Program, columns: Columns) -> Iterator[Path]:
         files = c_files(program)
         context = {
             **_context(columns),
+            "tracks": tracks(program, columns.states, columns.seen),
             "mathematics": next((f for f in files if MATHEMATICS.match(f)), ""),
         }
         files["predictor.c"] = render("predictor.c.jinja", context)
@@ -231,38 +276,6 @@ def built(program: Program, columns: Columns) -> Iterator[Path]:
         key = key_of(sources, command, compiler_version())
         main = [folder / "predictor.c"]
         yield stored(key, lambda made: compile_program(main, made, LIBRARY_FLAGS), folder)
-
-
-def _loaded(path: Path) -> Any:
-    library = ctypes.CDLL(str(path))
-    pointer, whole = ctypes.c_void_p, ctypes.c_long
-    library.modewright_differences.argtypes = [
-        *(pointer, pointer, ctypes.c_int, whole),
-        *(pointer, pointer, pointer, pointer, pointer, pointer),
-    ]
-    library.modewright_differences.restype = None
-    library.modewright_gains.argtypes = [
-        *(pointer, pointer, pointer, pointer, pointer),
-        *(whole, whole, ctypes.c_double, pointer, pointer),
-    ]
-    library.modewright_gains.restype = whole
-    library.modewright_predict.argtypes = [
-        *(pointer, pointer, pointer, pointer, whole, pointer),
-        *(whole, whole, ctypes.c_int, pointer, pointer, pointer, pointer, pointer),
-    ]
-    library.modewright_predict.restype = whole
-    library.modewright_predict_all.argtypes = [
-        *(pointer, pointer, pointer, pointer, whole, pointer),
-        *(whole, pointer, pointer, whole),
-        *(pointer, pointer, pointer, pointer, pointer),
-    ]
-    library.modewright_predict_all.restype = None
-    library.modewright_squares.argtypes = [
-        *(pointer, whole, pointer, pointer),
-        *(pointer, pointer, pointer),
-    ]
-    library.modewright_squares.restype = None
-    return library
 
 
 def _context(columns: Columns) -> dict[str, object]:

@@ -93,8 +93,9 @@ def stepped(program: Program) -> Program:
 def module_context(program: Program, page: Page = CONSTANTS) -> dict[str, Any]:
     """Return what the templates of a Program's files read."""
     number = program.number
-    local = locals_of(program)
-    used, turned = usages(program, local, page.holds), turning(program)
+    turned = turning(program)
+    local = locals_of(program, turned)
+    used = usages(program, local, page.holds)
     kinds = {variable.name: c_type(variable, program.number) for variable in program.variables}
     called = {name.removeprefix("call ") for name in reads(program.blocks.values()) if " " in name}
     shared = _work(program, local)
@@ -116,6 +117,7 @@ def module_context(program: Program, page: Page = CONSTANTS) -> dict[str, Any]:
         "work": [field_of(variable, number) for variable in shared],
         "scratch": scratch and _scratch(program, scratch, kinds),
         "work_type": _work_type(program, page, scratch),
+        "calls": {block: f"{block}({', '.join(used[block].parameters)})" for block in used},
         "blocks": [block for block in blocks if block["name"] not in ENTRIES],
         "entries": {block["name"]: block for block in blocks if block["name"] in ENTRIES},
         "keywords": [

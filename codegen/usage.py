@@ -79,9 +79,11 @@ def usages(
     return found
 
 
-def locals_of(program: Program) -> dict[str, frozenset[str]]:
+def locals_of(
+    program: Program, turned: Mapping[str, frozenset[str]] | None = None
+) -> dict[str, frozenset[str]]:
     """Return, per block, the work variables that live inside it: set once, then read there, or
-    `turning`.
+    those that have `turned` (see `turning`).
 
     A variable that some block reads without having set it is shared by the blocks.
     """
@@ -90,7 +92,7 @@ def locals_of(program: Program) -> dict[str, frozenset[str]]:
     for name, block in program.blocks.items():
         used = {n for n in (*block_reads(block), *block_writes(block)) if n.startswith("work.")}
         shared |= used - once[name]
-    found, turned = {}, turning(program)
+    found, turned = {}, turning(program) if turned is None else turned
     for name, block in program.blocks.items():
         loops = {op.index for op in walk(block) if isinstance(op, Loop)}
         found[name] = frozenset((once[name] - shared) | loops | turned[name])
@@ -115,7 +117,7 @@ def turning(program: Program) -> dict[str, frozenset[str]]:
         known -= read ^ written
         below = reached(name, program.blocks) - {name}
         known -= read & {n for other in below for names in has[other] for n in names}
-        known -= unassigned(program, name, frozenset(read))
+        known -= unassigned(program, name, frozenset(read & known)) if read & known else set()
     return {name: frozenset(read & known) for name, (read, _) in has.items()}
 
 

@@ -10,8 +10,8 @@ from diagnosis.estimation import (
     FIRST_DAMPING,
     Estimate,
     improved,
+    innovations_at,
     looked_at,
-    outcome_at,
     seen_at,
     with_normal,
 )
@@ -34,8 +34,10 @@ def adapted(model: Estimate, series: Sequence[Series]) -> Estimate:
         return now
     now = min(now, seen_at(model, series, turned(now, series).point), key=lambda one: one.cost)
     damping = FIRST_DAMPING
+    still = np.zeros(now.outcome.joined.shape)
+    held = {one.name: still for one in model.candidate.uncertain if not one.per_recording}
     for _ in range(ROUNDS if np.isfinite(now.cost) else 0):
-        better, damping = improved(with_normal(now, series), series, damping, own_only=True)
+        better, damping = improved(with_normal(now, series, held), series, damping, own_only=True)
         if better is None:
             break
         now = better
@@ -55,11 +57,12 @@ def turned(estimate: Estimate, series: Sequence[Series]) -> Estimate:
     best = estimate.point.own.copy()
     lowest = np.sum(estimate.outcome.runs.squares / variances, axis=1)
     for k in own:
-        for start in uncertain[k].starts:
-            trial = best.copy()
+        trials = [best.copy() for _ in uncertain[k].starts]
+        for trial, start in zip(trials, uncertain[k].starts, strict=True):
             trial[:, k] = uncertain[k].coordinate(start)
-            outcome = outcome_at(estimate, series, Point(estimate.point.shared, trial))
-            each = np.sum(outcome.runs.squares / variances, axis=1)
+        points = [Point(estimate.point.shared, trial) for trial in trials]
+        for trial, there in zip(trials, innovations_at(estimate, series, points), strict=True):
+            each = np.sum(there.squares / variances, axis=1)
             better = each < lowest
             best[better, k], lowest[better] = trial[better, k], each[better]
     point = Point(estimate.point.shared, best)

@@ -10,23 +10,28 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
+from numpy.typing import NDArray
 
 from diagnosis.bench import Bench
-from diagnosis.estimation import looked_at
+from diagnosis.estimation import Estimate, looked_at
 from diagnosis.evidence import inflation, inflations
-from diagnosis.freedom import WIDE_LEVELS, with_levels
+from diagnosis.freedom import START_LEVEL, WIDE_LEVELS, with_levels
 from diagnosis.layers import DRIFT, Layer, walks
 from diagnosis.level import units_of
 from diagnosis.location import places_of_freedom
-from diagnosis.naming import place_path
-from diagnosis.point import extended
+from diagnosis.naming import covariance_of, place_path
+from diagnosis.normal import solution
+from diagnosis.point import bounds_of, extended
 from diagnosis.selection import Selection
+from language.effect import own_names
 from language.problem import SpecError
 
-LEFT_PART = 0.5
+LEFT_PART = 0.2
 """Part of what was gained that a freedom may gain beside it: forms differ, and noise has colour.
 
 An error of an output is none of them: a sensor follows whatever the model gets wrong."""
+LEFT_LEVELS = (START_LEVEL, *WIDE_LEVELS)
+"""Levels at which such a freedom is looked at."""
 
 MEMORY = 1.2
 """Innovations that count as one from which on those of a model remember."""
@@ -35,6 +40,17 @@ MEMORY_PART = 0.25
 memory, and a form that is not quite right leaves little of it."""
 TYPICAL_PART = 0.2
 """The same for the recordings, for which it is the median: a few may be far from the others."""
+
+STRAINED, STRAINED_PART = 60.0, 0.02
+"""Nats that accepted effects would gain beyond the ranges of their own parameters, and part of what
+they gained, from which on they are pulled out of these: what imitates another effect is."""
+
+LOUD, LOUD_PART = 3.0, 0.05
+"""Innovations that count as one from which on those of a model are loud, and the typical part that
+an adequate one may then leave: a sensor's lag that imitates its delay leaves a tenth."""
+
+PLAINLY = 5.0
+"""Nats that the recordings must tell an effect from what it is where it is a plainer one."""
 
 PILED = 0.5
 """Part of what an effect gained that a further one gains at the same place, where neither is it."""
@@ -69,12 +85,13 @@ def remembers_mostly(bench: Bench, selection: Selection) -> bool:
 
     Where a form is not quite right some recordings show it that drive it far.
     """
-    if not remembers(bench, selection):
+    is_loud = inflation(selection.model, bench.series) > LOUD
+    if not is_loud and not remembers(bench, selection):
         return False
     before, after = (inflations(one, bench.series) for one in (selection.base, selection.model))
     heard = before > MEMORY
     left = (after[heard] - 1.0) / (before[heard] - 1.0)
-    return not heard.any() or float(np.median(left)) > TYPICAL_PART
+    return not heard.any() or float(np.median(left)) > (LOUD_PART if is_loud else TYPICAL_PART)
 
 
 def piles_up(selection: Selection) -> bool:
@@ -88,6 +105,58 @@ def piles_up(selection: Selection) -> bool:
             return True
         firsts.setdefault(path, gained)
     return False
+
+
+def is_strained(selection: Selection) -> bool:
+    """Tell whether accepted effects are pulled out of the ranges of their own parameters."""
+    gained = sum(tried.evidence.train for tried in selection.accepted if tried.evidence)
+    return strain(selection) > max(STRAINED, STRAINED_PART * gained)
+
+
+def is_plainer(bench: Bench, selection: Selection) -> bool:
+    """Tell whether an accepted effect may as well be a plainer one: friction that is said to rise
+    at rest, and does not.
+    """
+    model = selection.model
+    if model.normal is None:
+        return False
+    covariance, names = covariance_of(model)
+    shrink = 1.0 / inflation(model, bench.series)
+    for one, z in zip(model.candidate.uncertain, model.point.shared, strict=True):
+        if one.plain is not None and not one.per_recording:
+            k = names.index(one.name)
+            apart = float(z) - one.coordinate(one.plain)
+            if shrink * apart**2 / (2.0 * covariance[k, k]) < PLAINLY:
+                return True
+    return False
+
+
+def strain(selection: Selection) -> float:
+    """Return what accepted effects would gain [nats] if their own parameters that are at the end of
+    a range had none, as the normal equations foresee it.
+    """
+    model = selection.model
+    if model.normal is None:
+        return 0.0
+    brought = {
+        tried.layer.named(name)
+        for tried in selection.accepted
+        for name in own_names(tried.layer.effect.body)
+    }
+    low, high = bounds_of(model.candidate).T
+    at_end = (model.point.shared <= low) | (model.point.shared >= high)
+    is_brought = np.array([name in brought for name in model.candidate.names], dtype=bool)
+    within = ~model.normal.own & ~at_end
+    beyond = ~model.normal.own & (is_brought | ~at_end)
+    return _foreseen(model, beyond) - _foreseen(model, within)
+
+
+def _foreseen(model: Estimate, free: NDArray[np.bool_]) -> float:
+    """Return what a step of the free shared coordinates (parameters,) gains, without ranges."""
+    assert model.normal is not None
+    slope = model.normal.g.sum(axis=0)[free] + model.point.shared[free]
+    matrix = model.normal.a.sum(axis=0)[np.ix_(free, free)] + np.eye(int(free.sum()))
+    return 0.5 * float(slope @ solution(matrix, slope))
 
 
 def refused(selection: Selection) -> Selection:
@@ -109,7 +178,7 @@ def _gains(bench: Bench, selection: Selection, layer: Layer, limit: float) -> bo
     units = units_of(candidate, bench.series, model.noises, model.values(0))
     point = extended(candidate, model.candidate, model.point, {})
     quiet = looked_at(candidate, bench.series, model.noises, point)
-    for level in WIDE_LEVELS if np.isfinite(quiet.cost) else ():
+    for level in LEFT_LEVELS if np.isfinite(quiet.cost) else ():
         noises = with_levels(model.noises, units, {layer.named(DRIFT): level})
         free = looked_at(candidate, bench.series, noises, point, quiet.outcome)
         if quiet.cost - free.cost > limit:

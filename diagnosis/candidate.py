@@ -124,7 +124,7 @@ def _compiled(
     started = _with_starts(made, seen)
     starts = [name for name in started.parameters if name not in made.parameters]
     names = [*(one.name for one in uncertain), *starts]
-    fewest = fewest_steps(made, layers, seen)
+    fewest = fewest_steps(made, layers, seen, period)
     program, substeps = stepped(started, names, brought, period, fewest)
     columns = columns_of(program, seen)
     ranges = [made.states[name].range for name in columns.states]

@@ -7,11 +7,10 @@ tells that it is not the right one.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 from diagnosis.bench import Bench
 from diagnosis.description import Description
-from diagnosis.estimation import Estimate
 from diagnosis.excess import excess_at
 from diagnosis.location import acting
 from diagnosis.naming import place_path
@@ -27,6 +26,9 @@ LEFT = 2.0
 """Times the threshold that a term gains where an accepted effect leaves something over."""
 LEFT_PART = 0.3
 """And this part of what the effect gained: a strong one is never described quite well."""
+MUCH_OVER = 0.38
+"""Part of what accepted effects gained that a term at their place gains beside them, from which on
+they are something else: the right ones left a third of it at most."""
 STILL = 0.5
 """Units of its drifts below which a model with what was accepted needs none."""
 MORE = 1.5
@@ -34,27 +36,28 @@ MORE = 1.5
 
 
 def is_doubtful(
-    says: Says,
-    selection: Selection,
-    left: float,
-    bench: Bench,
-    threshold: float,
-    units: Mapping[str, float],
+    says: Says, selection: Selection, left: float, over: float, threshold: float
 ) -> bool:
     """Tell whether a formula might say more than the verdict does.
 
-    `left` is what the base leaves unexplained [nats], `units` are those of drifts.
+    `left` is what the base leaves unexplained [nats], `over` what accepted effects leave.
     """
     if says in ("unknown", "ambiguous"):
         return True
     if says == "nothing_missing":
         return left > UNEXPLAINED * threshold
-    if is_still(selection, units):
-        return False
-    gained = sum(tried.evidence.train for tried in selection.accepted if tried.evidence)
-    return _left_over(bench, selection.model, selection.accepted) > max(
-        LEFT * threshold, LEFT_PART * gained
-    )
+    return over > max(LEFT * threshold, LEFT_PART * _gained(selection))
+
+
+def leaves_much(selection: Selection, over: float, threshold: float) -> bool:
+    """Tell whether accepted effects leave over much of what they gained: they are not what is
+    missing, whether or not a formula is found that says more.
+    """
+    return over > max(threshold, MUCH_OVER * _gained(selection))
+
+
+def _gained(selection: Selection) -> float:
+    return sum(tried.evidence.train for tried in selection.accepted if tried.evidence)
 
 
 def is_still(selection: Selection, units: Mapping[str, float]) -> bool:
@@ -63,10 +66,14 @@ def is_still(selection: Selection, units: Mapping[str, float]) -> bool:
     return all(drifts.get(name, 0.0) < STILL * unit for name, unit in units.items())
 
 
-def _left_over(bench: Bench, model: Estimate, accepted: Sequence[Tried]) -> float:
-    """Return what the best term gains [nats] where effects were accepted, beside them."""
-    most = 0.0
-    for path in {place_path(tried.layer) for tried in accepted}:
+def left_over(bench: Bench, selection: Selection, units: Mapping[str, float]) -> float:
+    """Return what the best term gains [nats] where effects were accepted, beside them; nothing
+    where the model needs no drift.
+    """
+    most, model = 0.0, selection.model
+    if is_still(selection, units):
+        return most
+    for path in {place_path(tried.layer) for tried in selection.accepted}:
         section, _, place = path.partition(".")
         section, _, place = acting(bench, section, place).partition(".")
         try:

@@ -15,14 +15,25 @@ import numpy as np
 
 from diagnosis.candidate import Candidate
 from diagnosis.gains import gains_of
-from diagnosis.normal import Columns, Normal, columns_of, normal_of, stepped
+from diagnosis.normal import Normal, foreseen, normal_of, stepped
 from diagnosis.point import Point, all_values_at, point_of, values_at
-from diagnosis.prediction import Gains, Noises, Outcome, predicted
+from diagnosis.prediction import Gains, Innovations, Noises, Outcome, foreseen_at, predicted
 from diagnosis.series import Series
+from diagnosis.slopes import Columns, carried, columns_of
 
 MOST_ROUNDS = 15
 ENOUGH = 0.3
 """A round that gains less than this [nats] is the last."""
+ENOUGH_CARRIED = 2.0
+"""The same where slopes were carried along steps from where they were looked for."""
+WORTH_ANEW = 1.0
+"""Steps that gain more [nats] once slopes were looked for anew have them looked for again."""
+COMPLETIONS = 12
+"""How often they are at most: a tyre's mode had not come to rest after three."""
+NOTHING = 0.05
+"""A step that is foreseen to gain less than this [nats] is not tried."""
+LITTLE = 1.0
+"""The same while candidates are screened."""
 FIRST_DAMPING = 1e-3
 LARGEST_DAMPING = 1e5
 SCREENED_ROUNDS, ROUNDS_OF_ONE = 8, 4
@@ -90,8 +101,8 @@ def with_normal(
     `known` are columns of a model near it, which are not looked for again.
     """
 
-    def run(point: Point) -> Outcome:
-        return _run(estimate.candidate, series, point, estimate.gains, estimate.noises)
+    def run(points: Sequence[Point]) -> list[Innovations]:
+        return innovations_at(estimate, series, points)
 
     candidate, outcome = estimate.candidate, estimate.outcome
     known = known or {}
@@ -107,47 +118,120 @@ def estimated(
     noises: Noises,
     start: Mapping[str, float] | Point,
     rounds: int = MOST_ROUNDS,
+    known: Columns | None = None,
 ) -> Estimate:
-    """Return the point that foresees the recordings best, from `start` [SI]."""
+    """Return the point that foresees the recordings best, from `start` [SI].
+
+    `known` are slopes of the candidate near the start, if there are such.
+    """
+    return completed(followed(candidate, series, noises, start, rounds, known), series, rounds)
+
+
+def followed(
+    candidate: Candidate,
+    series: Sequence[Series],
+    noises: Noises,
+    start: Mapping[str, float] | Point,
+    rounds: int = MOST_ROUNDS,
+    known: Columns | None = None,
+) -> Estimate:
+    """Return where steps lead with slopes that are looked for once, and carried along them."""
     point = start if isinstance(start, Point) else point_of(candidate, len(series), start)
     now = looked_at(candidate, series, noises, point)
-    damping = FIRST_DAMPING
-    for _ in range(rounds if np.isfinite(now.cost) else 0):
+    return _walked(with_normal(now, series, known), series, rounds) if _is_known(now) else now
+
+
+def completed(now: Estimate, series: Sequence[Series], rounds: int = MOST_ROUNDS) -> Estimate:
+    """Return a fit that is done: slopes are looked for at its end, and steps sought with these."""
+    if not _is_known(now):
+        return now
+    for _ in range(COMPLETIONS):
         now = with_normal(now, series)
+        further = _walked(now, series, rounds, least=ENOUGH)
+        if now.cost - further.cost < WORTH_ANEW:
+            return further
+        now = further
+    return with_normal(now, series)
+
+
+def _is_known(now: Estimate) -> bool:
+    return bool(np.isfinite(now.cost))
+
+
+def _walked(
+    now: Estimate, series: Sequence[Series], rounds: int, least: float = ENOUGH_CARRIED
+) -> Estimate:
+    """Return where steps lead until one gains less than the `least` [nats]."""
+    damping = FIRST_DAMPING
+    for _ in range(rounds):
         better, damping = improved(now, series, damping)
         if better is None:
-            break
-        renewed = looked_at(candidate, series, noises, better.point, better.outcome)
+            return now
         gained = now.cost - better.cost
-        now = renewed if renewed.cost < better.cost + ENOUGH else better
-        if gained < ENOUGH:
-            break
-    return now if now.normal else with_normal(now, series) if np.isfinite(now.cost) else now
+        renewed = looked_at(now.candidate, series, now.noises, better.point, better.outcome)
+        best = renewed if renewed.cost < better.cost + ENOUGH else better
+        now = _moved(now, better, best, series)
+        if gained < least:
+            return now
+    return now
 
 
-def reached(estimate: Estimate, series: Sequence[Series], known: Columns) -> Estimate:
-    """Return where some steps lead for which `known` columns of a model near it are good enough."""
+def _moved(
+    before: Estimate, after: Estimate, there: Estimate, series: Sequence[Series]
+) -> Estimate:
+    """Return an estimate `there` with the slopes of the one `before`, carried along the step after
+    which it is. The gains there may be others than those of the step.
+    """
+    first, last = before.point, after.point
+    step = Point(last.shared - first.shared, last.own - first.own)
+    columns = carried(before.candidate, before.columns, before.outcome, after.outcome, step)
+    return with_normal(there, series, columns)
+
+
+def reached(estimate: Estimate, series: Sequence[Series], known: Columns, rounds: int) -> Estimate:
+    """Return where some steps lead for which `known` columns of a model near it are good enough.
+
+    Slopes of what the other model has not are looked for at each step: carried ones did not find
+    unequal shafts, which begin far from where they fit.
+    """
+    if not _is_known(estimate):
+        return estimate
     now, damping = estimate, FIRST_DAMPING
     early = ROUNDS_OF_ONE if len(series) == 1 else SCREENED_ROUNDS
-    for done in range(1, SCREENED_ROUNDS + 1 if np.isfinite(now.cost) else 0):
-        better, damping = improved(with_normal(now, series, known), series, damping)
+    for done in range(1, rounds + 1):
+        better, damping = improved(with_normal(now, series, known), series, damping, least=LITTLE)
         if better is None:
             break
         gained, now = now.cost - better.cost, better
         late = LATE_PART * (estimate.cost - now.cost) if done >= early else 0.0
         if gained < max(WORTH_A_ROUND, late):
             break
-    regained = looked_at(now.candidate, series, now.noises, now.point, now.outcome)
-    return min(now, regained, key=lambda one: one.cost)
+    return now
+
+
+def regained(now: Estimate, series: Sequence[Series]) -> Estimate:
+    """Return an estimate with gains made where it is, if they are better than those it has."""
+    again = looked_at(now.candidate, series, now.noises, now.point, now.outcome)
+    return min(now, again, key=lambda one: one.cost)
 
 
 def improved(
-    now: Estimate, series: Sequence[Series], damping: float, own_only: bool = False
+    now: Estimate,
+    series: Sequence[Series],
+    damping: float,
+    own_only: bool = False,
+    least: float = NOTHING,
 ) -> tuple[Estimate | None, float]:
-    """Return a better point and the damping that led there; None where there is none."""
+    """Return a better point and the damping that led there; None where there is none.
+
+    A step that is foreseen to gain less than the `least` [nats] is not tried.
+    """
     assert now.normal is not None
     while damping < LARGEST_DAMPING:
         point = stepped(now.candidate, now.point, now.normal, damping, own_only)
+        if foreseen(now.candidate, now.point, now.normal, point) < least:
+            damping *= 10.0
+            continue
         outcome = _run(now.candidate, series, point, now.gains, now.noises)
         cost = outcome.cost() + point.prior(now.candidate)
         if cost < now.cost:
@@ -167,6 +251,15 @@ def _run(
 def outcome_at(estimate: Estimate, series: Sequence[Series], point: Point) -> Outcome:
     """Return how a model foresees some recordings at a point, with the gains of the estimate."""
     return _run(estimate.candidate, series, point, estimate.gains, estimate.noises)
+
+
+def innovations_at(
+    estimate: Estimate, series: Sequence[Series], points: Sequence[Point]
+) -> list[Innovations]:
+    """Return what a model does not foresee at some points, with the gains of the estimate."""
+    candidate, gains = estimate.candidate, estimate.gains
+    values = [all_values_at(candidate, point)[: len(series)] for point in points]
+    return foreseen_at(candidate, series, values, gains, estimate.noises.limits) if points else []
 
 
 def seen_at(estimate: Estimate, series: Sequence[Series], point: Point) -> Estimate:

@@ -11,13 +11,11 @@ from numpy.typing import NDArray
 from codegen.runs import Prediction
 from diagnosis.bench import Bench
 from diagnosis.companion import turning
-from diagnosis.estimation import Estimate, outcome_at
+from diagnosis.estimation import Estimate, with_normal
 from diagnosis.evidence import inflation
-from diagnosis.normal import STEP
 from diagnosis.probe import Probe, probe_of
 from diagnosis.regression import Columns, Problem, problem_of
 from diagnosis.scale import holes_of
-from diagnosis.series import Series
 from diagnosis.term import Signals, Term, terms_of
 from language.known import Known, unit_text
 from language.units import Dimension
@@ -46,7 +44,8 @@ def excess_at(bench: Bench, model: Estimate, section: str, place: str) -> Excess
     signals = _signals(bench, probe, runs)
     shown = holes_of(bench, section, place).get("y", "") if section == "outputs" else ""
     terms = tuple(terms_of(signals, section, shown))
-    parameters = _parameters(model, bench.series, weigh)
+    model = model if model.columns else with_normal(model, bench.series)
+    parameters = _parameters(model, weigh)
     waves: list[tuple[Reals, ...]] = []
     columns: list[Columns] = []
     free = parameters[0].shape[1]
@@ -87,15 +86,12 @@ def _answer(
     return weigh.flat(moved)
 
 
-def _parameters(model: Estimate, series: Sequence[Series], weigh: _Weights) -> tuple[Reals, ...]:
+def _parameters(model: Estimate, weigh: _Weights) -> tuple[Reals, ...]:
     """Return how the innovations fall with each parameter (samples * seen, parameters)."""
-    columns = []
-    for k in range(len(model.candidate.uncertain)):
-        ahead = model.point.moved(model.candidate, k, STEP)
-        size = float(ahead.shared[k] - model.point.shared[k])
-        seen = outcome_at(model, series, ahead).innovations
-        moved = [(a - b) / size for a, b in zip(model.outcome.innovations, seen, strict=True)]
-        columns.append(weigh.flat(moved))
+    columns = [
+        weigh.flat([-model.columns[name][part] for part in model.outcome.parts])
+        for name in model.candidate.names
+    ]
     return tuple(np.stack(one, axis=1) for one in zip(*columns, strict=True))
 
 

@@ -11,14 +11,13 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.interpreter import Interpreter, Stepper
 from engine.recording import Channel, Recording
 from engine.simulate import simulate
 from engine.starting import programs_of
 from engine.stimulus import stimulus_of
 from engine.trajectory import Trajectory
 from language.declaration import Formula, Input
-from language.experiment import RecordingMap, Scenario
+from language.experiment import RecordingMap, Scenario, System
 from language.model import Automaton
 from language.problem import Problems, SpecError
 from language.program import Program
@@ -64,11 +63,20 @@ Programs = dict[tuple[tuple[str, ...], ...], Mapping[str, Program]]
 """Programs made for free runs, by the inputs, those of start values as well, and which vary."""
 
 
+Run = Callable[[System, Scenario, Mapping[str, Program]], Trajectory]
+"""What carries out a run of Programs."""
+
+
+def interpreted(system: System, scenario: Scenario, programs: Mapping[str, Program]) -> Trajectory:
+    """Return a run by the interpreter."""
+    return simulate(system, scenario, programs=programs)
+
+
 def free_run(
     automaton: Automaton,
     recording: Recording,
     mapping: RecordingMap,
-    build: Callable[[Program], Stepper] = Interpreter,
+    run: Run = interpreted,
     made: Programs | None = None,
 ) -> FreeRun:
     """Simulate from the first measured values of the states on, with nothing fed back.
@@ -100,7 +108,7 @@ def free_run(
         every=automaton.step,
         span=mapping.span,
     )
-    trajectory = _simulated(_startable(automaton, known), scenario, build, made)
+    trajectory = _simulated(_startable(automaton, known), scenario, run, made)
     compared = {
         channel.column.name: _compared(automaton, channel, trajectory, start) for channel in outputs
     }
@@ -110,7 +118,7 @@ def free_run(
 def _simulated(
     automaton: Automaton,
     scenario: Scenario,
-    build: Callable[[Program], Stepper],
+    run: Run,
     made: Programs | None,
 ) -> Trajectory:
     """Return what an automaton does, by Programs that were `made` before if there are such."""
@@ -120,7 +128,7 @@ def _simulated(
     made = {} if made is None else made
     if kind not in made:
         made[kind] = programs_of(system, scenario)
-    return simulate(system, scenario, build, programs=made[kind])
+    return run(system, scenario, made[kind])
 
 
 def _startable(automaton: Automaton, names: Collection[str]) -> Automaton:

@@ -8,7 +8,7 @@ from functools import partial
 
 from diagnosis.bench import Bench
 from diagnosis.candidate import Candidate
-from diagnosis.estimation import Estimate, estimated, looked_at
+from diagnosis.estimation import Estimate, followed, looked_at
 from diagnosis.layers import DRIFT, Layer
 from diagnosis.level import FIRST_LEVELS, units_of
 from diagnosis.point import extended, point_of
@@ -53,7 +53,7 @@ def _freed(bench: Bench, base: Estimate, candidate: Candidate, layer: Layer | No
         now = looked_at(candidate, bench.series, noises, point)
         found.append(scanned(now, bench.series, units, name, WIDE_LEVELS))
     now = min(found, key=lambda one: one.cost)
-    now = estimated(candidate, bench.series, now.noises, now.point, ROUNDS)
+    now = followed(candidate, bench.series, now.noises, now.point, ROUNDS)
     return scanned(now, bench.series, units, name, NEAR_LEVELS)
 
 
@@ -70,7 +70,7 @@ def scanned(
     best = now
     for level in levels:
         noises = with_levels(now.noises, units, {name: level})
-        tried = looked_at(now.candidate, series, noises, now.point)
+        tried = looked_at(now.candidate, series, noises, now.point, now.outcome)
         best = tried if tried.cost < best.cost else best
     return best
 

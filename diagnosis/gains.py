@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from itertools import pairwise
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +15,7 @@ from diagnosis.prediction import Gains, Noises, Outcome
 from diagnosis.series import Series
 
 Reals = NDArray[np.float64]
+Wholes = NDArray[np.int64]
 SHORT_STAY = 5
 """Samples: a mode that is left sooner has the gain of the mode that lasts longest."""
 START_PART = 0.01
@@ -144,20 +144,33 @@ def points_of(
     """
     if outcome is None:
         return _first_seen(candidate, series[0])
-    stays: dict[int, list[int]] = {}
-    longest: dict[int, Seen] = {}
-    for one, prediction in zip(series, outcome.predictions, strict=True):
-        modes = prediction.modes[: prediction.done]
-        edges = [0, *(np.flatnonzero(np.diff(modes)) + 1).tolist(), len(modes)]
-        for low, high in pairwise(edges if len(modes) else [0]):
-            mode, stay = int(modes[low]), high - low
-            if stay >= SHORT_STAY and stay > max(stays.get(mode, [0])):
-                k = _away(one.measured, low, high)
-                longest[mode] = Seen(prediction.states[k].copy(), one.inputs[k].copy(), stay)
-            stays.setdefault(mode, []).append(stay)
-    ordered = sorted(longest, key=lambda mode: -longest[mode].stay)
-    usual = {mode: round(float(np.median(stays[mode]))) for mode in ordered}
-    return {mode: replace(longest[mode], stay=max(1, usual[mode])) for mode in ordered}
+    found = {}
+    lows, highs, modes, of = _stays(outcome)
+    for mode in np.unique(modes).tolist():
+        here = np.flatnonzero(modes == mode)
+        lengths = highs[here] - lows[here]
+        best = here[np.argmax(lengths)]
+        if np.max(lengths) >= SHORT_STAY:
+            one, states = series[of[best]], outcome.predictions[of[best]].states
+            k = _away(one.measured, int(lows[best]), int(highs[best]))
+            usual = max(1, round(float(np.median(lengths))))
+            found[mode] = int(np.max(lengths)), Seen(states[k].copy(), one.inputs[k].copy(), usual)
+    ordered = sorted(found.items(), key=lambda item: -item[1][0])
+    return {mode: seen for mode, (_, seen) in ordered}
+
+
+def _stays(outcome: Outcome) -> tuple[Wholes, Wholes, Wholes, Wholes]:
+    """Return the first sample of each stay in a mode, the one behind it, its mode and recording."""
+    found = []
+    for r, run in enumerate(outcome.predictions):
+        modes = run.modes[: run.done]
+        edges = np.flatnonzero(modes[1:] != modes[:-1]) + 1
+        if len(modes):
+            lows, highs = np.append(0, edges), np.append(edges, len(modes))
+            found.append((lows, highs, modes[lows], np.full(len(lows), r)))
+    none = np.zeros(0, dtype=np.int64)
+    whole = [np.concatenate(parts) for parts in zip(*found, strict=True)] if found else [none] * 4
+    return whole[0], whole[1], whole[2], whole[3]
 
 
 def _first_seen(candidate: Candidate, series: Series) -> dict[int, Seen]:

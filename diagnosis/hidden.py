@@ -15,12 +15,14 @@ from numpy.typing import NDArray
 
 from diagnosis.adequacy import remembers
 from diagnosis.bench import Bench
-from diagnosis.estimation import Estimate, estimated, looked_at, with_normal
+from diagnosis.estimation import Estimate, followed, looked_at, with_normal
 from diagnosis.evidence import Evidence, evidence, inflation
 from diagnosis.freedom import ALL_LEVELS, SMALL_LEVEL, freed, scanned, with_levels
 from diagnosis.layers import Layer, fitting
 from diagnosis.level import units_of
+from diagnosis.location import acting
 from diagnosis.locus import Locus, Unknown, over_time, told
+from diagnosis.naming import place_path
 from diagnosis.noise import MAD
 from diagnosis.point import extended
 from diagnosis.search import Tell, Tried
@@ -90,7 +92,7 @@ def with_hidden(
     others = (one for one in loci if one.path != place.path)
     hidden = Tried(layer, found.gained, model, found.evidence)
     known = selection.first_round
-    is_less = _is_less(found)
+    is_less = _is_less(bench, found)
     selection = dataclasses.replace(
         selection,
         base=quiet,
@@ -102,12 +104,16 @@ def with_hidden(
     return selection, (place, *others)
 
 
-def _is_less(found: _Hidden) -> bool:
+def _is_less(bench: Bench, found: _Hidden) -> bool:
     """Tell whether effects are named before a hidden input: they gain more beside the drifts of
-    the base, or explain much more than it where nothing drifts.
+    the base, explain much more than it where nothing drifts, or one acts at its place. What it
+    explains there is then what the form of that one does not.
     """
     gained = sum(one.evidence.train for one in found.effects if one.evidence)
-    return gained > counted(found.evidence) or found.explained > MUCH_MORE * found.gained
+    if gained > counted(found.evidence) or found.explained > MUCH_MORE * found.gained:
+        return True
+    places = (place_path(one.layer).partition(".") for one in found.effects)
+    return any(acting(bench, section, place) == found.locus.path for section, _, place in places)
 
 
 def _found(
@@ -214,7 +220,7 @@ def _quieted(bench: Bench, model: Estimate) -> Estimate:
     """Return a model fitted with next to no drift: what it explains without."""
     units = units_of(model.candidate, bench.series, model.noises, model.values(0))
     noises = with_levels(model.noises, units, dict.fromkeys(units, SMALL_LEVEL))
-    return estimated(model.candidate, bench.series, noises, model.point, ROUNDS)
+    return followed(model.candidate, bench.series, noises, model.point, ROUNDS)
 
 
 def _from_silence(bench: Bench, locus: Locus, free: Estimate) -> Locus:

@@ -6,13 +6,27 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from diagnosis.adequacy import is_inadequate, piles_up, refused, remembers_mostly
+from diagnosis.adequacy import (
+    is_inadequate,
+    is_plainer,
+    is_strained,
+    piles_up,
+    refused,
+    remembers_mostly,
+)
 from diagnosis.alone import LEFT_OUT, SIMULATED, alone, forgets
 from diagnosis.bench import Bench
 from diagnosis.bootstrap import bootstrapped, kept_thresholds
 from diagnosis.case import Case
 from diagnosis.description import Description, described
-from diagnosis.doubt import explains_more, is_doubtful, is_still, selected_formula
+from diagnosis.doubt import (
+    explains_more,
+    is_doubtful,
+    is_still,
+    leaves_much,
+    left_over,
+    selected_formula,
+)
 from diagnosis.estimation import Estimate
 from diagnosis.hidden import with_hidden
 from diagnosis.layers import has_parameters
@@ -72,13 +86,15 @@ def _judged_by_observer(case: Case, raw: Bench, ways: Sequence[Way], tell: Tell)
     left = unexplained(bench, selection.base, loci)
     says = _says(selection, left, bench, most)
     formula = None
-    if is_doubtful(says, selection, left, bench, most, units):
+    over = left_over(bench, selection, units) if says == "effect" else 0.0
+    if is_doubtful(says, selection, left, over, most):
         formula = described(bench, selection.base, loci, units, most, tell)
     if formula is not None and explains_more(formula, selection):
         says, selection = "unknown", selected_formula(selection, formula)
     else:
         formula = None
-        says, selection = _adequate(bench, selection, says, UNKNOWN * most, units, tell)
+        is_other = says == "effect" and leaves_much(selection, over, most)
+        says, selection = _adequate(bench, selection, says, UNKNOWN * most, units, is_other, tell)
     return Judgement(bench, base, selection, loci, says, thresholds, formula)
 
 
@@ -88,13 +104,18 @@ def _adequate(
     says: Says,
     needed: float,
     units: Mapping[str, float],
+    is_other: bool,
     tell: Tell,
 ) -> tuple[Says, Selection]:
-    """Return a verdict, or `unknown` without effects that leave much of it unexplained."""
+    """Return a verdict, or `unknown` without effects that leave much of it unexplained.
+
+    `is_other` where what they leave over at their places is known to be much.
+    """
     if not selection.accepted or any(not has_parameters(t.layer) for t in selection.accepted):
         return says, selection
     is_heard = says == "effect" and not is_still(selection, units)
-    is_other = remembers_mostly(bench, selection) or piles_up(selection)
+    is_other = is_other or is_strained(selection) or piles_up(selection)
+    is_other = is_other or remembers_mostly(bench, selection) or is_plainer(bench, selection)
     if not is_other and not (is_heard and is_inadequate(bench, selection, needed)):
         return says, selection
     names = ", ".join(tried.layer.id for tried in selection.accepted)

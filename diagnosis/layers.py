@@ -20,7 +20,7 @@ from language.document import Document, Scalar, Table
 from language.effect import Effect, Laying, read_effect
 from language.laying import lay_effect
 from language.load import automaton_of, program_of
-from language.memory import applications
+from language.memory import applications, applies
 from language.model import Automaton
 from language.place import Misfit, place_of
 from language.problem import Problems, Source, Span
@@ -41,8 +41,9 @@ FAR = Fraction(4)
 """How far an effect's parameter may move while it is fitted, as a factor."""
 DELAYED_STEPS = 4
 """Fewest major steps between two samples of a model with a delay: none is shorter than a step."""
-TURNING_STEPS = 8
-"""Fewest of one with an input that goes along with an angle: motors turn by much in a sample."""
+TURNING_STEP = Fraction(1, 1000)
+"""Longest major step [s] of one with an input that goes along with an angle: motors turn by much in
+a sample. A tone of 12 periods a turn at 100 rad/s then has five steps a period."""
 MOST_STEPS = 40
 """Most major steps between two samples."""
 
@@ -136,11 +137,10 @@ def stepped(
     that effects `brought` at a quarter and at four times their value, and no longer than a time
     that they brought: where a rate is limited, stability is not known beforehand.
     """
-    stable = (
-        _stable(_scaled(given, brought, factor), LONGEST_STEP)
-        for factor in (Fraction(1), FAR, 1 / FAR)
-    )
-    longest = min(*stable, *_times(given, brought))
+    moved = [_scaled(given, brought, factor) for factor in (FAR, 1 / FAR)]
+    others = [one for one in moved if one.parameters != given.parameters]
+    stable = [_stable(one, LONGEST_STEP) for one in (given, *others)]
+    longest = min(*stable, *_times(given, brought), LONGEST_STEP)
     substeps = min(max(fewest, -(-period // longest)), MOST_STEPS)
     parameters = {
         name: dataclasses.replace(parameter, kind="tunable") if name in names else parameter
@@ -160,14 +160,16 @@ def _times(given: Automaton, names: Sequence[str]) -> list[Fraction]:
     ]
 
 
-def fewest_steps(given: Automaton, layers: Sequence[Layer], seen: Sequence[str]) -> int:
-    """Return how many major steps there are to be between two samples at least.
+def fewest_steps(
+    given: Automaton, layers: Sequence[Layer], seen: Sequence[str], period: Fraction
+) -> int:
+    """Return how many major steps there are to be in a period [s] between two samples at least.
 
     Several where what is `seen` shows an input at once as well: it is held within a step.
     """
     at_input = any(layer.effect.fits[0].kind == "input" for layer in layers)
-    if at_input and applications(given, ("floor",)):
-        return TURNING_STEPS
+    if at_input and applies(given, "floor"):
+        return int(-(-period // TURNING_STEP))
     is_short = applications(given, ("delay",)) or shows_inputs(given, seen)
     return DELAYED_STEPS if is_short else 1
 

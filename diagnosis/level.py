@@ -12,11 +12,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from diagnosis.candidate import Candidate
-from diagnosis.estimation import Estimate, estimated, looked_at
+from diagnosis.estimation import Estimate, completed, followed, looked_at
 from diagnosis.gains import near, points_of
 from diagnosis.point import Point
 from diagnosis.prediction import Noises, noises_of
 from diagnosis.series import Series
+from diagnosis.slopes import Columns
 
 REACH = 0.2
 """Seconds in which a drift of one unit shows."""
@@ -119,15 +120,19 @@ def settled(
     start: Mapping[str, float] | Point,
     units: Mapping[str, float],
     turns: int = 3,
+    columns: Columns | None = None,
 ) -> Estimate:
-    """Return parameters and drifts found in turns, until neither gains."""
-    now = estimated(candidate, series, noises, start)
+    """Return parameters and drifts found in turns, until neither gains.
+
+    `columns` are slopes of the candidate near the start, if there are such.
+    """
+    now = followed(candidate, series, noises, start, known=columns)
     for _ in range(turns):
         moved = levelled(now, series, units)
         if moved.cost >= now.cost:
-            return now
-        now = estimated(candidate, series, moved.noises, moved.point)
-    return now
+            break
+        now = followed(candidate, series, moved.noises, moved.point, known=now.columns)
+    return completed(now, series)
 
 
 def fitted(
@@ -137,6 +142,7 @@ def fitted(
     start: Mapping[str, float] | Point,
     units: Mapping[str, float],
     known: float = -np.inf,
+    columns: Columns | None = None,
 ) -> Estimate:
     """Return a fit with next to no drift at first, or a better one with those that `noises` has.
 
@@ -144,13 +150,12 @@ def fitted(
     The other one is tried where the first does not come below a `known` cost [nats].
     """
     quiet = {**noises.drifts, **{name: QUIET * unit for name, unit in units.items()}}
-    first = settled(
-        candidate, series, dataclasses.replace(noises, drifts=quiet), start, units, turns=2
-    )
+    still = dataclasses.replace(noises, drifts=quiet)
+    first = settled(candidate, series, still, start, units, turns=2, columns=columns)
     is_quiet = all(noises.drifts.get(name, 0.0) <= quiet[name] for name in units)
     if is_quiet or first.cost < known:
         return first
-    second = settled(candidate, series, noises, start, units, turns=1)
+    second = settled(candidate, series, noises, start, units, turns=1, columns=columns)
     return min(first, second, key=lambda one: one.cost)
 
 
@@ -168,11 +173,13 @@ def first_fit(
 
 def recalibrated(first: Estimate, series: Sequence[Series], units: Mapping[str, float]) -> Estimate:
     """Return the base fitted to recordings from a first fit, with drifts from little to much."""
-    found = []
+    found: list[Estimate] = []
     for level in FIRST_LEVELS:
         drifts = {name: level * unit for name, unit in units.items()}
         known = dataclasses.replace(first.noises, drifts=drifts)
-        found.append(settled(first.candidate, series, known, first.point, units))
+        near = min(found, key=lambda one: one.cost, default=first)
+        start, columns = near.point, near.columns
+        found.append(settled(first.candidate, series, known, start, units, columns=columns))
     return min(found, key=lambda one: one.cost)
 
 

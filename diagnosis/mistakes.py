@@ -194,15 +194,15 @@ def _followed(candidate: Candidate, series: Sequence[Series]) -> Estimate:
 
 def _costs(model: Estimate, series: Sequence[Series]) -> Reals:
     """Return the negative log likelihood [nats] of the quick part of each recording."""
-    values, found = model.values(0), []
-    for one in series:
-        outcome = predicted(model.candidate, [one], [values], model.gains, model.noises.limits)
-        if not outcome.is_whole:
-            found.append(np.inf)
-            continue
-        quick = _quick(outcome.innovations[0], float(one.period))
+    values, found = [model.values(0)] * len(series), []
+    outcome = predicted(model.candidate, series, values, model.gains, model.noises.limits)
+    for one, run, missed, counts in zip(
+        series, outcome.predictions, outcome.innovations, outcome.runs.counts, strict=True
+    ):
+        quick = _quick(missed, float(one.period))
         spread = np.log(np.maximum(np.nanmean(quick**2, axis=0), 1e-300))
-        found.append(float(np.sum(0.5 * outcome.counts * spread)))
+        whole = run.done == one.count
+        found.append(float(np.sum(0.5 * counts * spread)) if whole else np.inf)
     return np.array(found)
 
 

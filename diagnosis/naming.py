@@ -65,7 +65,7 @@ def quantities_of(model: Estimate) -> dict[str, Quantity]:
 
 def correlations_of(model: Estimate) -> Mapping[tuple[str, str], float]:
     """Return the correlations of the shared parameters of a fit, the strongest first."""
-    covariance, names = _covariance(model)
+    covariance, names = covariance_of(model)
     sizes = np.sqrt(np.diag(covariance))
     found = {}
     for i, first in enumerate(names):
@@ -74,7 +74,7 @@ def correlations_of(model: Estimate) -> Mapping[tuple[str, str], float]:
     return dict(sorted(found.items(), key=lambda item: -abs(item[1])))
 
 
-def _covariance(model: Estimate) -> tuple[Reals, list[str]]:
+def covariance_of(model: Estimate) -> tuple[Reals, list[str]]:
     """The covariance of the shared coordinates: the inverse of the normal equations with priors."""
     assert model.normal is not None
     free = ~model.normal.own
@@ -85,7 +85,7 @@ def _covariance(model: Estimate) -> tuple[Reals, list[str]]:
 
 def _spreads(model: Estimate) -> Reals:
     assert model.normal is not None
-    covariance, _ = _covariance(model)
+    covariance, _ = covariance_of(model)
     own = model.normal.own
     found = np.zeros(len(own))
     found[~own] = np.sqrt(np.diag(covariance))

@@ -23,11 +23,19 @@ def noise_of(values: Reals) -> float:
     known = values[np.isfinite(values)]
     if len(known) < 5:
         return 0.0
-    second = np.diff(known, n=2)
-    parts = np.array_split(second, max(1, len(second) // STRETCH))
-    spread = [MAD * float(np.median(np.abs(part))) for part in parts]
+    spread = MAD * _medians(np.abs(np.diff(known, n=2)))
     white = float(np.quantile(spread, QUIET)) / 6.0**0.5
     return float(max(white, quantum_of(known) / 12.0**0.5))
+
+
+def _medians(sizes: Reals) -> Reals:
+    """Return the median of each stretch of sizes (n,): the first ones have one more of them."""
+    count = max(1, len(sizes) // STRETCH)
+    width, more = divmod(len(sizes), count)
+    edge = more * (width + 1)
+    longer, others = sizes[:edge].reshape(more, width + 1), sizes[edge:].reshape(-1, width)
+    found = [np.median(part, axis=1) for part in (longer, others) if len(part)]
+    return np.concatenate(found)
 
 
 def quantum_of(values: Reals) -> float:

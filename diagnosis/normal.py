@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,20 +10,9 @@ from numpy.typing import NDArray
 from diagnosis.candidate import Candidate
 from diagnosis.point import Point, bounds_of, is_own
 from diagnosis.prediction import Outcome
+from diagnosis.slopes import Columns
 
 Reals = NDArray[np.float64]
-Columns = Mapping[str, Reals]
-"""How the joined innovations (n, seen) of all recordings change with the coordinate of a name."""
-MOST = 1e100
-"""Bound of a change: a run that leaves all bounds tells no more than its sign, and its coordinate
-stays where it is."""
-STEP, LEAST_STEP = 2e-3, 1e-7
-"""Change of a coordinate for a difference, in standard deviations of its prior."""
-FAR = 0.05
-"""Change of innovations, in their standard deviations, up to which they follow a coordinate in
-proportion: the phase of a tone runs far with its order."""
-ALIKE = 0.5
-"""Correlation of changes from which on those over the wider step are taken."""
 
 
 @dataclass(frozen=True)
@@ -47,73 +35,24 @@ class Normal:
         return Normal(self.a[kept], self.g[kept], self.own, self.of[kept], self.fold[kept])
 
 
-def columns_of(
-    candidate: Candidate,
-    point: Point,
-    outcome: Outcome,
-    run: Callable[[Point], Outcome],
-    names: Iterable[str],
-) -> Columns:
-    """Return how innovations change with some coordinates, by forward differences of `run`."""
-    scale = np.sqrt(outcome.variances)
-
-    def difference(k: int, step: float) -> tuple[Reals, float]:
-        ahead = point.moved(candidate, k, step)
-        size = float(ahead.shared[k] - point.shared[k])
-        changes = run(ahead).joined - outcome.joined
-        return _known(changes / size), _far(changes / scale)
-
-    def slope(k: int) -> Reals:
-        step = STEP
-        wide, far = difference(k, step)
-        narrow = wide
-        while FAR < far < np.inf and step > LEAST_STEP:
-            step = max(step * FAR / far / 2.0, LEAST_STEP)
-            narrow, far = difference(k, step)
-        return wide if _is_alike(wide, narrow) else narrow
-
-    return {name: slope(candidate.names.index(name)) for name in names}
-
-
-def _is_alike(first: Reals, second: Reals) -> bool:
-    """Tell whether changes over a wide step are those over a narrow one: they even out what sticks
-    and slips.
-    """
-    both = np.linalg.norm(first) * np.linalg.norm(second)
-    return bool(np.sum(first * second) >= ALIKE * both)
-
-
-def _far(changes: Reals) -> float:
-    """Return the root mean square of what is known of changes; without bound where one is."""
-    known = changes[~np.isnan(changes)]
-    if known.size == 0 or np.max(np.abs(known)) > MOST:
-        return np.inf
-    return float(np.sqrt(np.mean(known**2)))
-
-
-def _known(changes: Reals) -> Reals:
-    """Return changes, 0 where there is none: nothing was seen, or the run left all bounds."""
-    return np.clip(np.where(np.isfinite(changes), changes, 0.0), -MOST, MOST)
-
-
 def normal_of(candidate: Candidate, outcome: Outcome, columns: Columns) -> Normal:
     """Return the normal equations of an outcome, of all coordinates of a candidate."""
     blocks, innovation = outcome.blocks, outcome.joined
     known = np.isfinite(innovation)
     far = np.maximum(np.abs(innovation) / outcome.limits, 1.0)
     weight = np.where(known, 1.0 / outcome.variances / far, 0.0)
-    missed = np.where(known, innovation, 0.0)
-    jacobian = np.array([columns[name] for name in candidate.names])
-    count = len(jacobian)
-    jacobian = jacobian.reshape(count, *innovation.shape)
+    root = np.sqrt(weight)
+    errors = np.where(known, innovation * root, 0.0).reshape(-1)
+    count, seen = len(candidate.names), innovation.shape[1]
+    changes = np.empty((count, innovation.size))
+    for name, row in zip(candidate.names, changes, strict=True):
+        np.multiply(columns[name], root, out=row.reshape(innovation.shape))
     a = np.zeros((len(blocks), count, count))
     g = np.zeros((len(blocks), count))
     for place, block in enumerate(blocks):
-        error = missed[block.part].reshape(-1)
-        changes = jacobian[:, block.part].reshape(count, len(error))
-        weighted = changes * weight[block.part].reshape(-1)
-        a[place] = weighted @ changes.T
-        g[place] = weighted @ error
+        part = slice(seen * block.part.start, seen * block.part.stop)
+        a[place] = changes[:, part] @ changes[:, part].T
+        g[place] = changes[:, part] @ errors[part]
     of, fold = [np.array([getattr(b, name) for b in blocks]) for name in ("recording", "fold")]
     return Normal(a, g, is_own(candidate), of, fold)
 
@@ -145,6 +84,13 @@ def stepped(
     shared = np.clip(point.shared + step.shared, bounds[:, 0], bounds[:, 1])
     own = np.clip(point.own + step.own, bounds[:, 0], bounds[:, 1])
     return Point(shared, own)
+
+
+def foreseen(candidate: Candidate, now: Point, normal: Normal, there: Point) -> float:
+    """Return what the normal equations say that a step gains [nats], priors counted."""
+    step = np.where(normal.own, (there.own - now.own)[normal.of], there.shared - now.shared)
+    slope = normal.g + 0.5 * (normal.a @ step[:, :, None])[:, :, 0]
+    return now.prior(candidate) - there.prior(candidate) - float(np.sum(slope * step))
 
 
 def _solved(point: Point, normal: Normal, damping: float, held: NDArray[np.bool_]) -> Point:

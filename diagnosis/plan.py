@@ -18,10 +18,10 @@ from diagnosis.bench import Bench
 from diagnosis.estimation import Estimate
 from diagnosis.evidence import inflation
 from diagnosis.manoeuvre import Manoeuvre, manoeuvres_of
-from diagnosis.normal import STEP
 from diagnosis.point import Point, point_of
 from diagnosis.prediction import Gains, predicted
 from diagnosis.series import Series
+from diagnosis.slopes import STEP
 
 Reals = NDArray[np.float64]
 MOST = 3

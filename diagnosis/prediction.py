@@ -14,7 +14,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.runs import Prediction, Runs
+from codegen.predictor import Predictor
+from codegen.runs import Prediction, Recorded, Runs
 from diagnosis.candidate import Candidate
 from diagnosis.joined import joined
 from diagnosis.noise import MAD
@@ -79,9 +80,7 @@ class Outcome:
     @cached_property
     def joined(self) -> Reals:
         """The innovations of all recordings behind their burn-in, one after the other (n, seen)."""
-        starts = self.runs.starts
-        edges = zip((starts[:-1] + self.skips).tolist(), starts[1:].tolist(), strict=True)
-        return np.concatenate([self.runs.whole.innovations[low:high] for low, high in edges])
+        return _counted(self.runs.whole.innovations, self.runs.starts, self.skips)
 
     @cached_property
     def parts(self) -> list[slice]:
@@ -135,6 +134,26 @@ class Outcome:
         return found
 
 
+@dataclass(frozen=True)
+class Innovations:
+    """What was not foreseen of recordings at a point: `whole` (samples, seen) by a predictor."""
+
+    whole: Reals
+    recorded: Recorded
+    limits: Reals
+    predictor: Predictor
+
+    @cached_property
+    def joined(self) -> Reals:
+        """The innovations behind the burn-in of each recording (n, seen), as in an Outcome."""
+        return _counted(self.whole, self.recorded.starts, self.recorded.skips)
+
+    @cached_property
+    def squares(self) -> Reals:
+        """The sums of the squares that count (recordings, seen)."""
+        return self.predictor.squares(self.whole, self.recorded, self.limits)[0]
+
+
 def noises_of(series: Sequence[Series], drifts: Mapping[str, float]) -> Noises:
     """Return the noise of the signals and inputs of some recordings: the median over them."""
     seen, inputs = [np.array([one.noise[k] for one in series]) for k in (0, 1)]
@@ -163,3 +182,32 @@ def predicted(
     )
     whole = bool(np.array_equal(runs.done, np.diff(recorded.starts)))
     return Outcome(runs, recorded.skips, limits, whole)
+
+
+def foreseen_at(
+    candidate: Candidate,
+    series: Sequence[Series],
+    values: Sequence[Sequence[Mapping[str, float]]],
+    gains: Gains,
+    limits: Reals,
+) -> list[Innovations]:
+    """Return the innovations of recordings at several points, each with `values` for each of them.
+
+    All points are followed side by side; nothing is told of states.
+    """
+    together = joined(series)
+    recorded, predictor = together.recorded, candidate.predictor
+    found, _ = predictor.predict_points(
+        np.array([candidate.pages(one, together.first) for one in values]),
+        recorded,
+        gains.first,
+        gains.steady,
+        candidate.recipe.substeps,
+    )
+    return [Innovations(one, recorded, limits, predictor) for one in found]
+
+
+def _counted(innovations: Reals, starts: NDArray[np.int64], skips: NDArray[np.int64]) -> Reals:
+    """Return the innovations of all recordings behind their burn-in, one after the other."""
+    edges = zip((starts[:-1] + skips).tolist(), starts[1:].tolist(), strict=True)
+    return np.concatenate([innovations[low:high] for low, high in edges])

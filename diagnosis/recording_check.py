@@ -12,14 +12,13 @@ from diagnosis.consistency import Relation, relations
 from diagnosis.disagreement import disagreements, go_together
 from diagnosis.excitation import Excitation, excitation
 from diagnosis.finding import Finding, by_severity
+from diagnosis.free_run import Run, interpreted
 from diagnosis.outlier import outliers, pauses, without_huge
 from diagnosis.reference import Reference
 from diagnosis.remedy import cured, milliseconds, remedies
-from engine.interpreter import Interpreter, Stepper
 from engine.recording import Recording, pieces
 from language.experiment import RecordingMap
 from language.model import Automaton
-from language.program import Program
 
 Mistakes = Callable[[Sequence[Recording]], list[Finding] | None]
 SHORTEST = 2.0
@@ -52,7 +51,7 @@ def check_recordings(
     recordings: Sequence[Recording],
     mapping: RecordingMap,
     automaton: Automaton | None = None,
-    build: Callable[[Program], Stepper] = Interpreter,
+    carry_out: Run = interpreted,
     mistakes: Mistakes = lambda recordings: None,
 ) -> RecordingCheck:
     """Return what is to be known of recordings; with an automaton also units, signs and clocks.
@@ -73,7 +72,7 @@ def check_recordings(
     findings += _too_little(recordings, channels, excited)
     reference = None
     if automaton is not None and automaton.period is None:
-        reference = Reference(automaton, mapping, build)
+        reference = Reference(automaton, mapping, carry_out)
         findings += [f for one in recordings for f in milliseconds(one, reference)]
     broken = {finding.recording for finding in findings if finding.kind in BROKEN}
     whole = [one for one in recordings if "" not in broken and one.name not in broken]

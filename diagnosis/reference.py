@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
 
-from diagnosis.free_run import FreeRun, Programs, free_run
-from engine.interpreter import Interpreter, Stepper
+from diagnosis.free_run import FreeRun, Programs, Run, free_run, interpreted
 from engine.recording import Recording
 from language.experiment import RecordingMap
 from language.load import program_of
 from language.model import Automaton
-from language.program import Program
 
 LONGEST_STEP, STABLE = 0.004, 3.0
 """Longest major step [s], and how far it stays below the largest stable one."""
@@ -22,11 +19,11 @@ LONGEST_STEP, STABLE = 0.004, 3.0
 
 @dataclass(frozen=True)
 class Reference:
-    """An automaton with the map of its recordings; `build` makes what runs its Programs."""
+    """An automaton with the map of its recordings; `carry_out` runs its Programs."""
 
     automaton: Automaton
     mapping: RecordingMap
-    build: Callable[[Program], Stepper] = Interpreter
+    carry_out: Run = interpreted
     _made: Programs = field(default_factory=dict, repr=False)
 
     @cached_property
@@ -42,4 +39,4 @@ class Reference:
 
     def run(self, recording: Recording) -> FreeRun:
         """Simulate the coarse automaton under recorded inputs. Raises SpecError."""
-        return free_run(self.coarse, recording, self.mapping, self.build, self._made)
+        return free_run(self.coarse, recording, self.mapping, self.carry_out, self._made)

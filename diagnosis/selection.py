@@ -26,9 +26,9 @@ never described so well that nothing small is left beside it."""
 HOPE, HOPE_BESIDE = 0.25, 0.5
 """Part of what it needs to gain that a candidate must promise to be fitted, alone and beside what
 was accepted, where little is misjudged."""
-NEXT = 14
-"""Candidates that are looked at again beside an accepted one, the best of the round before; half
-as many beside two."""
+NEXT = 7
+"""Candidates that are looked at again beside two accepted ones, the best of the round before.
+Beside one all are: what one hid may show itself."""
 AGAIN = 15
 """Candidates that are looked at again where the model itself is found to fit better."""
 FEW = 3
@@ -110,7 +110,7 @@ def selected(
         before = [*accepted, best]
         accepted, model = swapped(bench, best.estimate, before, rounds[0], units, tell)
         rounds[0] = renewed(rounds[0], before, accepted)
-        layers = _likely([*known, *tried], NEXT // len(accepted))
+        layers = list(bench.layers()) if len(accepted) == 1 else _likely(tried, NEXT)
     found = Needed(base, model, tuple(accepted))
     found = still_needed(bench, found, units, thresholds, tell)
     first = tuple(renewed(rounds[0], accepted, found.kept)) if rounds else ()

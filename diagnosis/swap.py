@@ -17,6 +17,8 @@ from diagnosis.search import Tell, Tried
 
 CLEARLY = 3.0
 """Nats by which the model must be better with the other effect."""
+NEARLY = 0.5
+"""Part of what an accepted effect gains that another one gained alone, if it may stand for it."""
 
 
 def swapped(
@@ -35,13 +37,11 @@ def swapped(
     for k, old in enumerate(accepted[:-1]):
         for rival in rivals:
             ids = {tried.layer.id for tried in kept}
-            if rival.estimate is None or rival.layer.place != old.layer.place:
-                continue
-            if rival.layer.id in ids:
+            if rival.layer.id in ids or not _may_stand_for(rival, old):
                 continue
             layers = [rival.layer if tried is kept[k] else tried.layer for tried in kept]
             candidate = bench.possible(layers)
-            if candidate is None:
+            if candidate is None or rival.estimate is None:
                 continue
             start = extended(candidate, rival.estimate.candidate, rival.estimate.point, {})
             start = extended(candidate, model.candidate, model.point, start)
@@ -50,6 +50,13 @@ def swapped(
                 tell(f"{rival.layer.id} goes better with the others than {kept[k].layer.id}")
                 kept[k], model = rival, tried
     return kept, model
+
+
+def _may_stand_for(rival: Tried, old: Tried) -> bool:
+    """Tell whether a rival is at the place of an accepted effect, and gained not much less."""
+    if rival.evidence is None or old.evidence is None or rival.layer.place != old.layer.place:
+        return False
+    return rival.evidence.train > NEARLY * old.evidence.train
 
 
 def _gain(new: Estimate, old: Estimate, bench: Bench) -> float:

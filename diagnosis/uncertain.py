@@ -28,7 +28,10 @@ WIDE = 0.5
 
 @dataclass(frozen=True)
 class Uncertain:
-    """A parameter [SI] in its coordinate: value = start exp(sd z), or start + sd z."""
+    """A parameter [SI] in its coordinate: value = start exp(sd z), or start + sd z.
+
+    At `plain` the effect that brought it is a plainer one.
+    """
 
     name: str
     start: float
@@ -39,6 +42,7 @@ class Uncertain:
     per_recording: bool = False
     starts: tuple[float, ...] = ()
     unit: str = "1"
+    plain: float | None = None
 
     def value(self, z: float) -> float:
         """Return the value of a coordinate."""
@@ -87,10 +91,11 @@ def _of_effect(parameter: Parameter) -> Uncertain:
     each = fitting.per == "recording"
     place = (parameter.name, value, low, high)
     unit = si_unit(parameter)
+    plain = None if fitting.plain is None else float(fitting.plain)
     if low > 0.0 and value > 0.0:
         sd = WIDE * math.log(high / low)
-        return Uncertain(*place, sd, True, each, starts, unit)
-    return Uncertain(*place, WIDE * (high - low), False, each, starts, unit)
+        return Uncertain(*place, sd, True, each, starts, unit, plain)
+    return Uncertain(*place, WIDE * (high - low), False, each, starts, unit, plain)
 
 
 def _starts(parameter: Parameter, value: float) -> tuple[float, ...]:

@@ -12,7 +12,8 @@ from functools import partial
 
 from diagnosis.bench import Bench
 from diagnosis.estimation import Estimate
-from diagnosis.level import first_fit, recalibrated, units_of
+from diagnosis.level import first_fit, recalibrated, settled, units_of
+from diagnosis.point import extended
 from diagnosis.prediction import noises_of
 from diagnosis.search import Tell, Tried
 from diagnosis.selection import Selection, selected
@@ -64,10 +65,15 @@ def better_way(ways: Sequence[Way]) -> Way:
 def chosen(
     ways: Sequence[Way], thresholds: Thresholds, tell: Tell = lambda text: None
 ) -> tuple[Bench, Estimate, Selection]:
-    """Return the way in which the recordings are foreseen best with what is missing, and that."""
-    found = []
+    """Return the way in which the recordings are foreseen best with what is missing, and that.
+
+    Where something was accepted in one way another is gone only if that fits better there.
+    """
+    found: list[tuple[float, Bench, Estimate, Selection]] = []
     known: tuple[Tried, ...] = ()
     for bench, base in ways:
+        if any(not _fits_better(bench, base, selection) for *_, selection in found):
+            continue
         units = units_of(base.candidate, bench.series, base.noises, base.values(0))
         selection = selected(bench, base, units, thresholds, tell, known=known)
         known = selection.first_round if selection.accepted else ()
@@ -75,3 +81,16 @@ def chosen(
         found.append((cost, bench, base, selection))
     _, bench, base, selection = min(found, key=lambda one: one[0])
     return bench, base, selection
+
+
+def _fits_better(bench: Bench, base: Estimate, selection: Selection) -> bool:
+    """Tell whether what was accepted in another way fits better in this one; nothing may."""
+    candidate = bench.possible([tried.layer for tried in selection.accepted])
+    if candidate is None or not selection.accepted:
+        return True
+    model = selection.model
+    units = units_of(base.candidate, bench.series, base.noises, base.values(0))
+    start = extended(candidate, model.candidate, model.point, {})
+    given = (model.noises, start, units, 1)
+    make = partial(settled, candidate, bench.series, *given)
+    return bench.kept("settled", candidate, given, make).cost < model.cost

@@ -40,13 +40,15 @@ class Fitting:
     """What a fit needs to know of a parameter (SI).
 
     `neutral` is the value at which the effect that brought it vanishes, `absent` where there is
-    none; `starts` are values to start from; `per` is `recording` for one value each.
+    none, `plain` the value at which it is a plainer one than its name says; `starts` are values to
+    start from; `per` is `recording` for one value each.
     """
 
     neutral: Fraction | Literal["absent"] | None = None
     starts: tuple[Fraction, ...] = ()
     per: Literal["model", "recording"] = "model"
     form: Literal["constant", "constant_or_random_walk"] = "constant"
+    plain: Fraction | None = None
 
 
 @dataclass(frozen=True)

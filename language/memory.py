@@ -106,15 +106,26 @@ def applications(automaton: Automaton, functions: tuple[str, ...]) -> dict[str, 
 def remembering(automaton: Automaton) -> tuple[Application, ...]:
     """Return every use of a function with memory; what is inside of one comes before it."""
     found: list[Application] = []
-    trees = [formula.tree for formula in decisions(automaton.tables)]
-    for mode in automaton.all_modes:
-        trees += [formula.tree for formula in formulas(mode)]
-        trees += [balance.right for balance in mode.flow.values()]
-    for tree in trees:
+    for tree in _trees(automaton):
         found += reversed(
             [p for p in walk(tree) if isinstance(p, Application) and p.function in MEMORY]
         )
     return tuple(found)
+
+
+def applies(automaton: Automaton, function: str) -> bool:
+    """Tell whether a function is used anywhere, with memory or without."""
+    parts = (part for tree in _trees(automaton) for part in walk(tree))
+    return any(isinstance(part, Application) and part.function == function for part in parts)
+
+
+def _trees(automaton: Automaton) -> list[Tree]:
+    """Return every expression that is evaluated in a mode or in a decision."""
+    trees = [formula.tree for formula in decisions(automaton.tables)]
+    for mode in automaton.all_modes:
+        trees += [formula.tree for formula in formulas(mode)]
+        trees += [balance.right for balance in mode.flow.values()]
+    return trees
 
 
 def ticks_of(automaton: Automaton, time: Tree) -> int:

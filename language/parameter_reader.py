@@ -6,13 +6,13 @@ from fractions import Fraction
 from typing import Literal, cast
 
 from language.declaration import Fitting, Formula, Kind, Parameter, Range
-from language.document import Entry, Scalar, Table
+from language.document import Entry, Node, Scalar, Table
 from language.problem import Problems
 from language.reader import Reader, about_of
 from language.table import TableReader, section
 from language.units import NO_UNIT, UNKNOWN_UNIT, Unit, parse_unit
 
-FITTING_KEYS = ("neutral", "starts", "per", "form")
+FITTING_KEYS = ("neutral", "plain", "starts", "per", "form")
 FORMS = ("constant", "constant_or_random_walk")
 Per = Literal["model", "recording"]
 Form = Literal["constant", "constant_or_random_walk"]
@@ -103,19 +103,26 @@ class ParameterReader(Reader):
         )
 
     def _fitting(self, table: Table, unit: Unit, limits: Range | None) -> Fitting:
-        node = table.get("neutral")
+        node, plain = table.get("neutral"), table.get("plain")
         neutral: Fraction | Literal["absent"] | None = None
         if isinstance(node, Scalar) and node.text == "absent":
             neutral = "absent"
         elif node is not None:
-            neutral, _ = self.quantity(node, "neutral", node.span, unit)
-            if limits and not limits[0] <= neutral <= limits[1]:
-                self.problems.error("range", node.span, "the neutral value is outside the range")
+            neutral = self._inside(node, "neutral", "the neutral value", unit, limits)
+        plainer = None
+        if plain is not None:
+            plainer = self._inside(plain, "plain", "the plain value", unit, limits)
         items = self.items(table.get("starts"), "starts")
-        starts = [self.quantity(item, "starts", item.span, unit)[0] for item in items]
-        for item, start in zip(items, starts, strict=True):
-            if limits and not limits[0] <= start <= limits[1]:
-                self.problems.error("range", item.span, "this start is outside the range")
+        starts = [self._inside(item, "starts", "this start", unit, limits) for item in items]
         per = self.choice(table.get("per"), "per", ("model", "recording"), "model")
         form = self.choice(table.get("form"), "form", FORMS, "constant")
-        return Fitting(neutral, tuple(starts), cast(Per, per), cast(Form, form))
+        return Fitting(neutral, tuple(starts), cast(Per, per), cast(Form, form), plainer)
+
+    def _inside(
+        self, node: Node, key: str, words: str, unit: Unit, limits: Range | None
+    ) -> Fraction:
+        """Return a value of a parameter that lies in its range."""
+        value, _ = self.quantity(node, key, node.span, unit)
+        if limits and not limits[0] <= value <= limits[1]:
+            self.problems.error("range", node.span, f"{words} is outside the range")
+        return value

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from language.operation import (
     Assign,
@@ -88,30 +88,34 @@ def block_writes(block: Block) -> Iterator[str]:
 def expr_names(expr: Expr) -> Iterator[str]:
     """Yield the variables and constants that an expression reads, and `call <function>`."""
     for part in parts(expr):
-        match part:
-            case Ref(name) | Item(name, _):
-                yield name
-            case Call(function, _):
-                yield f"call {function}"
+        if isinstance(part, Ref | Item):
+            yield part.name
+        elif isinstance(part, Call):
+            yield f"call {part.function}"
 
 
-def parts(expr: Expr) -> Iterator[Expr]:
-    """Yield every part of an expression, parents first."""
-    stack = [expr]
+def parts(expr: Expr) -> Sequence[Expr]:
+    """Return every part of an expression, parents first."""
+    if isinstance(expr, Ref | Value):
+        return (expr,)
+    stack: list[Expr] = [expr]
+    found: list[Expr] = []
     while stack:
         part = stack.pop()
-        yield part
-        match part:
-            case Ref() | Value():
-                pass
-            case Item(_, operand) | Unary(_, operand):
-                stack.append(operand)
-            case Binary(_, left, right) | Compare(_, left, right):
-                stack += (right, left)
-            case Select(condition, then, other):
-                stack += (other, then, condition)
-            case Call(_, arguments):
-                stack += reversed(arguments)
+        found.append(part)
+        if isinstance(part, Ref | Value):
+            continue
+        if isinstance(part, Binary | Compare):
+            stack += (part.right, part.left)
+        elif isinstance(part, Call):
+            stack += part.arguments[::-1]
+        elif isinstance(part, Unary):
+            stack.append(part.operand)
+        elif isinstance(part, Select):
+            stack += (part.other, part.then, part.condition)
+        else:
+            stack.append(part.index)
+    return found
 
 
 def reads(blocks: Iterable[Block]) -> set[str]:

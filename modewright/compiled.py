@@ -6,6 +6,7 @@ Both have the same bits. What did the work is told, with the reason where it is 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from functools import cache, partial
 
 from codegen.build import BuildError
@@ -61,6 +62,15 @@ def run_in_c(system: System, scenario: Scenario) -> tuple[Trajectory, str]:
         return found, means
     found = simulate(system, scenario, CompiledStepper, programs=programs)
     return found, f"compiled, block by block: {means}"
+
+
+def carried_out(system: System, scenario: Scenario, programs: Mapping[str, Program]) -> Trajectory:
+    """Return the trajectory of a resolved scenario, in C where that is possible."""
+    with suppress(ToolMissing, BuildError, OSError):
+        found, _ = _in_c(system, scenario, programs)
+        if found:
+            return found
+    return simulate(system, scenario, programs=programs)
 
 
 def _in_c(

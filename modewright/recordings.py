@@ -9,15 +9,12 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from codegen.build import BuildError
-from codegen.stepper import CompiledStepper
 from diagnosis.case import Case
 from diagnosis.file_names import file_names
 from diagnosis.finding import told
 from diagnosis.guessed_map import guessed_map
 from diagnosis.mistakes import mistakes_of
 from diagnosis.recording_check import RecordingCheck, check_recordings as checked, used_columns
-from engine.interpreter import Interpreter, Stepper
 from engine.recording import Recording, read_recording
 from language.experiment import RecordingMap
 from language.load import automaton_of
@@ -26,8 +23,8 @@ from language.missing import ToolMissing
 from language.model import Automaton
 from language.pairing import check_pairing
 from language.problem import Problems, SpecError
-from language.program import Program
 from language.project import Project, expanded, read_document
+from modewright.compiled import carried_out
 
 if TYPE_CHECKING:
     from engine.plot import Picture
@@ -93,7 +90,7 @@ def check_recordings(
         return CheckedRecordings(check, mapping, recordings)
     document = expanded(read_document(project.path_of(spec)), project)
     mistakes = partial(mistakes_of, document, project, automaton, mapping)
-    check = _explained(checked(recordings, mapping, automaton, stepper_of, mistakes), lacking)
+    check = _explained(checked(recordings, mapping, automaton, carried_out, mistakes), lacking)
     return CheckedRecordings(check, mapping, recordings)
 
 
@@ -116,17 +113,9 @@ def held_out_findings(case: Case, automaton: Automaton) -> tuple[str, ...]:
     if not recordings:
         return ()
     mistakes = partial(mistakes_of, case.document, case.project, automaton, case.mapping)
-    check = checked(recordings, case.mapping, automaton, stepper_of, mistakes)
+    check = checked(recordings, case.mapping, automaton, carried_out, mistakes)
     serious = [finding for finding in check.findings if finding.severity != "note"]
     return tuple(f"held out, {severity}: {text}" for severity, text in told(serious))
-
-
-def stepper_of(program: Program) -> Stepper:
-    """Return a Program in C, interpreted where there is no compiler; both have the same bits."""
-    try:
-        return CompiledStepper(program)
-    except (ToolMissing, BuildError, OSError):
-        return Interpreter(program)
 
 
 def _read(

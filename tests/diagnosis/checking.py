@@ -5,11 +5,11 @@ from __future__ import annotations
 from functools import partial
 from pathlib import Path
 
-from codegen.stepper import CompiledStepper
 from diagnosis.mistakes import mistakes_of
 from diagnosis.recording_check import RecordingCheck, check_recordings
 from engine.recording import Recording
 from language.project import Project
+from modewright.compiled import carried_out
 from tests.diagnosis.driving import (
     bench,
     document,
@@ -19,7 +19,7 @@ from tests.diagnosis.driving import (
 
 def check(*recordings: Recording) -> RecordingCheck:
     mistakes = partial(mistakes_of, document(), Project(Path()), driveline(), bench())
-    return check_recordings(recordings, bench(), driveline(), CompiledStepper, mistakes)
+    return check_recordings(recordings, bench(), driveline(), carried_out, mistakes)
 
 
 def seen(found: RecordingCheck) -> set[tuple[str, str, str]]:

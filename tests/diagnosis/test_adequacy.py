@@ -4,16 +4,26 @@ from __future__ import annotations
 
 import dataclasses
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from diagnosis.adequacy import is_inadequate, piles_up, refused, remembers, remembers_mostly
+from diagnosis.adequacy import (
+    is_inadequate,
+    is_plainer,
+    is_strained,
+    piles_up,
+    refused,
+    remembers,
+    remembers_mostly,
+    strain,
+)
 from diagnosis.bench import Bench
 from diagnosis.estimation import Estimate, estimated
 from diagnosis.evidence import evidence, inflations
 from diagnosis.joined import burnt
-from diagnosis.layers import fitting
+from diagnosis.layers import effects_in, fitting, shipped_effects
 from diagnosis.level import settled, units_of
 from diagnosis.search import Tried
 from diagnosis.selection import Selection
@@ -21,6 +31,7 @@ from diagnosis.series import Series
 from diagnosis.stirring import resting, stirring
 from tests.diagnosis.test_estimation import bench
 from tests.diagnosis.test_location import based, with_effect
+from tests.language.making import ROOT
 
 __all__ = ["bench"]
 NEEDED = 50.0
@@ -136,3 +147,28 @@ def test_a_few_recordings_in_which_much_is_left_do_not_speak_for_all(
         selection = dataclasses.replace(right, model=model)
         assert remembers(rubbing, selection)
         assert remembers_mostly(rubbing, selection) is mostly
+
+
+@pytest.mark.parametrize(("most", "strained"), [(100, False), (2, True)])
+def test_what_is_pulled_out_of_its_range_is_something_else(
+    bench: Bench, rubbing: Bench, most: int, strained: bool, tmp_path: Path
+) -> None:
+    """Friction of which no more than a fifth may act would gain much beyond that."""
+    text = (ROOT / "spec" / "effects" / "coulomb_friction.yaml").read_text()
+    limited = text.replace("range: [0, 100]", f"range: [0, {most}]")
+    (tmp_path / "coulomb_friction.yaml").write_text(limited)
+    own = dataclasses.replace(rubbing, effects=effects_in(tmp_path), _made={})
+    selection = accepting(own, own, "coulomb_friction@w_em")
+    assert is_strained(selection) is strained
+    assert (strain(selection) < 1.0) is not strained
+
+
+@pytest.mark.parametrize(("rise", "plainer"), [(0.0, True), (3.0, False)])
+def test_friction_that_does_not_rise_at_rest_is_a_plainer_one(
+    bench: Bench, rise: float, plainer: bool
+) -> None:
+    every = dataclasses.replace(bench, effects=shipped_effects(), _made={})
+    true = {"T_c_w_em": 5.0, "rise_w_em": rise, "w_k_w_em": 60.0}
+    own = with_effect(every, "stribeck_friction@w_em", true)
+    selection = accepting(every, own, "stribeck_friction@w_em")
+    assert is_plainer(own, selection) is plainer

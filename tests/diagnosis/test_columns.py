@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from diagnosis.bench import Bench
-from diagnosis.estimation import estimated, looked_at, outcome_at
+from diagnosis.estimation import estimated, innovations_at, looked_at, outcome_at
 from diagnosis.layers import fitting, shipped_effects
-from diagnosis.normal import STEP, Normal, columns_of, stepped
+from diagnosis.normal import Normal, stepped
 from diagnosis.point import Point, point_of
 from diagnosis.prediction import noises_of
+from diagnosis.slopes import STEP, columns_of
 from tests.diagnosis.test_estimation import TRUTH, bench, recorded
 
 __all__ = ["bench"]
@@ -25,7 +26,7 @@ def test_a_column_is_the_slope_at_its_point(bench: Bench, name: str) -> None:
     point = point_of(candidate, len(series), {**TRUTH, **TONE})
     here = looked_at(candidate, series, noises_of(series, {}), point)
     found = columns_of(
-        candidate, point, here.outcome, lambda p: outcome_at(here, series, p), [name]
+        candidate, point, here.outcome, lambda points: innovations_at(here, series, points), [name]
     )[name]
     tiny, k = 1e-6, candidate.names.index(name)
     ahead, behind = (outcome_at(here, series, point.moved(candidate, k, s)) for s in (tiny, -tiny))

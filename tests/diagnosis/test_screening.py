@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import pytest
 
-from diagnosis import search
+from diagnosis import screening
 from diagnosis.bench import Bench
 from diagnosis.candidate import Candidate
 from diagnosis.estimation import Estimate, looked_at
@@ -15,7 +15,7 @@ from diagnosis.layers import fitting, shipped_effects
 from diagnosis.level import first_fit, units_of
 from diagnosis.point import Point, extended
 from diagnosis.prediction import noises_of
-from diagnosis.search import MOST_SCREENED, screened
+from diagnosis.screening import BEHIND, HINT, MOST_SCREENED, STRONG, Part, promises
 from tests.diagnosis.test_estimation import TRUTH, bench, recorded
 
 __all__ = ["bench"]
@@ -23,15 +23,15 @@ COUNT = 9
 GAIN = 20.0
 
 
-def away_on_some(reached: Callable[..., Estimate]) -> Callable[..., Estimate]:
-    """Steps that on some of the recordings lead to where the brake has no drag."""
+def away_on_some(raced: Callable[..., Estimate]) -> Callable[..., Estimate]:
+    """First steps that on some of the recordings lead to where the brake has no drag."""
 
-    def found(bench: Bench, candidate: Candidate, base: Estimate, rows: list[int]) -> Estimate:
-        if len(rows) == len(bench.series):
-            return reached(bench, candidate, base, rows)
-        whole = extended(candidate, base.candidate, base.point, {"T_r_w_w": 0.0, "share_w_w": 0.0})
-        series = [bench.series[row] for row in rows]
-        return looked_at(candidate, series, base.noises, Point(whole.shared, whole.own[rows]))
+    def found(part: Part, candidate: Candidate, starts: Sequence[Point]) -> Estimate:
+        if len(part.rows) == COUNT:
+            return raced(part, candidate, starts)
+        base, none = part.base, {"T_r_w_w": 0.0, "share_w_w": 0.0}
+        start = extended(candidate, base.candidate, base.point, none)
+        return looked_at(candidate, part.bench.series, base.noises, start)
 
     return found
 
@@ -54,5 +54,24 @@ def test_what_a_single_recording_shows_is_found_where_it_is_not_looked_at_first(
     own = dataclasses.replace(bench, series=series, _made={})
     fitted = first_fit(base, series, units_of(base, series, noises_of(series, {}), {}))
     if leads_away:
-        monkeypatch.setattr(search, "_reached", away_on_some(search._reached))
-    assert fitted.cost - screened(own, drag, fitted).cost > GAIN
+        monkeypatch.setattr(screening, "_raced", away_on_some(screening._raced))
+    (promise,) = promises(own, fitted, [(drag.layers[0], drag)], HINT)
+    assert promise.start is not None
+    assert promise.gain > GAIN
+
+
+def test_what_is_far_behind_is_not_followed_further(bench: Bench) -> None:
+    """Beside dry friction of the motor an offset of its torque takes its first steps alone."""
+    layers = {layer.id: layer for e in shipped_effects() for layer in fitting(bench.document, e)}
+    names = ("coulomb_friction@w_em", "torque_gain@T_br")
+    known = [(layers[name], bench.candidate((layers[name],))) for name in names]
+    series = recorded(known[0][1], {**TRUTH, "T_c_w_em": 40.0})
+    own = dataclasses.replace(bench, series=series, _made={})
+    base = bench.candidate(())
+    fitted = first_fit(base, series, units_of(base, series, noises_of(series, {}), {}))
+    first, second = promises(own, fitted, known, HINT)
+    assert (first.layer.id, second.layer.id) == names
+    assert first.gain > STRONG
+    assert first.start is not None
+    assert second.gain < BEHIND * first.gain
+    assert second.start is None

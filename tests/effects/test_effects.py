@@ -69,7 +69,7 @@ RISE: list[tuple[str, str, Callable[[Array], Array]]] = [
         lambda t: 6 / J * (t - 0.2 * (t - 2 * (1 - np.exp(-t / 2)))),
     ),
     (
-        "{torque_drift@T: {values: {drop: 0.2, tau_d: 2 s, load: 1, u_r: 3, warm_0: 1}}}",
+        "{torque_drift@T: {values: {drop: 0.2, tau_d: 2 s, load: 1, u_n: 3, warm_0: 1}}}",
         "6 N*m",  # heats four times as much as time alone would, from where time alone ends
         lambda t: 6 / J * (t - 0.2 * (4 * t - 3 * 2 * (1 - np.exp(-t / 2)))),
     ),

@@ -40,7 +40,7 @@ WRITTEN_OUT: dict[str, str] = {
     "stiffness_nonlinear": "q x_r",
     "stribeck_friction": "T_c rise w_k bend",
     "torque_derating": "P_max share w_lo",
-    "torque_drift": "drop tau_d load warm_0 u_r",
+    "torque_drift": "drop tau_d load warm_0 u_n",
     "torque_rate_limit": "r_max tau_f",
     "torque_ripple": "a ord ph",
     "tyre_slip": "J_w C_t l_r w_lo",
@@ -95,7 +95,7 @@ TORQUES: list[tuple[str, str, Callable[[], Array]]] = [
         lambda: library.rate_limit(COURSE, MS, 250.0, 0.009),
     ),
     (
-        "torque_drift@T: {values: {drop: 0.3, tau_d: 1 s, load: 0.6, warm_0: 0.2}}", "u_d_T",
+        "torque_drift@T: {values: {drop: 0.3, tau_d: 1 s, load: 0.6, warm_0: 0.2}}", "u_w_T",
         lambda: library.drift(COURSE, MS, 0.3, 1.0, 0.6, 0.2),
     ),
     (

@@ -1,0 +1,142 @@
+"""Recordings that are followed side by side have the bits of those that are followed alone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from codegen.predictor import Predictor
+from codegen.runs import Prediction, Recorded
+from diagnosis.bench import Bench, balance_drifts
+from diagnosis.candidate import Candidate
+from diagnosis.layers import fitting, shipped_effects
+from diagnosis.series import Series
+from language.load import automaton_of
+from language.project import Project, expanded, read_document
+from tests.diagnosis.test_estimation import PERIOD, SEEN
+from tests.language.making import ROOT
+
+Reals = NDArray[np.float64]
+COUNTS = (150, 90, 211, 40, 171)
+"""Samples of recordings: one vector and one that is left over."""
+LINEAR = (1, 0, 1, 1, 0)
+POINTS = 3
+UNKNOWN = 0.2
+"""Part of the measurements that are not known."""
+FIRST = 20
+LAID = {
+    "": True,
+    "actuator_delay@T_em": True,
+    "backlash@half_shaft": False,
+    "actuator_lag@T_em": True,
+    "coulomb_friction@w_em": True,
+    "mount_compliance@half_shaft": True,
+    "second_gap@half_shaft": True,
+    "sensor_lag@w_s": True,
+    "torque_ripple@T_em": True,
+    "tyre_slip@vehicle": True,
+}
+"""Effects on the blind driveline: whether recordings go side by side."""
+
+
+@pytest.fixture(scope="module")
+def bench() -> Bench:
+    project = Project(ROOT)
+    document = expanded(read_document(project.path_of("blind_driveline")), project)
+    automaton = automaton_of(document, project)
+    blank = Series("blank", PERIOD, PERIOD * 0, np.zeros((2, 2)), np.zeros((2, 2)))
+    drifts = balance_drifts(document, automaton)
+    return Bench(document, project, automaton, shipped_effects(), (blank,), SEEN, drifts)
+
+
+def candidate_of(bench: Bench, name: str) -> Candidate:
+    layers = {layer.id: layer for e in bench.effects for layer in fitting(bench.document, e)}
+    return bench.candidate((layers[name],) if name else ())
+
+
+def recorded(predictor: Predictor, seed: int) -> Recorded:
+    """Return recordings with torques that go through the gap, at rest, slowly and fast; parts of
+    what is measured are not known, and the second one leaves all bounds.
+    """
+    draw = np.random.default_rng(seed)
+    starts = np.cumsum([0, *COUNTS], dtype=np.int64)
+    inputs = np.repeat(draw.uniform(-90.0, 90.0, (starts[-1] // 8 + 1, 2)), 8, axis=0)[: starts[-1]]
+    inputs[:, predictor.inputs.index("T_br")] = np.abs(inputs[:, 1]) * 3.0 * (inputs[:, 0] > 50.0)
+    speeds = np.repeat([0.0, 3.0, 60.0, 5.0, 100.0], COUNTS)
+    measured = speeds[:, np.newaxis] * [1.0, 1.0 / 9.0] + draw.normal(size=(starts[-1], 2))
+    measured[draw.uniform(size=measured.shape) < UNKNOWN] = np.nan
+    measured[starts[1] + 60] = 1e16
+    return Recorded(np.ascontiguousarray(inputs), measured, starts, np.full(5, 9), np.array(LINEAR))
+
+
+def gains_of(predictor: Predictor, draw: np.random.Generator, count: int) -> Reals:
+    """Return gains under which the states stay near what is measured."""
+    found = draw.normal(0.0, 1e-4, (count, len(predictor.states), len(SEEN)))
+    for k, name in enumerate(SEEN):
+        found[:, predictor.states.index(name), k] += draw.uniform(0.1, 0.3, count)
+    return found
+
+
+def alone(
+    predictor: Predictor, page: Reals, given: Recorded, r: int, gains: tuple[Reals, Reals], n: int
+) -> Prediction:
+    low, high = given.starts[r : r + 2]
+    inputs, measured = given.inputs[low:high], given.measured[low:high]
+    return predictor.predict(page, inputs, measured, *gains, n, linear=bool(given.linear[r]))
+
+
+def assert_same(mine: Reals, theirs: Reals) -> None:
+    """Bit for bit; one NaN is as good as another."""
+    known = ~np.isnan(theirs)
+    assert np.array_equal(known, ~np.isnan(mine))
+    assert np.array_equal(mine[known].view(np.int64), theirs[known].view(np.int64))
+
+
+@pytest.mark.parametrize("effect", LAID)
+def test_side_by_side_they_have_the_bits_of_one(effect: str, bench: Bench) -> None:
+    candidate = candidate_of(bench, effect)
+    predictor, substeps = candidate.predictor, candidate.recipe.substeps
+    given = recorded(predictor, len(effect))
+    draw = np.random.default_rng(5)
+    page = np.array(list(predictor.page.values()))
+    pages = page * draw.uniform(0.9, 1.1, (POINTS, len(COUNTS), len(page)))
+    first, steady = (gains_of(predictor, draw, n) for n in (FIRST, len(predictor.modes)))
+    innovations, done = predictor.predict_points(pages, given, first, steady, substeps)
+    limits = np.full(len(SEEN), np.inf)
+    whole = predictor.predict_all(pages[0], given, first, steady, substeps, limits).each()
+    for r, (low, high) in enumerate(zip(given.starts[:-1], given.starts[1:], strict=True)):
+        for p in range(POINTS):
+            run = alone(predictor, pages[p, r], given, r, (first, steady), substeps)
+            assert_same(innovations[p, low:high], run.innovations)
+            assert done[p, r] == run.done
+        run = alone(predictor, pages[0, r], given, r, (first, steady), substeps)
+        assert whole[r].done == run.done
+        assert_same(whole[r].seen, run.seen)
+        assert_same(whole[r].states[: run.done], run.states[: run.done])
+        assert np.array_equal(whole[r].modes[: run.done], run.modes[: run.done])
+    assert done[0].tolist() == [150, 60, 211, 40, 171]
+    assert len({int(mode) for one in whole for mode in one.modes}) > 1
+
+
+@pytest.mark.parametrize("effect", LAID)
+def test_most_effects_go_side_by_side(effect: str, bench: Bench) -> None:
+    """The library tells: it holds what follows several."""
+    candidate = candidate_of(bench, effect)
+    library = Path(candidate.predictor._library._name).read_bytes()
+    assert (b"follow_abreast" in library) == LAID[effect]
+
+
+@pytest.mark.parametrize("substeps", [1, 3])
+def test_between_samples_inputs_are_held_or_run_straight(substeps: int, bench: Bench) -> None:
+    candidate = candidate_of(bench, "")
+    predictor = candidate.predictor
+    given = recorded(predictor, 77)
+    pages = np.tile(list(predictor.page.values()), (1, len(COUNTS), 1))
+    gains = np.zeros((len(predictor.modes), len(predictor.states), len(SEEN)))
+    innovations, _ = predictor.predict_points(pages, given, gains[:0], gains, substeps)
+    for r, (low, high) in enumerate(zip(given.starts[:-1], given.starts[1:], strict=True)):
+        run = alone(predictor, pages[0, r], given, r, (gains[:0], gains), substeps)
+        assert_same(innovations[0, low:high], run.innovations)
