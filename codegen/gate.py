@@ -18,7 +18,7 @@ from language.substitution import with_expressions
 LATCH = "latch"
 WITHIN = "within"
 """A function of C alone."""
-LATCH_APART = "latch_apart"
+LATCH_EACH = "latch_each"
 """What takes the inputs one by one."""
 
 
@@ -42,9 +42,9 @@ def gated(program: Program, by_amount: bool = True) -> Program:
         inside = reduce(_both, (part for branch in held for part in _parts(branch.condition)))
         together = tuple(op for branch in held for op in branch.then)
         blocks = {
-            LATCH_APART: taken,
+            LATCH_EACH: taken,
             **blocks,
-            LATCH: (Branch(inside, together, (Run(LATCH_APART),)),),
+            LATCH: (Branch(inside, together, (Run(LATCH_EACH),)),),
         }
     return dataclasses.replace(program, blocks=blocks)
 

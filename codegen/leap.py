@@ -22,7 +22,7 @@ from language.traversal import block_writes, expr_names, reads
 from language.wiring import finished
 
 ENTRIES = ("init", "derive", "step")
-LEAP, DONE, RECORD, STARTED = "leap", "memory.is_done", "record", "memory.started"
+LEAP, DONE, RECORD, STARTED = "leap", "memory.is_leapt", "record", "memory.started"
 THROUGH = "through_events"
 END = "work.end_"
 UNDONE = (Assign(DONE, Value(False)),)

@@ -10,7 +10,7 @@ from codegen.expression import literal
 from codegen.names import CNames, c_member, c_type
 from codegen.usage import ON_PAGE
 from language.number import NumberType, decimal
-from language.program import Constant, Program, Variable
+from language.program import MODE, Constant, Program, Variable
 from language.units import shown_unit
 
 GROUPS = {
@@ -118,13 +118,21 @@ def _groups(program: Program) -> list[tuple[str, str, list[Field]]]:
 
 def _outputs(program: Program) -> list[dict[str, str]]:
     types = {v.name: c_type(v, program.number) for v in program.variables}
+    known = {v.name: v for v in program.variables}
     place = CNames(program)
     return [
         {
             "type": types[wire.source],
             "name": wire.name,
-            "unit": shown_unit(wire.unit),
+            "comment": _told(program, known[wire.source], wire.unit),
             "source": place(wire.source),
         }
         for wire in program.outputs
     ]
+
+
+def _told(program: Program, shown: Variable, unit: str) -> str:
+    """Return what an output is in: its unit, or what its numbers stand for."""
+    if shown.name == MODE:
+        return f"{program.name}_MODE_*"
+    return shown_unit(unit) if shown.type == "real" else shown.about

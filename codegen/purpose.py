@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 
 PURPOSES = {
     "back": "Goes back to the tick in which `until` turned true[, for transition {}]",
@@ -16,26 +17,26 @@ PURPOSES = {
     "elapse": "Time passes: what is left of the step and of waits",
     "equations": "Equations[ of mode {}]",
     "guards": "Guards[ of mode {}]",
-    "half": "States in the middle of a whole step[ in mode {}]: x = Eh x + Fh pull",
+    "half": "States halfway through a step, if it is a whole one[, in mode {}]: Eh x + Fh pull",
     "hear": "Decides between the wishes of regions[: {}]",
     "jump": "Transitions[ of mode {}]: the first one that is due is taken",
     "keep": "Keeps the values that are read later: delays, and ticks that are looked back to",
     "latch": "Takes the inputs of now, each within its range",
-    "latch_apart": "Inputs one by one: a fault bit for each that is not within its range",
+    "latch_each": "Inputs one by one: a fault bit for each that is not within its range",
     "leap": "The whole step[ in mode {}], if nothing happens in it",
     "leave": "What is forgotten where[ {}] is left",
     "limit": "The next piece of the step: it ends where a wait does",
     "load": "Waits whose guard is false begin anew",
-    "locate": "Halves the bracket in which a guard[ of mode {}] changes; its upper end is kept",
+    "locate": "Halves the bracket in which a guard[ of mode {}] turns true; its upper end is kept",
     "look": "Guards[ of mode {}] at work->s after the start of the step",
     "micro_step": "One micro-step: choose, leave, reset, enter",
-    "move": "Flows[ in mode {}] over work->h, or to the first change of a guard",
+    "move": "Flows[ in mode {}] over work->h, or until a guard turns true",
     "point": "States at work->s after the start of the step: its polynomial",
     "predict": "Prediction of the observer[ in mode {}] over one period",
     "pull": "What of the rates[ in mode {}] is not linear in the states: pull = rate - A x",
     "quit": "Leaves region[ {}] with all that is active in it",
     "rates": "Rates of the states[ in mode {}]",
-    "remember": "Keeps the inputs of this tick for the next one",
+    "remember": "Keeps those inputs of this tick that the next one reads",
     "rest": "The model over work->rest: the rest of a tick[, in mode {}]",
     "run": "The model over one tick[, in mode {}]",
     "segment": "One piece of the step: flow, then what is due at its end",
@@ -44,7 +45,7 @@ PURPOSES = {
     "settle": "Transitions until none is enabled",
     "spread": "The covariance over one period[: {}]",
     "late": "What a change of an input at an unknown instant has done[: {}]",
-    "start": "The first values, from the inputs of the first tick; nothing advances yet",
+    "start": "The first tick: states begin, where the spec says so at inputs; nothing advances yet",
     "step": "One step of the method[ in mode {}]: from the states to work->end_*",
     "store": "What updates[ of mode {}] found, stored together",
     "switch": "The transition of the model out of mode {}",
@@ -52,7 +53,7 @@ PURPOSES = {
     "until": "Whether `until` holds[, for transition {}]",
     "update": "Updates[ of mode {}], from the values of this tick",
     "watch": "What each guard is now",
-    "whole": "States at the end of a whole step[ in mode {}]: x = E x + F pull",
+    "whole": "States at the end of a step, if it is a whole one[, in mode {}]: E x + F pull",
 }
 """By the words that the name of a block begins with; `{}` is what follows them, and what stands in
 brackets is said where something does.
@@ -60,12 +61,17 @@ brackets is said where something does.
 OPTIONAL = re.compile(r"\[(.*?)\]")
 
 
-def purpose(block: str) -> str:
-    """Return what a block is for; nothing where its name begins with no such words."""
+def purpose(block: str, modes: Iterable[str] = (), run_modes: Iterable[str] = ()) -> str:
+    """Return what a block is for; nothing where its name begins with no such words.
+
+    What is for a mode while the model inside is in one of its `run_modes` names both.
+    """
+    both = {f"{m}_{r}": f"{m} with the model in {r}" for m in modes for r in run_modes}
     words = block.split("_")
     for count in range(len(words), 0, -1):
         text = PURPOSES.get("_".join(words[:count]))
         if text:
             rest = "_".join(words[count:])
-            return OPTIONAL.sub(r"\1" if rest else "", text).replace("{}", rest)
+            shown = both.get(rest, rest)
+            return OPTIONAL.sub(r"\1" if rest else "", text).replace("{}", shown)
     return ""

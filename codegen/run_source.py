@@ -80,7 +80,6 @@ def _driver(
         for name, program in programs.items()
     ]
     rows = dataclasses.replace(places, is_row=True)
-    formulas = [c for c in assembly.columns if c.block]
     sensors = [_sensor(sensor, places) for sensor in assembly.sensors.values()]
     wired = {name for block in assembly.wires.blocks.values() for name in block_names(block)}
     called = {name for name in wired if name.startswith("call ")}
@@ -98,21 +97,29 @@ def _driver(
         "uses_math": has_lag or bool(called),
         "courses": [_course(assembly, course) for course in assembly.courses],
         "slots": [_slot(assembly, signal, places) for signal in assembly.slots],
-        "formulas": [
-            (len(assembly.slots) + k, rows.formula(column.block or ""))
-            for k, column in enumerate(formulas)
-        ],
+        "formulas": _formulas(assembly, rows),
         "happenings": _happenings(assembly),
-        "captures": [
-            (assembly.happenings.index(f"capture {n}"), f"{INSTANCE.format(n)}_capture(run, now);")
-            for n, sensor in assembly.sensors.items()
-            if sensor.delay
-        ],
+        "captures": _captures(assembly),
         "tunables": [
             (INSTANCE.format(owner), short(c.name), REAL[programs[owner].number])
             for owner, c in assembly.tunables()
         ],
     }
+
+
+def _formulas(assembly: Assembly, rows: Places) -> list[tuple[int, str]]:
+    """Return the place in a row of each column that is a formula, behind the slots, and its C."""
+    blocks = [column.block for column in assembly.columns if column.block]
+    return [(len(assembly.slots) + k, rows.formula(block)) for k, block in enumerate(blocks)]
+
+
+def _captures(assembly: Assembly) -> list[tuple[int, str]]:
+    """Return, for each sensor with a delay, the happening at which it captures, and the call."""
+    return [
+        (assembly.happenings.index(f"capture {n}"), f"{INSTANCE.format(n)}_capture(run, now);")
+        for n, sensor in assembly.sensors.items()
+        if sensor.delay
+    ]
 
 
 def _slot(assembly: Assembly, signal: str, places: Places) -> dict[str, object]:

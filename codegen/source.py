@@ -7,8 +7,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from codegen.expression import SUFFIX, literal
+from codegen.fault import why_set
 from codegen.frame import apart
-from codegen.gate import LATCH_APART, gated
+from codegen.gate import LATCH_EACH, gated
 from codegen.leap import THROUGH, leaping
 from codegen.mathematics import math_files
 from codegen.member import CONSTANTS, PAGE, Page, field_of, members
@@ -42,11 +43,11 @@ from language.traversal import reads, walk
 from language.wiring import finished
 
 ENTRIES = ("init", "derive", "step")
-RARE = (LATCH_APART, THROUGH)
+RARE = (LATCH_EACH, THROUGH)
 """Blocks that are kept out of the way of what a step does nearly always."""
 NOT_INLINED = {
-    "RARELY": "Cold path, not inlined",
-    "APART": "Computes much: its values are on the stack only while it runs",
+    "RARELY": "Runs rarely: not inlined",
+    "NOT_INLINED": "Computes much: its values are on the stack only while it runs",
 }
 """Keywords of functions of a module, with why."""
 STATIC = rf"static (?:{'|'.join(('inline', *NOT_INLINED))}) "
@@ -103,11 +104,15 @@ def module_context(program: Program, page: Page = CONSTANTS) -> dict[str, Any]:
     if scratch and scratch.block != STEP:
         used = with_own(program, used, scratch)
     own = apart(program)
+    modes, run_modes = ([m.name for m in of] for of in (program.modes, program.run_modes))
+    keywords = {name: _keyword(name, own) for name in program.blocks}
     blocks = [
         {
-            **_block(program, name, local[name], turned[name], used, kinds, page, scratch),
-            "purpose": purpose(name),
-            "keyword": _keyword(name, own),
+            **_block(
+                program, name, local[name], turned[name], used, kinds, page, scratch, keywords[name]
+            ),
+            "purpose": purpose(name, modes, run_modes),
+            "keyword": keywords[name],
         }
         for name in _callees_first(program)
     ]
@@ -153,7 +158,9 @@ def _names(program: Program) -> dict[str, Any]:
             (name, [(value_constant(program, values, n), n) for n in range(len(values))])
             for name, values in enumerations(program)
         ],
-        "faults": list(enumerate(program.faults)),
+        "faults": [
+            (bit, fault, why_set(program, fault)) for bit, fault in enumerate(program.faults)
+        ],
         "transitions": program.transitions,
         "real": REAL[program.number],
         "suffix": SUFFIX[program.number],
@@ -212,6 +219,7 @@ def _block(
     kinds: Mapping[str, str],
     page: Page,
     scratch: Scratch | None,
+    keyword: str,
 ) -> dict[str, Any]:
     place = CNames(program, local, SOLVED_ON_PAGE if page.holds_solved else SOLVED_APART)
     writer = Writer(program, used, local - turned, place, kinds)
@@ -230,7 +238,7 @@ def _block(
     ]
     return {
         "name": name,
-        "parameters": _listed(f"static inline void {name}(", parameters),
+        "parameters": _listed(f"static {keyword} void {name}(", parameters),
         "needs": usage.needs,
         "lines": [
             *(declared and [*declared, ""]),
@@ -242,7 +250,7 @@ def _block(
 def _keyword(name: str, own: frozenset[str]) -> str:
     if name.startswith(RARE):
         return "RARELY"
-    return "APART" if name in own else "inline"
+    return "NOT_INLINED" if name in own else "inline"
 
 
 def _listed(opening: str, parameters: Sequence[str]) -> str:

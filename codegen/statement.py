@@ -28,7 +28,7 @@ from language.operation import (
     Unary,
     Value,
 )
-from language.program import Program, short
+from language.program import Program, TransitionInfo, short
 from language.traversal import expr_names
 
 INDENT = "    "
@@ -73,7 +73,7 @@ class Writer:
             case Loop(count, index, body):
                 yield from self._loop(count, index, body)
             case Count(timer, condition, limit, key):
-                yield from self._count(self.place(timer), condition, limit, key)
+                yield from self._count(self.place(timer), condition, limit, key, self._wait(timer))
             case FaultBit(fault, _, True):
                 yield f"self->faults |= {self.program.name}_FAULT_{fault};"
             case FaultBit(fault, _, _):
@@ -131,13 +131,27 @@ class Writer:
         yield from self.lines(inner)
         yield "}"
 
-    def _count(self, timer: str, condition: Expr, limit: int, key: str) -> Iterator[str]:
+    def _wait(self, timer: str) -> str:
+        """Return when the transition of a timer is due; nothing for other counters."""
+        return next((_told(info) for info in self.program.transitions if info.timer == timer), "")
+
+    def _count(
+        self, timer: str, condition: Expr, limit: int, key: str, awaited: str
+    ) -> Iterator[str]:
         yield from tested("if", c_expression(opposite(condition), self.place), key, self.room)
         yield f"{INDENT}{timer} = 0U;"
         yield f"}} else if ({timer} < {limit}U) {{"
-        yield f"{INDENT}{timer}++;"
+        counted = wrapped(timer, "++", awaited, self.room - len(INDENT))
+        yield from (INDENT + line for line in counted)
         yield from ELSE_NOTHING
         yield "}"
+
+
+def _told(info: TransitionInfo) -> str:
+    """Return when a transition is due, with the key of its wait."""
+    if info.tunable:
+        return f"due after more in a row than {info.key}.wait"
+    return f"due at {info.ticks + 1} in a row: {info.key}.wait, {float(1000 * info.wait):g} ms"
 
 
 def going_on(index: str, body: Block) -> tuple[Expr | None, Block]:

@@ -45,8 +45,8 @@ def with_model(
         _check_constant(automaton, observer, {"A": a, "C": c})
         b = _inputs(automaton, balances, point)
         inputs = tuple(u for u in automaton.inputs if any(u in row for row in b.values()))
-        f, f_constants = _rests(balances, (*observer.states, *inputs), point, f"{name}_f")
-        g, g_constants = _rests(seen, observer.states, point, f"{name}_g")
+        f, f_constants = _rests(balances, (*observer.states, *inputs), point, f"{name}_f_constant")
+        g, g_constants = _rests(seen, observer.states, point, f"{name}_g_constant")
         return dataclasses.replace(
             observer,
             inputs=inputs,

@@ -93,7 +93,8 @@ def field_variables(field: Field) -> list[Variable]:
         found.append(Variable(f"work.at_{state}", "real", unit))
         found.append(Variable(f"work.rate_{state}", "real", f"({unit})/s"))
     found += equation_variables(field.automaton, "work.at_")
-    found += [Variable(f"work.guard_{slot}", "truth") for slot in field.slots]
+    about = "a guard of the active mode, in the order of its transitions"
+    found += [Variable(f"work.guard_{slot}", "truth", about=about) for slot in field.slots]
     found += action_variables(field.automaton)
     return found
 

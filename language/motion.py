@@ -98,14 +98,16 @@ def motion_variables(field: Field, method: Method) -> list[Variable]:
     found = [
         Variable("work.h", "real", "s", about="step to flow over"),
         Variable("work.elapsed", "real", "s", about="part of the step until a crossing"),
-        Variable("work.crossed", "truth", about="a guard changed"),
+        Variable("work.crossed", "truth", about="a guard has turned true in the step"),
         Variable("work.s", "real", "s", about="time since the start of the step"),
         Variable("work.low", "real", "s"),
         Variable("work.high", "real", "s"),
         Variable("work.halving", "whole"),
-        Variable("work.is_inside", "truth", about="a crossing lies inside the step"),
+        Variable(
+            "work.is_before_end", "truth", about="a guard turns true before the end of the step"
+        ),
         Variable("work.term", "whole"),
-        *(Variable(f"work.first_{k}", "truth") for k in field.slots),
+        *(Variable(f"work.guard_{k}_at_high", "truth") for k in field.slots),
     ]
     for name, state in field.automaton.states.items():
         unit = str(state.unit.dimension)
@@ -117,7 +119,7 @@ def motion_variables(field: Field, method: Method) -> list[Variable]:
 
 def _locate(field: Field, mode: Mode, crossed: Expr, halvings: int, merge: Expr) -> Block:
     """Halve (low, high]: a guard has changed at high, none has at low."""
-    low, high, inside = Ref("work.low"), Ref("work.high"), "work.is_inside"
+    low, high, inside = Ref("work.low"), Ref("work.high"), "work.is_before_end"
     middle = add(low, multiply(real(0.5), subtract(high, low)))
     body: Block = (
         *_look(mode, middle),
@@ -149,9 +151,9 @@ def _at_high(field: Field, mode: Mode, inside: Expr) -> Block:
     return (Branch(inside, (*kept, Run(f"guards_{mode.name}")), _look(mode, high)),)
 
 
-def _look(mode: Mode, s: Expr) -> Block:
+def _look(mode: Mode, s: Expr, why: str = "") -> Block:
     """Read the guards at `s`."""
-    return (Assign("work.s", s), Run(f"look_{mode.name}"))
+    return (Assign("work.s", s, why), Run(f"look_{mode.name}"))
 
 
 def _kept(field: Field) -> Block:
@@ -167,16 +169,16 @@ def _merged(field: Field, mode: Mode, merge: Expr) -> Block:
     watched = slots(mode)
     if len(watched) < 2:
         return ()
-    first = [Assign(f"work.first_{k}", Ref(f"work.guard_{k}")) for k in watched]
+    first = [Assign(f"work.guard_{k}_at_high", Ref(f"work.guard_{k}")) for k in watched]
     another: Expr = Value(False)
     for position, k in enumerate(watched):
-        turned = Binary("and", Ref(f"work.guard_{k}"), Unary("not", Ref(f"work.first_{k}")))
+        turned = Binary("and", Ref(f"work.guard_{k}"), Unary("not", Ref(f"work.guard_{k}_at_high")))
         another = turned if position == 0 else Binary("or", another, turned)
     high = Ref("work.high")
     accepted: Block = (Assign("work.high", Ref("work.s")), *_kept(field))
     return (
         *first,
-        *_look(mode, add(high, merge)),
+        *_look(mode, add(high, merge), "what turns true until then does so at the same instant"),
         Branch(another, accepted),
     )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
 from language.declaration import Formula
@@ -52,13 +52,7 @@ def read_observer(reader: Reader, node: Node, key: str, model: Automaton | None)
     of = _mode_of_model(reader, of_node, "an observer", node.span, model) if of_node else None
     _one_source(reader, table)
     _each_once(reader, states, table.entries.get("kalman"))
-    noise = _vector(
-        reader, table.get("measurement_noise"), f"{key}.measurement_noise", set(measures)
-    )
-    for name in measures if "measurement_noise" in table.entries else ():
-        if name not in noise:
-            label = f"`{name}` has no measurement noise"
-            reader.problems.error("observer", table.entries["measurement_noise"].span, label)
+    noise = _measurement_noise(reader, table, key, measures)
     rows = columns = set(states)
     correct = table.get("correct")
     inputs = tuple(item.text for item in reader.items(table.get("inputs"), "inputs"))
@@ -83,6 +77,20 @@ def read_observer(reader: Reader, node: Node, key: str, model: Automaton | None)
         limits=_limits(reader, kalman.get("covariance_range"), f"{key}.covariance_range", rows),
         unknown_instant=instants,
     )
+
+
+def _measurement_noise(
+    reader: Reader, table: Table, key: str, measures: Mapping[str, str]
+) -> dict[str, Formula]:
+    """Return the noise of each measurement; where any is given, each has one."""
+    given = table.entries.get("measurement_noise")
+    path = f"{key}.measurement_noise"
+    noise = _vector(reader, table.get("measurement_noise"), path, set(measures))
+    for name in measures:
+        if given and name not in noise:
+            label = f"`{name}` has no measurement noise"
+            reader.problems.error("observer", given.span, label)
+    return noise
 
 
 def _each_once(reader: Reader, states: Iterable[str], entry: Entry | None) -> None:

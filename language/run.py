@@ -98,8 +98,8 @@ def run_motion(
     made.update(_switches(field, problems))
     variables = (
         *_modes(model),
-        Variable("work.left", "real", "s", about="rest of the substep"),
-        Variable("work.event", "whole"),
+        Variable("work.left", "real", "s", about="rest of the tick, or of its substep"),
+        Variable("work.piece", "whole"),
         Variable("work.substep", "whole"),
         *field_variables(field),
         *motion_variables(field, method),
@@ -132,7 +132,7 @@ def run_block(automaton: Automaton, run: ModelRun, rest: Expr | None = None) -> 
 
 def _through_events(automaton: Automaton, field: Field, run: ModelRun, length: Expr) -> Block:
     """One substep, segment by segment, at most `events` jumps."""
-    may_jump = Compare("<", Ref("work.event"), whole(run.events))
+    may_jump = Compare("<", Ref("work.piece"), whole(run.events))
     at_limit: Block = (FaultBit(EVENT_LIMIT), Assign("work.left", real(0.0)))
     look = (*at_state(field), by_mode(field, "guards"))
     after: Block = (Branch(may_jump, (*look, by_mode(field, "switch")), at_limit),)
@@ -145,7 +145,7 @@ def _through_events(automaton: Automaton, field: Field, run: ModelRun, length: E
     left = Compare(">", Ref("work.left"), real(0.0))
     return (
         Assign("work.left", length, f"{automaton.name} {run.key}"),
-        Loop(run.events + 1, "work.event", (Branch(left, segment),)),
+        Loop(run.events + 1, "work.piece", (Branch(left, segment),)),
     )
 
 

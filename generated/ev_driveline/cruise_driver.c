@@ -10,7 +10,7 @@
 #include "ha_math.h"
 
 #if defined(__FAST_MATH__) || (FLT_EVAL_METHOD != 0)
-#error "this code is exact only without fast-math and without excess precision"
+#error "exact only without fast-math and without excess precision; give -ffp-contract=off"
 #endif
 
 /* Fixed parameters, SI */
@@ -38,9 +38,9 @@ static const struct {
 
 /* Computes much: its values are on the stack only while it runs */
 #if defined(__GNUC__)
-#define APART __attribute__((noinline))
+#define NOT_INLINED __attribute__((noinline))
 #else
-#define APART
+#define NOT_INLINED
 #endif
 
 const char cruise_driver_Version[] = cruise_driver_DIGEST;
@@ -51,7 +51,8 @@ cruise_driver_CALIBRATION const volatile cruise_driver_Cal cruise_driver_default
 };
 
 /* Equations of mode always */
-static APART void equations_always(cruise_driver_Self *self, const volatile cruise_driver_Cal *cal)
+static NOT_INLINED void equations_always(cruise_driver_Self *self,
+    const volatile cruise_driver_Cal *cal)
 {
     const double w_w_squared = self->latched.w_w * self->latched.w_w; /* w_w * w_w */
     /* cruise_driver equations.T_v */
@@ -83,7 +84,7 @@ static inline void latch(cruise_driver_Self *self, const cruise_driver_In *in)
     }
 }
 
-/* Keeps the inputs of this tick for the next one */
+/* Keeps those inputs of this tick that the next one reads */
 static inline void remember(void)
 {
     /* nothing to do */

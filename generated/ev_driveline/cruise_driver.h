@@ -17,7 +17,7 @@ enum {
 };
 
 /* Latched fault bits */
-#define cruise_driver_FAULT_range_w_w (1UL << 0)
+#define cruise_driver_FAULT_range_w_w (1UL << 0) /* w_w was outside its range */
 
 /* The calibration page: tunable parameters */
 typedef struct {
@@ -64,7 +64,7 @@ extern const volatile cruise_driver_Cal cruise_driver_default_cal;
 /* Before the first step */
 void cruise_driver_Init(cruise_driver_Self *self, const volatile cruise_driver_Cal *cal);
 
-/* After a change of the calibration page: X_Derive, and a fault if solved numbers do not fit it */
+/* After a change of the page: cruise_driver_Derive, and a fault if solved numbers do not fit it */
 void cruise_driver_Calibrate(cruise_driver_Self *self, const volatile cruise_driver_Cal *cal);
 void cruise_driver_Derive(const volatile cruise_driver_Cal *cal, cruise_driver_Derived *derived);
 

@@ -8,7 +8,7 @@
 #include <float.h>
 
 #if defined(__FAST_MATH__) || (FLT_EVAL_METHOD != 0)
-#error "this code is exact only without fast-math and without excess precision"
+#error "exact only without fast-math and without excess precision; give -ffp-contract=off"
 #endif
 
 const char contactor_Version[] = contactor_DIGEST;
@@ -29,6 +29,7 @@ static inline void jump_open(contactor_Self *self, const contactor_In *in)
     if (!in->command) { /* contactor modes.open.transitions.shut.when */
         self->timer.open_shut = 0U;
     } else if (self->timer.open_shut < 5U) {
+        /* due at 5 in a row: contactor modes.open.transitions.shut.wait, 40 ms */
         self->timer.open_shut++;
     } else {
         /* nothing to do */
@@ -55,7 +56,7 @@ static inline void jump_shut(contactor_Self *self, const contactor_In *in)
     }
 }
 
-/* Keeps the inputs of this tick for the next one */
+/* Keeps those inputs of this tick that the next one reads */
 static inline void remember(void)
 {
     /* nothing to do */

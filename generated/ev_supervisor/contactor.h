@@ -36,7 +36,7 @@ typedef struct {
 } contactor_In;
 
 typedef struct {
-    bool closed; /* 1 */
+    bool closed;
 } contactor_Out;
 
 /* One instance: allocated by the caller, written by this module alone */
@@ -62,7 +62,7 @@ extern const volatile contactor_Cal contactor_default_cal;
 /* Before the first step */
 void contactor_Init(contactor_Self *self, const volatile contactor_Cal *cal);
 
-/* After a change of the calibration page: X_Derive, and a fault if solved numbers do not fit it */
+/* After a change of the page: contactor_Derive, and a fault if solved numbers do not fit it */
 void contactor_Calibrate(contactor_Self *self, const volatile contactor_Cal *cal);
 void contactor_Derive(const volatile contactor_Cal *cal, contactor_Derived *derived);
 

@@ -11,7 +11,7 @@
 #include "ha_mathf.h"
 
 #if defined(__FAST_MATH__) || (FLT_EVAL_METHOD != 0)
-#error "this code is exact only without fast-math and without excess precision"
+#error "exact only without fast-math and without excess precision; give -ffp-contract=off"
 #endif
 
 /* Fixed parameters, SI */
@@ -26,7 +26,7 @@ static const struct {
 /* Points of the axes of tables, SI */
 static const float axis_lim_1[3] = {333.15F, 363.15F, 393.15F}; /* K; supervisor parameters.lim.table.over temp */
 
-/* Cold path, not inlined */
+/* Runs rarely: not inlined */
 #if defined(__GNUC__)
 #define RARELY __attribute__((noinline))
 #else
@@ -42,7 +42,7 @@ supervisor_CALIBRATION const volatile supervisor_Cal supervisor_default_cal = {
 };
 
 /* Inputs one by one: a fault bit for each that is not within its range */
-static RARELY void latch_apart(supervisor_Self *self, const supervisor_In *in)
+static RARELY void latch_each(supervisor_Self *self, const supervisor_In *in)
 {
     if (in->key <= supervisor_key_crank) {
         self->latched.key = in->key; /* inputs.key */
@@ -369,6 +369,7 @@ static inline void count_operation(supervisor_Self *self, const supervisor_In *i
         if (in->hv_ok) { /* supervisor modes.operation.transitions.fault.when */
             self->timer.operation_fault = 0U;
         } else if (self->timer.operation_fault < 4U) {
+            /* due at 4 in a row: supervisor modes.operation.transitions.fault.wait, 30 ms */
             self->timer.operation_fault++;
         } else {
             /* nothing to do */
@@ -416,6 +417,7 @@ static inline void count_operation_precharge(supervisor_Self *self, const superv
         if (!(self->discrete.permit && self->equation.pre_closed)) {
             self->timer.operation_precharge_ready = 0U;
         } else if (self->timer.operation_precharge_ready < 6U) {
+            /* due at 6 in a row: supervisor modes.operation.modes.precharge.transitions.ready.wait, 50 ms */
             self->timer.operation_precharge_ready++;
         } else {
             /* nothing to do */
@@ -521,6 +523,7 @@ static inline void count_operation_drive_torque_regen(supervisor_Self *self,
         if (!((self->latched.v < cal->v_creep) || (self->latched.T_req >= 0.0F))) {
             self->timer.operation_drive_torque_regen_creep = 0U;
         } else if (self->timer.operation_drive_torque_regen_creep < 3U) {
+            /* due at 3 in a row: supervisor modes.operation.modes.drive.regions.torque.modes.regen.transitions.creep.wait, 20 ms */
             self->timer.operation_drive_torque_regen_creep++;
         } else {
             /* nothing to do */
@@ -555,6 +558,7 @@ static inline void count_operation_drive_derating_cool(supervisor_Self *self,
         if (!(self->latched.temp > 333.15F)) {
             self->timer.operation_drive_derating_cool_warm = 0U;
         } else if (self->timer.operation_drive_derating_cool_warm < 101U) {
+            /* due at 101 in a row: supervisor modes.operation.modes.drive.regions.derating.modes.cool.transitions.warm.wait, 1000 ms */
             self->timer.operation_drive_derating_cool_warm++;
         } else {
             /* nothing to do */
@@ -589,6 +593,7 @@ static inline void count_operation_drive_derating_warm(supervisor_Self *self,
         if (!(self->latched.temp < 328.15F)) {
             self->timer.operation_drive_derating_warm_cool = 0U;
         } else if (self->timer.operation_drive_derating_warm_cool < 501U) {
+            /* due at 501 in a row: supervisor modes.operation.modes.drive.regions.derating.modes.warm.transitions.cool.wait, 5000 ms */
             self->timer.operation_drive_derating_warm_cool++;
         } else {
             /* nothing to do */
@@ -631,6 +636,7 @@ static inline void count_main_open(supervisor_Self *self, const supervisor_Work 
         if (!self->equation.main_command) {
             self->timer.main_open_shut = 0U;
         } else if (self->timer.main_open_shut < 5U) {
+            /* due at 5 in a row: supervisor regions.main.modes.open.transitions.shut.wait, 40 ms */
             self->timer.main_open_shut++;
         } else {
             /* nothing to do */
@@ -672,6 +678,7 @@ static inline void count_pre_open(supervisor_Self *self, const supervisor_Work *
         if (!self->equation.pre_command) {
             self->timer.pre_open_shut = 0U;
         } else if (self->timer.pre_open_shut < 3U) {
+            /* due at 3 in a row: supervisor regions.pre.modes.open.transitions.shut.wait, 20 ms */
             self->timer.pre_open_shut++;
         } else {
             /* nothing to do */
@@ -1795,11 +1802,11 @@ static inline void latch(supervisor_Self *self, const supervisor_In *in)
         self->latched.v = in->v; /* inputs.v */
         self->latched.temp = in->temp; /* inputs.temp */
     } else {
-        latch_apart(self, in);
+        latch_each(self, in);
     }
 }
 
-/* Keeps the inputs of this tick for the next one */
+/* Keeps those inputs of this tick that the next one reads */
 static inline void remember(void)
 {
     /* nothing to do */
@@ -1838,7 +1845,7 @@ static inline void keep(supervisor_Self *self)
     }
 }
 
-/* The first values, from the inputs of the first tick; nothing advances yet */
+/* The first tick: states begin, where the spec says so at inputs; nothing advances yet */
 static inline void start(supervisor_Self *self, supervisor_Work *work)
 {
     const float new_T_cmd = 0.0F; /* supervisor discrete.T_cmd.initial */

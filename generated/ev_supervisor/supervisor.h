@@ -77,15 +77,15 @@ enum {
 };
 
 /* Latched fault bits */
-#define supervisor_FAULT_micro_step_limit (1UL << 0)
-#define supervisor_FAULT_range_key (1UL << 1)
-#define supervisor_FAULT_range_U_dc (1UL << 2)
-#define supervisor_FAULT_range_U_pack (1UL << 3)
-#define supervisor_FAULT_range_T_req (1UL << 4)
-#define supervisor_FAULT_range_v (1UL << 5)
-#define supervisor_FAULT_range_temp (1UL << 6)
-#define supervisor_FAULT_range_T_cmd (1UL << 7)
-#define supervisor_FAULT_range_share (1UL << 8)
+#define supervisor_FAULT_micro_step_limit (1UL << 0) /* transitions of a tick did not end: no more are taken */
+#define supervisor_FAULT_range_key (1UL << 1) /* key was outside its range */
+#define supervisor_FAULT_range_U_dc (1UL << 2) /* U_dc was outside its range */
+#define supervisor_FAULT_range_U_pack (1UL << 3) /* U_pack was outside its range */
+#define supervisor_FAULT_range_T_req (1UL << 4) /* T_req was outside its range */
+#define supervisor_FAULT_range_v (1UL << 5) /* v was outside its range */
+#define supervisor_FAULT_range_temp (1UL << 6) /* temp was outside its range */
+#define supervisor_FAULT_range_T_cmd (1UL << 7) /* T_cmd was outside its range */
+#define supervisor_FAULT_range_share (1UL << 8) /* share was outside its range */
 
 /* The calibration page: tunable parameters */
 typedef struct {
@@ -113,15 +113,15 @@ typedef struct {
 typedef struct {
     float T_cmd; /* N*m */
     float share; /* 1 */
-    bool permit; /* 1 */
-    bool main_closed; /* 1 */
-    bool pre_closed; /* 1 */
-    int16_t mode; /* 1 */
-    int16_t operation_drive_torque; /* 1 */
-    int16_t operation_drive_derating; /* 1 */
-    int16_t main; /* 1 */
-    int16_t pre; /* 1 */
-    uint32_t faults; /* 1 */
+    bool permit; /* discrete.permit */
+    bool main_closed;
+    bool pre_closed;
+    int16_t mode; /* supervisor_MODE_* */
+    int16_t operation_drive_torque; /* active mode of region operation.drive.torque */
+    int16_t operation_drive_derating; /* active mode of region operation.drive.derating */
+    int16_t main; /* active mode of region main */
+    int16_t pre; /* active mode of region pre */
+    uint32_t faults; /* latched fault bits */
 } supervisor_Out;
 
 /* Values that live within one step */
@@ -239,7 +239,7 @@ extern const volatile supervisor_Cal supervisor_default_cal;
 /* Before the first step */
 void supervisor_Init(supervisor_Self *self, const volatile supervisor_Cal *cal);
 
-/* After a change of the calibration page: X_Derive, and a fault if solved numbers do not fit it */
+/* After a change of the page: supervisor_Derive, and a fault if solved numbers do not fit it */
 void supervisor_Calibrate(supervisor_Self *self, const volatile supervisor_Cal *cal);
 void supervisor_Derive(const volatile supervisor_Cal *cal, supervisor_Derived *derived);
 

@@ -11,7 +11,7 @@
 #include "ha_math.h"
 
 #if defined(__FAST_MATH__) || (FLT_EVAL_METHOD != 0)
-#error "this code is exact only without fast-math and without excess precision"
+#error "exact only without fast-math and without excess precision; give -ffp-contract=off"
 #endif
 
 /* Fixed parameters, SI */
@@ -128,7 +128,7 @@ static inline void equations_always(bmw_i3_Self *self)
         + (constant.a_aer * self->state.v * fabs(self->state.v));
 }
 
-/* The first values, from the inputs of the first tick; nothing advances yet */
+/* The first tick: states begin, where the spec says so at inputs; nothing advances yet */
 static inline void start(bmw_i3_Self *self)
 {
     self->state.v = 0.0; /* bmw_i3 states.v.initial */

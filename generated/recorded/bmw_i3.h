@@ -17,8 +17,8 @@ enum {
 };
 
 /* Latched fault bits */
-#define bmw_i3_FAULT_zeno (1UL << 0)
-#define bmw_i3_FAULT_livelock (1UL << 1)
+#define bmw_i3_FAULT_zeno (1UL << 0) /* more transitions than a step may have: its rest is dropped */
+#define bmw_i3_FAULT_livelock (1UL << 1) /* transitions at an instant did not end: no more are taken */
 
 /* The calibration page: tunable parameters */
 typedef struct {
@@ -68,7 +68,7 @@ extern const volatile bmw_i3_Cal bmw_i3_default_cal;
 /* Before the first step */
 void bmw_i3_Init(bmw_i3_Self *self, const volatile bmw_i3_Cal *cal);
 
-/* After a change of the calibration page: X_Derive, and a fault if solved numbers do not fit it */
+/* After a change of the page: bmw_i3_Derive, and a fault if solved numbers do not fit it */
 void bmw_i3_Calibrate(bmw_i3_Self *self, const volatile bmw_i3_Cal *cal);
 void bmw_i3_Derive(const volatile bmw_i3_Cal *cal, bmw_i3_Derived *derived);
 

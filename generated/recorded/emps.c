@@ -8,7 +8,7 @@
 #include <float.h>
 
 #if defined(__FAST_MATH__) || (FLT_EVAL_METHOD != 0)
-#error "this code is exact only without fast-math and without excess precision"
+#error "exact only without fast-math and without excess precision; give -ffp-contract=off"
 #endif
 
 /* Fixed parameters, SI */
@@ -131,7 +131,7 @@ static inline void equations_always(emps_Self *self)
     self->equation.F_m = constant.G_f * self->equation.u_dr; /* emps equations.F_m */
 }
 
-/* The first values, from the inputs of the first tick; nothing advances yet */
+/* The first tick: states begin, where the spec says so at inputs; nothing advances yet */
 static inline void start(emps_Self *self)
 {
     self->state.q = self->before.q_ref; /* emps states.q.initial */

@@ -17,8 +17,8 @@ enum {
 };
 
 /* Latched fault bits */
-#define emps_FAULT_zeno (1UL << 0)
-#define emps_FAULT_livelock (1UL << 1)
+#define emps_FAULT_zeno (1UL << 0) /* more transitions than a step may have: its rest is dropped */
+#define emps_FAULT_livelock (1UL << 1) /* transitions at an instant did not end: no more are taken */
 
 /* The calibration page: tunable parameters */
 typedef struct {
@@ -69,7 +69,7 @@ extern const volatile emps_Cal emps_default_cal;
 /* Before the first step */
 void emps_Init(emps_Self *self, const volatile emps_Cal *cal);
 
-/* After a change of the calibration page: X_Derive, and a fault if solved numbers do not fit it */
+/* After a change of the page: emps_Derive, and a fault if solved numbers do not fit it */
 void emps_Calibrate(emps_Self *self, const volatile emps_Cal *cal);
 void emps_Derive(const volatile emps_Cal *cal, emps_Derived *derived);
 

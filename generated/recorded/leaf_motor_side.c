@@ -8,7 +8,7 @@
 #include <float.h>
 
 #if defined(__FAST_MATH__) || (FLT_EVAL_METHOD != 0)
-#error "this code is exact only without fast-math and without excess precision"
+#error "exact only without fast-math and without excess precision; give -ffp-contract=off"
 #endif
 
 /* Fixed parameters, SI */
@@ -135,7 +135,7 @@ static inline void equations_always(leaf_motor_side_Self *self)
         (constant.k_hs * self->state.theta_d) + (constant.c_hs * self->equation.w_d);
 }
 
-/* The first values, from the inputs of the first tick; nothing advances yet */
+/* The first tick: states begin, where the spec says so at inputs; nothing advances yet */
 static inline void start(leaf_motor_side_Self *self)
 {
     /* leaf_motor_side states.w_em.initial */

@@ -17,8 +17,8 @@ enum {
 };
 
 /* Latched fault bits */
-#define leaf_motor_side_FAULT_zeno (1UL << 0)
-#define leaf_motor_side_FAULT_livelock (1UL << 1)
+#define leaf_motor_side_FAULT_zeno (1UL << 0) /* more transitions than a step may have: its rest is dropped */
+#define leaf_motor_side_FAULT_livelock (1UL << 1) /* transitions at an instant did not end: no more are taken */
 
 /* The calibration page: tunable parameters */
 typedef struct {
@@ -72,7 +72,7 @@ extern const volatile leaf_motor_side_Cal leaf_motor_side_default_cal;
 /* Before the first step */
 void leaf_motor_side_Init(leaf_motor_side_Self *self, const volatile leaf_motor_side_Cal *cal);
 
-/* After a change of the calibration page: X_Derive, and a fault if solved numbers do not fit it */
+/* After a change of the page: leaf_motor_side_Derive, and a fault if solved numbers do not fit it */
 void leaf_motor_side_Calibrate(leaf_motor_side_Self *self, const volatile leaf_motor_side_Cal *cal);
 void leaf_motor_side_Derive(const volatile leaf_motor_side_Cal *cal, leaf_motor_side_Derived *derived);
 

@@ -11,7 +11,7 @@
 #include "ha_math.h"
 
 #if defined(__FAST_MATH__) || (FLT_EVAL_METHOD != 0)
-#error "this code is exact only without fast-math and without excess precision"
+#error "exact only without fast-math and without excess precision; give -ffp-contract=off"
 #endif
 
 /* Fixed parameters, SI */
@@ -146,7 +146,7 @@ static inline void equations_always(leaf_vehicle_Self *self)
         + (constant.a_aer_r_w_cubed * self->state.w_w * fabs(self->state.w_w));
 }
 
-/* The first values, from the inputs of the first tick; nothing advances yet */
+/* The first tick: states begin, where the spec says so at inputs; nothing advances yet */
 static inline void start(leaf_vehicle_Self *self)
 {
     self->state.w_w = 0.0; /* leaf_vehicle states.w_w.initial */

@@ -17,8 +17,8 @@ enum {
 };
 
 /* Latched fault bits */
-#define leaf_vehicle_FAULT_zeno (1UL << 0)
-#define leaf_vehicle_FAULT_livelock (1UL << 1)
+#define leaf_vehicle_FAULT_zeno (1UL << 0) /* more transitions than a step may have: its rest is dropped */
+#define leaf_vehicle_FAULT_livelock (1UL << 1) /* transitions at an instant did not end: no more are taken */
 
 /* The calibration page: tunable parameters */
 typedef struct {
@@ -71,7 +71,7 @@ extern const volatile leaf_vehicle_Cal leaf_vehicle_default_cal;
 /* Before the first step */
 void leaf_vehicle_Init(leaf_vehicle_Self *self, const volatile leaf_vehicle_Cal *cal);
 
-/* After a change of the calibration page: X_Derive, and a fault if solved numbers do not fit it */
+/* After a change of the page: leaf_vehicle_Derive, and a fault if solved numbers do not fit it */
 void leaf_vehicle_Calibrate(leaf_vehicle_Self *self, const volatile leaf_vehicle_Cal *cal);
 void leaf_vehicle_Derive(const volatile leaf_vehicle_Cal *cal, leaf_vehicle_Derived *derived);
 

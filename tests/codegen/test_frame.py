@@ -19,4 +19,4 @@ def test_what_computes_much_has_a_frame_of_its_own() -> None:
 @pytest.mark.parametrize("name", ["estimator_float32", "driveline"])
 def test_float32_and_continuous_automata_stay_as_they_are(name: str) -> None:
     assert apart(c_program(program(name))) == frozenset()
-    assert "APART" not in c_files(program(name))[f"{name}.c"]
+    assert "NOT_INLINED" not in c_files(program(name))[f"{name}.c"]

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from codegen.build import FLAGS, compile_program, run_executable
-from codegen.gate import LATCH, LATCH_APART, WITHIN, centred, gated
+from codegen.gate import LATCH, LATCH_EACH, WITHIN, centred, gated
 from codegen.mathematics import math_files
 from codegen.names import REAL
 from codegen.source import c_files
@@ -106,8 +106,8 @@ def test_inputs_are_taken_at_once_or_each_apart() -> None:
     blocks = gated(made).blocks
     (taken,) = blocks[LATCH]
     assert isinstance(taken, Branch)
-    assert len(taken.then) == len(blocks[LATCH_APART]) == len(made.blocks[LATCH]) > 1
-    assert taken.other == (Run(LATCH_APART),)
+    assert len(taken.then) == len(blocks[LATCH_EACH]) == len(made.blocks[LATCH]) > 1
+    assert taken.other == (Run(LATCH_EACH),)
 
 
 def test_a_word_of_an_enumeration_is_not_asked_whether_it_is_below_0() -> None:

@@ -155,14 +155,14 @@ def test_a_name_is_not_given_twice() -> None:
 def test_what_happens_rarely_is_a_function_of_its_own() -> None:
     text = c_files(shipped("estimator_float32"))["estimator_float32.c"]
     assert "static RARELY void through_events_gap(" in text
-    assert "static RARELY void latch_apart(" in text
+    assert "static RARELY void latch_each(" in text
     assert "RARELY" not in c_files(shipped("contactor"))["contactor.c"]
 
 
 def test_what_loops_alone_set_is_a_local_of_its_block() -> None:
     text = c_files(shipped("estimator_float32"))["estimator_float32.c"]
     locate = text[text.index("void locate_no_contact(") :].partition("\n}\n")[0]
-    assert "    float high;\n    bool is_inside;\n    float low;\n" in locate
+    assert "    float high;\n    bool is_before_end;\n    float low;\n" in locate
     assert "work->high" not in text
 
 
@@ -179,5 +179,5 @@ def test_what_nobody_reads_is_not_computed() -> None:
     for name, block in leaping(stepped(cart())).blocks.items():
         if name.startswith("leap_"):
             targets = [op.target for op in walk(block) if hasattr(op, "target")]
-            made = {target for target in targets if target.startswith("work.")} - {"work.is_done"}
+            made = {target for target in targets if target.startswith("work.")}
             assert made <= reads([block]) and len(made) > 10

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from codegen.fault import why_set
 from codegen.names import c_member, transition_constants
 from codegen.purpose import purpose
-from codegen.source import ENTRIES, c_program
+from codegen.source import ENTRIES, c_files, c_program
 from modewright.api import program
 
 SHIPPED = ("estimator", "estimator_float32", "hko", "driveline", "supervisor", "contactor")
@@ -24,8 +25,10 @@ def test_each_function_of_a_shipped_automaton_says_what_it_is_for(name: str) -> 
 def test_a_purpose_names_the_mode_where_there_is_one() -> None:
     assert purpose("rates_no_contact") == "Rates of the states in mode no_contact"
     assert purpose("equations") == "Equations"
-    assert purpose("latch_apart").startswith("Inputs one by one")
+    assert purpose("latch_each").startswith("Inputs one by one")
     assert purpose("what_nobody_knows") == ""
+    both = purpose("leap_gap_no_contact", ("gap", "drive"), ("no_contact",))
+    assert both.startswith("The whole step in mode gap with the model in no_contact,")
 
 
 def test_rows_and_columns_of_a_solved_matrix_are_apart() -> None:
@@ -46,3 +49,18 @@ def test_a_transition_is_called_by_its_source_and_its_name() -> None:
     assert transition_constants(program("contactor"))[1] == "contactor_FIRED_open_shut"
     names = transition_constants(program("supervisor"))
     assert names[9] == "supervisor_FIRED_operation_drive_torque_creep_pull"
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_each_fault_bit_says_why_it_is_set(name: str) -> None:
+    made = program(name)
+    header = c_files(made)[f"{name}.h"]
+    for bit, fault in enumerate(made.faults):
+        why = why_set(made, fault)
+        assert why
+        assert f"#define {name}_FAULT_{fault} (1UL << {bit}) /* {why} */\n" in header
+
+
+def test_a_count_says_when_its_transition_is_due() -> None:
+    text = c_files(program("estimator"))["estimator.c"]
+    assert "/* due at 2 in a row: estimator modes.drive.transitions.gap.wait, 0.7 ms */" in text

@@ -98,7 +98,7 @@ def test_the_estimator_has_the_numbers_of_the_written_one() -> None:
         {k: v for k, v in solved(p).items() if "_lin" not in k} for p in (taken, written)
     )
     numbers = [name for name in theirs if name.startswith("solved.")]
-    more = ["solved.drive_f.w_w", "solved.coast_f.w_w"]
+    more = ["solved.drive_f_constant.w_w", "solved.coast_f_constant.w_w"]
     assert [n for n in ours if n.startswith("solved.") and n not in more] == numbers
     for name in more:
         assert ours[name] == pytest.approx(-theirs["constant.b_0"] / ours["constant.J_v"], 1e-13)

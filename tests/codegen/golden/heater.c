@@ -11,7 +11,7 @@
 #include "ha_math.h"
 
 #if defined(__FAST_MATH__) || (FLT_EVAL_METHOD != 0)
-#error "this code is exact only without fast-math and without excess precision"
+#error "exact only without fast-math and without excess precision; give -ffp-contract=off"
 #endif
 
 /* Fixed parameters, SI */
@@ -33,9 +33,9 @@ static const struct {
 
 /* Computes much: its values are on the stack only while it runs */
 #if defined(__GNUC__)
-#define APART __attribute__((noinline))
+#define NOT_INLINED __attribute__((noinline))
 #else
-#define APART
+#define NOT_INLINED
 #endif
 
 const char heater_Version[] = heater_DIGEST;
@@ -57,6 +57,7 @@ static inline void jump_rest(heater_Self *self, const heater_In *in)
     if (!(self->equation.low && in->request)) { /* heater modes.rest.transitions.heating.when */
         self->timer.rest_heating = 0U;
     } else if (self->timer.rest_heating < 4U) {
+        /* due at 4 in a row: heater modes.rest.transitions.heating.wait, 300 ms */
         self->timer.rest_heating++;
     } else {
         /* nothing to do */
@@ -76,7 +77,7 @@ static inline void jump_rest(heater_Self *self, const heater_In *in)
 }
 
 /* Equations of mode heating */
-static APART void equations_heating(heater_Self *self, const volatile heater_Cal *cal)
+static NOT_INLINED void equations_heating(heater_Self *self, const volatile heater_Cal *cal)
 {
     self->equation.low = self->latched.T < constant.T_on; /* heater equations.low */
     /* heater modes.heating.equations.P */
@@ -94,7 +95,7 @@ static inline void jump_heating(heater_Self *self, const heater_In *in)
 }
 
 /* Updates of mode heating, from the values of this tick */
-static APART void update_heating(heater_Self *self)
+static NOT_INLINED void update_heating(heater_Self *self)
 {
     /* heater modes.heating.update.heat */
     const double next_heat =
@@ -120,13 +121,13 @@ static inline void latch(heater_Self *self, const heater_In *in)
     }
 }
 
-/* Keeps the inputs of this tick for the next one */
+/* Keeps those inputs of this tick that the next one reads */
 static inline void remember(void)
 {
     /* nothing to do */
 }
 
-/* The first values, from the inputs of the first tick; nothing advances yet */
+/* The first tick: states begin, where the spec says so at inputs; nothing advances yet */
 static inline void start(heater_Self *self)
 {
     const double new_heat = 0.3; /* heater states.heat.initial */

@@ -22,8 +22,8 @@ enum {
 #define heater_FIRED_heating_rest 2U
 
 /* Latched fault bits */
-#define heater_FAULT_range_T (1UL << 0)
-#define heater_FAULT_range_heat (1UL << 1)
+#define heater_FAULT_range_T (1UL << 0) /* T was outside its range */
+#define heater_FAULT_range_heat (1UL << 1) /* heat was outside its range */
 
 /* The calibration page: tunable parameters */
 typedef struct {
@@ -43,7 +43,7 @@ typedef struct {
 typedef struct {
     double P; /* W */
     double heat; /* N*m */
-    int16_t mode; /* 1 */
+    int16_t mode; /* heater_MODE_* */
 } heater_Out;
 
 /* One instance: allocated by the caller, written by this module alone */
@@ -77,7 +77,7 @@ extern const volatile heater_Cal heater_default_cal;
 /* Before the first step */
 void heater_Init(heater_Self *self, const volatile heater_Cal *cal);
 
-/* After a change of the calibration page: X_Derive, and a fault if solved numbers do not fit it */
+/* After a change of the page: heater_Derive, and a fault if solved numbers do not fit it */
 void heater_Calibrate(heater_Self *self, const volatile heater_Cal *cal);
 void heater_Derive(const volatile heater_Cal *cal, heater_Derived *derived);
 

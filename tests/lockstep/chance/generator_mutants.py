@@ -59,8 +59,8 @@ def _everywhere(name: str, value: Any) -> Patch:
     return apply
 
 
-def _short(writer: Writer, timer: str, condition: Expr, limit: int, key: str) -> Any:
-    return _COUNT(writer, timer, condition, limit - 1, key)
+def _short(writer: Writer, timer: str, condition: Expr, limit: int, *told: str) -> Any:
+    return _COUNT(writer, timer, condition, limit - 1, *told)
 
 
 _COUNT = Writer._count
