@@ -175,7 +175,7 @@ def _gains(bench: Bench, selection: Selection, layer: Layer, limit: float) -> bo
         candidate = bench.candidate([tried.layer for tried in selection.accepted], drifts)
     except SpecError:
         return False
-    units = units_of(candidate, bench.series, model.noises, model.values(0))
+    units = units_of(candidate, bench.series, model.values(0))
     point = extended(candidate, model.candidate, model.point, {})
     quiet = looked_at(candidate, bench.series, model.noises, point)
     for level in LEFT_LEVELS if np.isfinite(quiet.cost) else ():

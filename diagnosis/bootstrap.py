@@ -115,7 +115,7 @@ def gains_in(
     series = paced(made, bench.automaton, bench.seen, bench.series[0].is_linear)
     own = dataclasses.replace(bench, series=series, shelf=NOWHERE)
     noises = dataclasses.replace(noises_of(series, base.noises.drifts), limits=base.noises.limits)
-    model = settled(base.candidate, series, noises, base.point, units, turns=1)
+    model = settled(base.candidate, series, noises, base.point, units)
     tried = searched(own, model, units, own.layers(), worth=FLOOR)
     if any(gain > FLOOR for gain in _best_of(tried).values()):
         _, tried = looked_again(own, model, units, tried)

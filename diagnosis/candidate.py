@@ -31,16 +31,20 @@ START = "start_of_{}"
 
 @dataclass(frozen=True)
 class Candidate:
-    """A compiled model: `layers` over the base, its recipe, and its library."""
+    """A compiled model: `layers` over the base, its recipe, and its library.
+
+    `levels` are those of its noises, where a fit may move these beside its parameters.
+    """
 
     layers: tuple[Layer, ...]
     recipe: Recipe
     predictor: Predictor
+    levels: tuple[Uncertain, ...] = ()
 
     @property
     def uncertain(self) -> tuple[Uncertain, ...]:
-        """The parameters that a fit may move."""
-        return self.recipe.uncertain
+        """What a fit may move: parameters, behind them levels."""
+        return self.recipe.uncertain + self.levels
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -146,7 +146,7 @@ def _described(
                 own[:, k] = [one.coordinate(value) for value in formula.phases[one.name]]
         looks.append(looked_at(candidate, bench.series, base.noises, Point(point.shared, own)))
     start = min(looks, key=lambda one: one.cost).point
-    found = settled(candidate, bench.series, base.noises, start, units, turns=1)
+    found = settled(candidate, bench.series, base.noises, start, units)
     if not np.isfinite(found.cost) or found.normal is None:
         return None
     each = [found.values(k) for k in range(len(bench.series))]

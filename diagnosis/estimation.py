@@ -17,7 +17,15 @@ from diagnosis.candidate import Candidate
 from diagnosis.gains import gains_of
 from diagnosis.normal import Normal, foreseen, normal_of, stepped
 from diagnosis.point import Point, all_values_at, point_of, values_at
-from diagnosis.prediction import Gains, Innovations, Noises, Outcome, foreseen_at, predicted
+from diagnosis.prediction import (
+    Gains,
+    Innovations,
+    Noises,
+    Outcome,
+    foreseen_at,
+    noises_at,
+    predicted,
+)
 from diagnosis.series import Series
 from diagnosis.slopes import Columns, carried, columns_of
 
@@ -30,6 +38,8 @@ WORTH_ANEW = 1.0
 """Steps that gain more [nats] once slopes were looked for anew have them looked for again."""
 COMPLETIONS = 12
 """How often they are at most: a tyre's mode had not come to rest after three."""
+LEVEL_STEP = 0.05
+"""Change of the logarithm of a level for a difference."""
 NOTHING = 0.05
 """A step that is foreseen to gain less than this [nats] is not tried."""
 LITTLE = 1.0
@@ -106,10 +116,33 @@ def with_normal(
 
     candidate, outcome = estimate.candidate, estimate.outcome
     known = known or {}
-    fresh = [name for name in candidate.names if name not in known]
+    fresh = [one.name for one in candidate.recipe.uncertain if one.name not in known]
     columns = {**known, **columns_of(candidate, estimate.point, outcome, run, fresh)}
+    columns |= _of_levels(
+        estimate, series, [o.name for o in candidate.levels if o.name not in known]
+    )
     normal = normal_of(candidate, outcome, columns)
     return dataclasses.replace(estimate, normal=normal, columns=columns)
+
+
+def _of_levels(now: Estimate, series: Sequence[Series], names: Sequence[str]) -> Columns:
+    """Return how innovations change with levels: with the gains that are made with these."""
+    candidate, found = now.candidate, {}
+    for name in names:
+        k = candidate.names.index(name)
+        there = now.point.moved(candidate, k, LEVEL_STEP / candidate.uncertain[k].sd)
+        outcome = _run(candidate, series, now.point, _gains(now, series, there), now.noises)
+        changes = (outcome.joined - now.outcome.joined) / (there.shared[k] - now.point.shared[k])
+        found[name] = np.where(np.isfinite(changes), changes, 0.0)
+    return found
+
+
+def _gains(now: Estimate, series: Sequence[Series], point: Point) -> Gains:
+    """Return the gains of an estimate with the levels that its candidate has at a point."""
+    if not now.candidate.levels:
+        return now.gains
+    noises, values = noises_at(now.candidate, point, now.noises), now.values(0)
+    return gains_of(now.candidate, series, values, noises, now.outcome)
 
 
 def estimated(
@@ -168,7 +201,7 @@ def _walked(
         if better is None:
             return now
         gained = now.cost - better.cost
-        renewed = looked_at(now.candidate, series, now.noises, better.point, better.outcome)
+        renewed = looked_at(now.candidate, series, better.noises, better.point, better.outcome)
         best = renewed if renewed.cost < better.cost + ENOUGH else better
         now = _moved(now, better, best, series)
         if gained < least:
@@ -232,10 +265,13 @@ def improved(
         if foreseen(now.candidate, now.point, now.normal, point) < least:
             damping *= 10.0
             continue
-        outcome = _run(now.candidate, series, point, now.gains, now.noises)
+        gains = _gains(now, series, point)
+        outcome = _run(now.candidate, series, point, gains, now.noises)
         cost = outcome.cost() + point.prior(now.candidate)
         if cost < now.cost:
-            better = dataclasses.replace(now, point=point, cost=cost, outcome=outcome)
+            noises = noises_at(now.candidate, point, now.noises)
+            better = Estimate(now.candidate, point, cost, outcome, gains, noises)
+            better = dataclasses.replace(better, normal=now.normal, columns=now.columns)
             return better, max(damping / 10.0, 1e-9)
         damping *= 10.0
     return None, damping

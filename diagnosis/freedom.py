@@ -44,7 +44,7 @@ def freed(bench: Bench, base: Estimate, layer: Layer | None = None) -> Estimate:
 def _freed(bench: Bench, base: Estimate, candidate: Candidate, layer: Layer | None) -> Estimate:
     """Return a candidate with the drift of a layer free, its parameters fitted."""
     name = layer.named(DRIFT) if layer else None
-    units = units_of(candidate, bench.series, base.noises, base.values(0))
+    units = units_of(candidate, bench.series, base.values(0))
     levels = dict.fromkeys(units, SMALL_LEVEL) | ({name: START_LEVEL} if name else {})
     noises = with_levels(base.noises, units, levels)
     found = []

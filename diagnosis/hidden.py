@@ -160,7 +160,7 @@ def _is_hidden(bench: Bench, locus: Locus) -> bool:
 
 def _is_heard(bench: Bench, model: Estimate, name: str, needed: float) -> bool:
     """Tell whether a drift may gain enough beside a model, whose parameters stay where they are."""
-    units = units_of(model.candidate, bench.series, model.noises, model.values(0))
+    units = units_of(model.candidate, bench.series, model.values(0))
     small = with_levels(model.noises, units, dict.fromkeys(units, SMALL_LEVEL))
     without = looked_at(model.candidate, bench.series, small, model.point)
     free = scanned(without, bench.series, units, name, ALL_LEVELS)
@@ -186,7 +186,7 @@ def _joined(bench: Bench, selection: Selection, alone: _Hidden) -> _Hidden:
     if not selection.accepted:
         return alone
     model = alone.model
-    units = units_of(model.candidate, bench.series, model.noises, model.values(0))
+    units = units_of(model.candidate, bench.series, model.values(0))
     others = {name: unit for name, unit in units.items() if name != alone.locus.drift}
     needed = Thresholds(usual=max(USUAL, PART * counted(alone.evidence)))
     found = selected(bench, model, others, needed, known=selection.first_round)
@@ -218,7 +218,7 @@ def _beside(bench: Bench, selection: Selection, locus: Locus) -> _Hidden:
 
 def _quieted(bench: Bench, model: Estimate) -> Estimate:
     """Return a model fitted with next to no drift: what it explains without."""
-    units = units_of(model.candidate, bench.series, model.noises, model.values(0))
+    units = units_of(model.candidate, bench.series, model.values(0))
     noises = with_levels(model.noises, units, dict.fromkeys(units, SMALL_LEVEL))
     return followed(model.candidate, bench.series, noises, model.point, ROUNDS)
 

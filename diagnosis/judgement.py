@@ -79,7 +79,7 @@ def _judged_by_observer(case: Case, raw: Bench, ways: Sequence[Way], tell: Tell)
     thresholds = _thresholds(case, *better_way(ways), raw.series, tell)
     most = max(USUAL, thresholds.most)
     bench, base, selection = chosen(ways, thresholds, tell)
-    units = units_of(base.candidate, bench.series, base.noises, base.values(0))
+    units = units_of(base.candidate, bench.series, base.values(0))
     loci = located(bench, base)
     tell(place_sentence(loci, bench))
     selection, loci = with_hidden(bench, selection, loci, HIDDEN * most, tell)
@@ -151,7 +151,7 @@ def _thresholds(
         return case.thresholds
     kept = kept_thresholds(bench, raw)
     if kept is None and case.bootstrap == "made":
-        units = units_of(base.candidate, bench.series, base.noises, base.values(0))
+        units = units_of(base.candidate, bench.series, base.values(0))
         kept = bootstrapped(bench, base, units, raw, tell)
     found = kept or case.thresholds
     tell(f"thresholds of {found.text} nats, {found.origin}")

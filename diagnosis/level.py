@@ -12,12 +12,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from diagnosis.candidate import Candidate
-from diagnosis.estimation import Estimate, completed, followed, looked_at
+from diagnosis.estimation import Estimate, followed, looked_at
 from diagnosis.gains import near, points_of
 from diagnosis.point import Point
 from diagnosis.prediction import Noises, noises_of
 from diagnosis.series import Series
 from diagnosis.slopes import Columns
+from diagnosis.tuning import tuned
 
 REACH = 0.2
 """Seconds in which a drift of one unit shows."""
@@ -38,9 +39,10 @@ ENOUGH = 2.0
 
 
 def units_of(
-    candidate: Candidate, series: Sequence[Series], noises: Noises, start: Mapping[str, float]
+    candidate: Candidate, series: Sequence[Series], start: Mapping[str, float]
 ) -> dict[str, float]:
-    """Return the unit [SI] of each drift of a candidate."""
+    """Return the unit [SI] of each drift of a candidate, for the noise that was measured."""
+    seen_noise = noises_of(series, {}).seen
     mode, seen_there = next(iter(points_of(candidate, series, None).items()))
     page = candidate.page(start, series[0])
     linear = near(candidate, page, mode, seen_there.states, seen_there.inputs)
@@ -50,7 +52,7 @@ def units_of(
     ahead = linear.c @ np.linalg.matrix_power(linear.phi, count)
     found = {}
     for name in candidate.drifts:
-        seen = np.abs(ahead[:, candidate.predictor.states.index(name)]) / noises.seen
+        seen = np.abs(ahead[:, candidate.predictor.states.index(name)]) / seen_noise
         found[name] = 1.0 / max(float(np.max(seen)), 1e-12)
     return found
 
@@ -119,20 +121,14 @@ def settled(
     noises: Noises,
     start: Mapping[str, float] | Point,
     units: Mapping[str, float],
-    turns: int = 3,
     columns: Columns | None = None,
 ) -> Estimate:
-    """Return parameters and drifts found in turns, until neither gains.
+    """Return parameters and levels found together, from levels that fit where parameters lead.
 
     `columns` are slopes of the candidate near the start, if there are such.
     """
     now = followed(candidate, series, noises, start, known=columns)
-    for _ in range(turns):
-        moved = levelled(now, series, units)
-        if moved.cost >= now.cost:
-            break
-        now = followed(candidate, series, moved.noises, moved.point, known=now.columns)
-    return completed(now, series)
+    return tuned(levelled(now, series, units), series, units)
 
 
 def fitted(
@@ -151,11 +147,11 @@ def fitted(
     """
     quiet = {**noises.drifts, **{name: QUIET * unit for name, unit in units.items()}}
     still = dataclasses.replace(noises, drifts=quiet)
-    first = settled(candidate, series, still, start, units, turns=2, columns=columns)
+    first = settled(candidate, series, still, start, units, columns)
     is_quiet = all(noises.drifts.get(name, 0.0) <= quiet[name] for name in units)
     if is_quiet or first.cost < known:
         return first
-    second = settled(candidate, series, noises, start, units, turns=1, columns=columns)
+    second = settled(candidate, series, noises, start, units, columns)
     return min(first, second, key=lambda one: one.cost)
 
 
@@ -166,7 +162,7 @@ def first_fit(
 
     How far innovations usually are out, beyond which they count no more, is known after it.
     """
-    first = settled(candidate, series, noises_of(series, units), {}, units, turns=1)
+    first = settled(candidate, series, noises_of(series, units), {}, units)
     limits = FAR * np.maximum(first.outcome.robust(), 1e-12)
     return dataclasses.replace(first, noises=dataclasses.replace(first.noises, limits=limits))
 
@@ -179,7 +175,7 @@ def recalibrated(first: Estimate, series: Sequence[Series], units: Mapping[str, 
         known = dataclasses.replace(first.noises, drifts=drifts)
         near = min(found, key=lambda one: one.cost, default=first)
         start, columns = near.point, near.columns
-        found.append(settled(first.candidate, series, known, start, units, columns=columns))
+        found.append(settled(first.candidate, series, known, start, units, columns))
     return min(found, key=lambda one: one.cost)
 
 

@@ -188,7 +188,7 @@ def undone(series: Series, trial: Trial) -> Series:
 def _followed(candidate: Candidate, series: Sequence[Series]) -> Estimate:
     """Return the model as it is declared, with drifts that let it follow the recordings."""
     noises = noises_of(series, {})
-    noises = dataclasses.replace(noises, drifts=units_of(candidate, series, noises, {}))
+    noises = dataclasses.replace(noises, drifts=units_of(candidate, series, {}))
     return looked_at(candidate, series, noises, point_of(candidate, len(series), {}))
 
 

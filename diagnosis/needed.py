@@ -69,7 +69,7 @@ def _without(
     if candidate is None:
         return None
     start = extended(candidate, found.model.candidate, found.model.point, {})
-    given = (found.base.noises, start, units, 1)
+    given = (found.base.noises, start, units)
     make = partial(settled, candidate, bench.series, *given)
     return bench.kept("settled", candidate, given, make)
 

@@ -6,6 +6,7 @@ itself, so a wrong model cannot hide behind the gain of another one.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -19,9 +20,12 @@ from codegen.runs import Prediction, Recorded, Runs
 from diagnosis.candidate import Candidate
 from diagnosis.joined import joined
 from diagnosis.noise import MAD
+from diagnosis.point import Point, values_at
 from diagnosis.series import Series
 
 Reals = NDArray[np.float64]
+DRIFTS, SIGNAL, INPUTS = "level of {}", "noise of {}", "noise of inputs"
+"""Names of levels that a fit moves: of a drift, of a compared signal, of all inputs."""
 FOLDS = 5
 """Parts of the recordings that are left out in turn: every fifth block in time of each."""
 
@@ -160,6 +164,20 @@ def noises_of(series: Sequence[Series], drifts: Mapping[str, float]) -> Noises:
     floor = [float(np.nanmax(np.abs(one.measured))) * 1e-6 + 1e-12 for one in series]
     known = np.maximum(np.median(seen, axis=0), np.median(floor))
     return Noises(known, np.median(inputs, axis=0), drifts, np.full(len(known), np.inf))
+
+
+def noises_at(candidate: Candidate, point: Point, noises: Noises) -> Noises:
+    """Return noises with the levels that a candidate has as coordinates, at a point."""
+    if not candidate.levels:
+        return noises
+    values = values_at(candidate, point, 0)
+    named = {name: values.get(DRIFTS.format(name)) for name in candidate.drifts}
+    drifts = {name: level for name, level in named.items() if level is not None}
+    signals = zip(candidate.predictor.seen, noises.seen, strict=True)
+    seen = np.array([values.get(SIGNAL.format(name), noise) for name, noise in signals])
+    most = np.max(noises.inputs, initial=0.0)
+    inputs = noises.inputs * (values[INPUTS] / most) if INPUTS in values else noises.inputs
+    return dataclasses.replace(noises, drifts={**noises.drifts, **drifts}, seen=seen, inputs=inputs)
 
 
 def predicted(

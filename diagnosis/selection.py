@@ -183,7 +183,7 @@ def _better_base(
     if best is None or best.estimate is None:
         return None
     start = extended(model.candidate, best.estimate.candidate, best.estimate.point, {})
-    given = (best.estimate.noises, start, units, 2)
+    given = (best.estimate.noises, start, units)
     make = partial(settled, model.candidate, bench.series, *given)
     again = bench.kept("settled", model.candidate, given, make)
     return again if again.cost < model.cost - BETTER else None

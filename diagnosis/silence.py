@@ -42,13 +42,13 @@ def from_silence(
     pieces, places = _pieces(series, loud)
     if sum(one.count for one in pieces) < MOST * sum(one.count for one in series):
         return model
-    units = units_of(model.candidate, series, model.noises, model.values(0))
+    units = units_of(model.candidate, series, model.values(0))
     own = [places.index(r) if r in places else 0 for r in range(len(series))]
     start = Point(model.point.shared, model.point.own[places])
     found = []
     for level in STARTS:
         noises = with_levels(model.noises, units, dict.fromkeys(units, level))
-        found.append(settled(model.candidate, pieces, noises, start, units, turns=1))
+        found.append(settled(model.candidate, pieces, noises, start, units))
     quiet = min(found, key=lambda one: one.cost)
     point = Point(quiet.point.shared, quiet.point.own[own])
     small = with_levels(model.noises, units, dict.fromkeys(units, SMALL_LEVEL))

@@ -14,7 +14,6 @@ from diagnosis.bench import Bench
 from diagnosis.estimation import Estimate
 from diagnosis.level import first_fit, recalibrated, settled, units_of
 from diagnosis.point import extended
-from diagnosis.prediction import noises_of
 from diagnosis.search import Tell, Tried
 from diagnosis.selection import Selection, selected
 from diagnosis.series import paced, require_one_pace
@@ -37,7 +36,7 @@ def ways_of(bench: Bench, tell: Tell = lambda text: None) -> list[Way]:
         own = tuple(settled_at_start(one) for one in paced_ones)
         way = dataclasses.replace(bench, series=own)
         candidate = way.candidate(())
-        units = units_of(candidate, own, noises_of(own, {}), {})
+        units = units_of(candidate, own, {})
         make = partial(first_fit, candidate, own, units)
         first = way.kept("first fit", candidate, [units], make)
         way = dataclasses.replace(way, series=started(first, own))
@@ -74,7 +73,7 @@ def chosen(
     for bench, base in ways:
         if any(not _fits_better(bench, base, selection) for *_, selection in found):
             continue
-        units = units_of(base.candidate, bench.series, base.noises, base.values(0))
+        units = units_of(base.candidate, bench.series, base.values(0))
         selection = selected(bench, base, units, thresholds, tell, known=known)
         known = selection.first_round if selection.accepted else ()
         cost = selection.model.cost + thresholds.usual * len(selection.accepted)
@@ -89,8 +88,8 @@ def _fits_better(bench: Bench, base: Estimate, selection: Selection) -> bool:
     if candidate is None or not selection.accepted:
         return True
     model = selection.model
-    units = units_of(base.candidate, bench.series, base.noises, base.values(0))
+    units = units_of(base.candidate, bench.series, base.values(0))
     start = extended(candidate, model.candidate, model.point, {})
-    given = (model.noises, start, units, 1)
+    given = (model.noises, start, units)
     make = partial(settled, candidate, bench.series, *given)
     return bench.kept("settled", candidate, given, make).cost < model.cost

@@ -51,7 +51,7 @@ def accepting(bench: Bench, rubbing: Bench, effect: str, base: Estimate | None =
     """Return a selection that has accepted an effect for what is recorded, over a base."""
     layers = {layer.id: layer for e in bench.effects for layer in fitting(bench.document, e)}
     base = base or based(rubbing)
-    units = units_of(base.candidate, rubbing.series, base.noises, base.values(0))
+    units = units_of(base.candidate, rubbing.series, base.values(0))
     candidate = rubbing.candidate((layers[effect],))
     model = settled(candidate, rubbing.series, base.noises, base.values(0), units)
     known = evidence(model, base, rubbing.series)

@@ -76,7 +76,7 @@ def bench() -> Bench:
 @pytest.fixture(scope="module")
 def base(bench: Bench) -> Estimate:
     noises = noises_of(bench.series, {DRIFT: 0.5})
-    return settled(bench.candidate(()), bench.series, noises, {}, {DRIFT: 1.0}, turns=1)
+    return settled(bench.candidate(()), bench.series, noises, {}, {DRIFT: 1.0})
 
 
 @pytest.fixture

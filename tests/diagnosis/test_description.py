@@ -109,7 +109,7 @@ def test_a_friction_without_a_name_becomes_its_formula(
     base = based(hidden)
     excess = excess_at(hidden, base, "flow", "w_em")
     assert ranking(excess.problem, excess.columns)[0][1].name == "the sign of w_em"
-    units = units_of(base.candidate, hidden.series, base.noises, base.values(0))
+    units = units_of(base.candidate, hidden.series, base.values(0))
     locus = Locus("flow", "w_em", 100.0, 2.0, free=base)
     found = described(hidden, base, [locus], units, 45.0)
     assert found is not None

@@ -77,7 +77,7 @@ def bench() -> Bench:
 def test_a_clean_recording_gives_the_parameters_that_made_it(bench: Bench) -> None:
     candidate = bench.candidate(())
     series = recorded(candidate, TRUTH)
-    units = units_of(candidate, series, noises_of(series, {}), {})
+    units = units_of(candidate, series, {})
     found = recalibrated(first_fit(candidate, series, units), series, units).values(0)
     for name, value in TRUTH.items():
         assert found[name] == pytest.approx(value, rel=0.02), name
@@ -88,15 +88,15 @@ def test_a_left_out_friction_gains_where_it_is_and_a_lag_does_not(bench: Bench) 
     layers = {layer.id: layer for e in bench.effects for layer in fitting(bench.document, e)}
     friction = bench.candidate((layers["coulomb_friction@w_em"],))
     series = recorded(friction, {**TRUTH, **FRICTION})
-    units = units_of(base, series, noises_of(series, {}), {})
+    units = units_of(base, series, {})
     known = recalibrated(first_fit(base, series, units), series, units)
     start = {**known.values(0), "T_c_w_em": 0.5}
-    better = settled(friction, series, known.noises, start, units, turns=1)
+    better = settled(friction, series, known.noises, start, units)
     assert evidence(better, known, series).least > 100.0
     assert better.values(0)["T_c_w_em"] == pytest.approx(2.0, rel=0.1)
     lag = bench.candidate((layers["sensor_lag@w_s"],))
     start = {**known.values(0), "tau_w_s": 0.002}
-    worse = settled(lag, series, known.noises, start, units, turns=1)
+    worse = settled(lag, series, known.noises, start, units)
     assert evidence(worse, known, series).least < evidence(better, known, series).least / 4
 
 

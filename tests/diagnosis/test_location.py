@@ -34,7 +34,7 @@ def with_effect(bench: Bench, effect: str, own: dict[str, float]) -> Bench:
 
 def based(bench: Bench) -> Estimate:
     candidate = bench.candidate(())
-    units = units_of(candidate, bench.series, noises_of(bench.series, {}), {})
+    units = units_of(candidate, bench.series, {})
     return recalibrated(first_fit(candidate, bench.series, units), bench.series, units)
 
 

@@ -38,7 +38,7 @@ def looked_at_after(bench: Bench, own: dict[str, float], first: str, second: str
         bench.document, bench.project, bench.automaton, (), series, bench.seen, bench.drifts
     )
     base = based(used)
-    units = units_of(base.candidate, series, base.noises, base.values(0))
+    units = units_of(base.candidate, series, base.values(0))
 
     def fitted(count: int) -> Estimate:
         start = {**base.values(0), **STARTS}

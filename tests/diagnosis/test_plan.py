@@ -33,9 +33,9 @@ def test_a_model_is_not_told_from_itself_but_from_one_without_friction(bench: Be
     base = based(hidden)
     layers = {one.id: one for e in bench.effects for one in fitting(bench.document, e)}
     candidate = hidden.candidate((layers["coulomb_friction@w_em"],))
-    units = units_of(base.candidate, hidden.series, base.noises, base.values(0))
+    units = units_of(base.candidate, hidden.series, base.values(0))
     start = {**base.values(0), "T_c_w_em": 1.0}
-    friction = settled(candidate, hidden.series, base.noises, start, units, turns=1)
+    friction = settled(candidate, hidden.series, base.noises, start, units)
     same = planned(hidden, [("a", friction), ("b", friction)])
     assert same is not None
     assert same.options[0].nats < 1.0

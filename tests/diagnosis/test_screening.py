@@ -52,7 +52,7 @@ def test_what_a_single_recording_shows_is_found_where_it_is_not_looked_at_first(
     )
     assert len(series) > MOST_SCREENED
     own = dataclasses.replace(bench, series=series, _made={})
-    fitted = first_fit(base, series, units_of(base, series, noises_of(series, {}), {}))
+    fitted = first_fit(base, series, units_of(base, series, {}))
     if leads_away:
         monkeypatch.setattr(screening, "_raced", away_on_some(screening._raced))
     (promise,) = promises(own, fitted, [(drag.layers[0], drag)], HINT)
@@ -68,7 +68,7 @@ def test_what_is_far_behind_is_not_followed_further(bench: Bench) -> None:
     series = recorded(known[0][1], {**TRUTH, "T_c_w_em": 40.0})
     own = dataclasses.replace(bench, series=series, _made={})
     base = bench.candidate(())
-    fitted = first_fit(base, series, units_of(base, series, noises_of(series, {}), {}))
+    fitted = first_fit(base, series, units_of(base, series, {}))
     first, second = promises(own, fitted, known, HINT)
     assert (first.layer.id, second.layer.id) == names
     assert first.gain > STRONG

@@ -51,7 +51,7 @@ def bench_of(hidden: bool) -> Bench:
 def fitted(bench: Bench) -> tuple[Estimate, dict[str, Estimate]]:
     """Return the recalibrated base, and it with each effect."""
     candidate = bench.candidate(())
-    units = units_of(candidate, bench.series, noises_of(bench.series, {}), {})
+    units = units_of(candidate, bench.series, {})
     base = recalibrated(first_fit(candidate, bench.series, units), bench.series, units)
     found = {}
     for effect in bench.effects:
@@ -108,7 +108,7 @@ def test_without_a_step_there_is_none_and_a_clean_one_is_followed() -> None:
         dataclasses.replace(one, inputs=np.zeros_like(one.inputs)) for one in bench.series
     )
     candidate = bench.candidate(())
-    units = units_of(candidate, bench.series, noises_of(bench.series, {}), {})
+    units = units_of(candidate, bench.series, {})
     base = recalibrated(first_fit(candidate, bench.series, units), bench.series, units)
     assert shuffle_of(base, quiet) is None
     clean = shuffle_of(base, bench.series)

@@ -93,7 +93,7 @@ def test_a_drift_lies_within_its_standard_deviations_as_often_as_it_should(bench
         series.append(dataclasses.replace(blank, measured=np.ascontiguousarray(measured)))
         truths.append(run.states[:, place])
     noises = dataclasses.replace(noises_of(series, {}), seen=np.array([0.05, 0.01]))
-    units = units_of(candidate, series, noises, TRUTH)
+    units = units_of(candidate, series, TRUTH)
     noises = dataclasses.replace(noises, drifts=dict.fromkeys(units, 0.0) | {DRIFT: LEVEL})
     model = looked_at(candidate, series, noises, point_of(candidate, len(series), TRUTH))
     far = []

@@ -145,7 +145,7 @@ def _pull(dossier: Dossier, file: Path) -> tuple[Series, Reals]:
     values = {k: v for k, v in model.values(0).items() if not k.startswith("grade")}
     name = bench.drifts[0].named(DRIFT)
     candidate = bench.candidate(())
-    units = units_of(candidate, [whole], model.noises, values)
+    units = units_of(candidate, [whole], values)
     start = looked_at(candidate, [whole], model.noises, point_of(candidate, 1, values))
     free = scanned(start, [whole], units, name, ALL_LEVELS)
     column = free.candidate.predictor.states.index(name)
