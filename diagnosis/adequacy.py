@@ -19,7 +19,7 @@ from diagnosis.freedom import START_LEVEL, WIDE_LEVELS, with_levels
 from diagnosis.layers import DRIFT, Layer, walks
 from diagnosis.level import units_of
 from diagnosis.location import places_of_freedom
-from diagnosis.naming import covariance_of, place_path
+from diagnosis.naming import place_path
 from diagnosis.normal import solution
 from diagnosis.point import bounds_of, extended
 from diagnosis.selection import Selection
@@ -48,9 +48,6 @@ they gained, from which on they are pulled out of these: what imitates another e
 LOUD, LOUD_PART = 3.0, 0.05
 """Innovations that count as one from which on those of a model are loud, and the typical part that
 an adequate one may then leave: a sensor's lag that imitates its delay leaves a tenth."""
-
-PLAINLY = 5.0
-"""Nats that the recordings must tell an effect from what it is where it is a plainer one."""
 
 PILED = 0.5
 """Part of what an effect gained that a further one gains at the same place, where neither is it."""
@@ -111,24 +108,6 @@ def is_strained(selection: Selection) -> bool:
     """Tell whether accepted effects are pulled out of the ranges of their own parameters."""
     gained = sum(tried.evidence.train for tried in selection.accepted if tried.evidence)
     return strain(selection) > max(STRAINED, STRAINED_PART * gained)
-
-
-def is_plainer(bench: Bench, selection: Selection) -> bool:
-    """Tell whether an accepted effect may as well be a plainer one: friction that is said to rise
-    at rest, and does not.
-    """
-    model = selection.model
-    if model.normal is None:
-        return False
-    covariance, names = covariance_of(model)
-    shrink = 1.0 / inflation(model, bench.series)
-    for one, z in zip(model.candidate.uncertain, model.point.shared, strict=True):
-        if one.plain is not None and not one.per_recording:
-            k = names.index(one.name)
-            apart = float(z) - one.coordinate(one.plain)
-            if shrink * apart**2 / (2.0 * covariance[k, k]) < PLAINLY:
-                return True
-    return False
 
 
 def strain(selection: Selection) -> float:

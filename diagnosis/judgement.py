@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 from diagnosis.adequacy import (
     is_inadequate,
-    is_plainer,
     is_strained,
     piles_up,
     refused,
@@ -35,6 +34,7 @@ from diagnosis.location import located, unexplained
 from diagnosis.locus import Locus
 from diagnosis.naming import verdict_id
 from diagnosis.place_sentence import place_sentence
+from diagnosis.plainer import may_be_plainer
 from diagnosis.search import Tell
 from diagnosis.selection import Selection, selected
 from diagnosis.series import Series
@@ -115,7 +115,11 @@ def _adequate(
         return says, selection
     is_heard = says == "effect" and not is_still(selection, units)
     is_other = is_other or is_strained(selection) or piles_up(selection)
-    is_other = is_other or remembers_mostly(bench, selection) or is_plainer(bench, selection)
+    is_other = (
+        is_other
+        or remembers_mostly(bench, selection)
+        or may_be_plainer(selection.model, bench.series)
+    )
     if not is_other and not (is_heard and is_inadequate(bench, selection, needed)):
         return says, selection
     names = ", ".join(tried.layer.id for tried in selection.accepted)

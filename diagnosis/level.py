@@ -18,7 +18,7 @@ from diagnosis.point import Point
 from diagnosis.prediction import Noises, noises_of
 from diagnosis.series import Series
 from diagnosis.slopes import Columns
-from diagnosis.tuning import tuned
+from diagnosis.tuning import FARTHEST, tuned
 
 REACH = 0.2
 """Seconds in which a drift of one unit shows."""
@@ -32,8 +32,6 @@ FAR = 4.0
 """Standard deviations beyond which an innovation counts as that far."""
 SCALE = 1.5
 """Factor by which the noise of inputs or of a signal is changed at a time."""
-FARTHEST = 2.5
-"""Factor by which it may be another one than was measured."""
 ENOUGH = 2.0
 """Another level is taken where it gains this much [nats]."""
 
@@ -77,10 +75,10 @@ def levelled(
                 if not tried.cost < now.cost - ENOUGH:
                     break
                 now, here = tried, here + direction
-    return _tuned(now, series)
+    return _scaled_noises(now, series)
 
 
-def _tuned(now: Estimate, series: Sequence[Series]) -> Estimate:
+def _scaled_noises(now: Estimate, series: Sequence[Series]) -> Estimate:
     """Return an estimate with the noise of its inputs, then of each signal, scaled.
 
     Not far from what was measured: a model that lacks something would trust in its signals alone.

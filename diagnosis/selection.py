@@ -15,6 +15,7 @@ from diagnosis.evidence import Evidence, evidence
 from diagnosis.layers import Layer
 from diagnosis.level import settled
 from diagnosis.needed import Needed, renewed, still_needed
+from diagnosis.plainer import plainest
 from diagnosis.point import extended
 from diagnosis.search import Tell, Tried, searched
 from diagnosis.swap import swapped
@@ -96,12 +97,13 @@ def selected(
     while len(accepted) < MOST_EFFECTS:
         worth = (HOPE_BESIDE if accepted else HOPE) * max(needed, thresholds.usual)
         tried = searched(bench, model, units, layers, tell, worth)
-        better, tried = looked_again(bench, model, units, tried, tell)
+        better, tried = looked_again(bench, model, units, tried, tell, worth)
         if better is not None:
             model = better
             base = base if accepted else better
         rounds.append(tried)
         best = _enough(tried, needed, thresholds, left_out)
+        best = plainest(best, tried, bench.series) if best else None
         if best is None or best.estimate is None or best.evidence is None:
             break
         gained = counted(best.evidence, left_out)
@@ -163,13 +165,20 @@ def looked_again(
     units: Mapping[str, float],
     tried: list[Tried],
     tell: Tell = lambda text: None,
+    worth: float = 0.0,
 ) -> tuple[Estimate | None, list[Tried]]:
-    """Return a better fit of the model itself, if there is one, and the candidates beside it."""
+    """Return a better fit of the model itself, if there is one, and the candidates beside it.
+
+    Beside accepted effects they are only looked for again where one still gains what is `worth` it.
+    """
     better = _better_base(bench, model, units, tried)
     if better is None:
         return None, tried
     tell(f"the model itself fits better: {better.cost:.0f} nats; candidates again")
-    return better, _again(bench, better, units, tried, model.cost - better.cost, tell)
+    gained = model.cost - better.cost
+    if _most(tried) * MUCH > gained or (model.candidate.layers and _most(tried) < gained + worth):
+        return better, _compared(bench, better, tried)
+    return better, _again(bench, better, units, tried, tell)
 
 
 def _better_base(
@@ -190,32 +199,31 @@ def _better_base(
 
 
 def _again(
-    bench: Bench,
-    model: Estimate,
-    units: Mapping[str, float],
-    tried: list[Tried],
-    gained: float,
-    tell: Tell,
+    bench: Bench, model: Estimate, units: Mapping[str, float], tried: list[Tried], tell: Tell
 ) -> list[Tried]:
-    """Return candidates beside a model that was found to fit better: as they were, or better.
-
-    They are looked for again only where the model `gained` [nats] much of what they seemed to.
-    """
+    """Return candidates beside a model that was found to fit better, looked for anew."""
     known = {t.layer.id: t for t in tried}
-    most = max((t.evidence.train for t in tried if t.evidence), default=0.0)
-    if gained > MUCH * most:
-        promising = [other.layer for other in tried if other.promised > 0.0]
-        for new in searched(bench, model, units, promising[:AGAIN], tell):
-            old = known[new.layer.id].estimate
-            if new.estimate and (old is None or new.estimate.cost < old.cost):
-                known[new.layer.id] = new
+    promising = [other.layer for other in tried if other.promised > 0.0]
+    for new in searched(bench, model, units, promising[:AGAIN], tell):
+        old = known[new.layer.id].estimate
+        if new.estimate and (old is None or new.estimate.cost < old.cost):
+            known[new.layer.id] = new
+    return _compared(bench, model, list(known.values()))
+
+
+def _compared(bench: Bench, model: Estimate, tried: Sequence[Tried]) -> list[Tried]:
+    """Return candidates with what they gain over a model, best first."""
     again = [
         dataclasses.replace(t, evidence=evidence(t.estimate, model, bench.series))
         if t.estimate
         else t
-        for t in known.values()
+        for t in tried
     ]
     return sorted(again, key=lambda one: -one.score)
+
+
+def _most(tried: Sequence[Tried]) -> float:
+    return max((t.evidence.train for t in tried if t.evidence), default=0.0)
 
 
 def _rivals(first: tuple[Tried, ...], kept: tuple[Tried, ...]) -> tuple[Tried, ...]:

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from diagnosis.candidate import Candidate
-from diagnosis.estimation import Estimate, completed, looked_at, with_normal
+from diagnosis.estimation import Estimate, completed, looked_at
 from diagnosis.point import Point
 from diagnosis.prediction import DRIFTS, INPUTS, SIGNAL, Noises, noises_at, noises_of
 from diagnosis.series import Series
@@ -39,8 +39,10 @@ def tuned(now: Estimate, series: Sequence[Series], units: Mapping[str, float]) -
     point = _widened(wide, now)
     noises = noises_at(wide, point, now.noises)
     begun = looked_at(wide, series, noises, point, now.outcome)
+    if not np.isfinite(begun.cost):
+        return completed(now, series)
     found = _narrowed(now.candidate, completed(begun, series))
-    return found if found.cost < now.cost else with_normal(now, series, now.columns)
+    return found if found.cost < now.cost else completed(now, series)
 
 
 def _levels(candidate: Candidate, known: Noises, units: Mapping[str, float]) -> Iterator[Uncertain]:

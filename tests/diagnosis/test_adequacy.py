@@ -11,7 +11,6 @@ import pytest
 
 from diagnosis.adequacy import (
     is_inadequate,
-    is_plainer,
     is_strained,
     piles_up,
     refused,
@@ -25,6 +24,7 @@ from diagnosis.evidence import evidence, inflations
 from diagnosis.joined import burnt
 from diagnosis.layers import effects_in, fitting, shipped_effects
 from diagnosis.level import settled, units_of
+from diagnosis.plainer import may_be_plainer
 from diagnosis.search import Tried
 from diagnosis.selection import Selection
 from diagnosis.series import Series
@@ -171,4 +171,4 @@ def test_friction_that_does_not_rise_at_rest_is_a_plainer_one(
     true = {"T_c_w_em": 5.0, "rise_w_em": rise, "w_k_w_em": 60.0}
     own = with_effect(every, "stribeck_friction@w_em", true)
     selection = accepting(every, own, "stribeck_friction@w_em")
-    assert is_plainer(own, selection) is plainer
+    assert may_be_plainer(selection.model, own.series) is plainer

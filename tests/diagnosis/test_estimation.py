@@ -13,7 +13,6 @@ from diagnosis.candidate import Candidate
 from diagnosis.evidence import evidence
 from diagnosis.layers import fitting, shipped_effects
 from diagnosis.level import first_fit, recalibrated, settled, units_of
-from diagnosis.prediction import noises_of
 from diagnosis.series import Series, thinned
 from language.load import automaton_of
 from language.project import Project, expanded, read_document

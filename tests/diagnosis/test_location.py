@@ -16,7 +16,6 @@ from diagnosis.level import first_fit, recalibrated, units_of
 from diagnosis.location import DISTURBED, acting, led_by, located, unexplained
 from diagnosis.locus import Locus, locus_of
 from diagnosis.place_sentence import NOTHING, place_sentence
-from diagnosis.prediction import noises_of
 from diagnosis.series import Series
 from tests.diagnosis.test_estimation import FRICTION, TRUTH, bench, recorded
 

@@ -14,7 +14,6 @@ from diagnosis.estimation import Estimate, looked_at
 from diagnosis.layers import fitting, shipped_effects
 from diagnosis.level import first_fit, units_of
 from diagnosis.point import Point, extended
-from diagnosis.prediction import noises_of
 from diagnosis.screening import BEHIND, HINT, MOST_SCREENED, STRONG, Part, promises
 from tests.diagnosis.test_estimation import TRUTH, bench, recorded
 

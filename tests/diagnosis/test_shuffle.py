@@ -14,7 +14,6 @@ from diagnosis.estimation import Estimate
 from diagnosis.evidence import evidence
 from diagnosis.layers import fitting, shipped_effects
 from diagnosis.level import first_fit, recalibrated, units_of
-from diagnosis.prediction import noises_of
 from diagnosis.series import Series
 from diagnosis.shuffle import Cycles, Shuffle, _cycles, _wave, shuffle_of
 from diagnosis.shuffle_picture import shuffle_picture
