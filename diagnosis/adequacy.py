@@ -1,13 +1,13 @@
 """Adequacy: whether effects that were accepted leave more unexplained than they explain.
 
-The nearest effect of a library that lacks the true one gains a great deal; but with the parameters
-held, a drift that is let free at some place still finds much to do beside it, and innovations of
-the model remember, which noise does not.
+The nearest effect of a library that lacks the true one gains a great deal; but drifts that are let
+free still find much to do beside it, and innovations of the model remember, which noise does not.
 """
 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from diagnosis.bench import Bench
 from diagnosis.estimation import Estimate, looked_at
 from diagnosis.evidence import inflation, inflations
-from diagnosis.freedom import START_LEVEL, WIDE_LEVELS, with_levels
 from diagnosis.layers import DRIFT, Layer, walks
 from diagnosis.level import units_of
 from diagnosis.location import places_of_freedom
@@ -23,25 +22,26 @@ from diagnosis.naming import place_path
 from diagnosis.normal import solution
 from diagnosis.point import bounds_of, extended
 from diagnosis.selection import Selection
+from diagnosis.tuning import tuned
 from language.effect import own_names
 from language.problem import SpecError
 
-LEFT_PART = 0.2
-"""Part of what was gained that a freedom may gain beside it: forms differ, and noise has colour.
-
-An error of an output is none of them: a sensor follows whatever the model gets wrong."""
-LEFT_LEVELS = (START_LEVEL, *WIDE_LEVELS)
-"""Levels at which such a freedom is looked at."""
+LEFT_PART = 0.06
+"""Part of what was gained that drifts which are let free may gain beside it: forms differ."""
+FREE = 1000.0
+"""Units that such a drift may have."""
 
 MEMORY = 1.2
 """Innovations that count as one from which on those of a model remember."""
+HEARD = 1.5
+"""The same from which on a name is taken back: a tone whose phase is not quite right has 1.44."""
 MEMORY_PART = 0.25
 """Part of what the base's innovations remembered that those of an adequate model may: noise has no
 memory, and a form that is not quite right leaves little of it."""
 TYPICAL_PART = 0.2
 """The same for the recordings, for which it is the median: a few may be far from the others."""
 
-STRAINED, STRAINED_PART = 60.0, 0.02
+STRAINED, STRAINED_PART = 60.0, 0.03
 """Nats that accepted effects would gain beyond the ranges of their own parameters, and part of what
 they gained, from which on they are pulled out of these: what imitates another effect is."""
 
@@ -57,18 +57,39 @@ UNLIKELY = 20.0
 
 
 def is_inadequate(bench: Bench, selection: Selection, needed: float) -> bool:
-    """Tell whether a freedom gains much of what the accepted effects gained, and what is `needed`.
-
-    An effect that may walk along a recording, such as a grade, leaves what it leaves at its place.
+    """Tell whether free drifts gain much of what the accepted effects gained, and what is `needed`
+    [nats].
     """
     known = [tried.evidence.train for tried in selection.accepted if tried.evidence]
-    limit = max(needed, LEFT_PART * sum(known)) * inflation(selection.model, bench.series)
-    walking = {tried.layer.place for tried in selection.accepted if walks(tried.layer)}
-    return any(
-        _gains(bench, selection, layer, limit)
-        for section, layer in places_of_freedom(bench)
-        if section == "elements" or (section == "flow" and layer.place not in walking)
-    )
+    return freedom_gain(bench, selection) > max(needed, LEFT_PART * sum(known))
+
+
+def freedom_gain(bench: Bench, selection: Selection) -> float:
+    """Return what drifts that are let free in all balances and elements gain [nats], the parameters
+    fitted with them; those of elements are left out where they do not go along.
+
+    An effect that may walk along a recording, such as a grade, leaves what it leaves at its place.
+    A free error of an output is none of them: a sensor follows whatever the model gets wrong.
+    """
+    inside = [layer for section, layer in places_of_freedom(bench) if section == "elements"]
+    gains = (_gain(bench, selection, some) for some in ((*bench.drifts, *inside), bench.drifts))
+    return next((gain for gain in gains if np.isfinite(gain)), np.inf)
+
+
+def _gain(bench: Bench, selection: Selection, drifts: Sequence[Layer]) -> float:
+    """Return what some drifts gain [nats] that are let free; -inf where they do not go along."""
+    model, layers = selection.model, [tried.layer for tried in selection.accepted]
+    try:
+        candidate = bench.candidate(layers, drifts)
+    except SpecError:
+        return -np.inf
+    units = units_of(candidate, bench.series, model.values(0))
+    walking = {layer.place for layer in layers if walks(layer)}
+    most = {layer.named(DRIFT): FREE for layer in drifts if layer.place not in walking}
+    point = extended(candidate, model.candidate, model.point, {})
+    quiet = looked_at(candidate, bench.series, model.noises, point)
+    found = tuned(quiet, bench.series, units, most)
+    return (model.cost - found.cost) / inflation(model, bench.series)
 
 
 def remembers(bench: Bench, selection: Selection) -> bool:
@@ -82,8 +103,9 @@ def remembers_mostly(bench: Bench, selection: Selection) -> bool:
 
     Where a form is not quite right some recordings show it that drive it far.
     """
-    is_loud = inflation(selection.model, bench.series) > LOUD
-    if not is_loud and not remembers(bench, selection):
+    together = inflation(selection.model, bench.series)
+    is_loud = together > LOUD
+    if together < HEARD or not (is_loud or remembers(bench, selection)):
         return False
     before, after = (inflations(one, bench.series) for one in (selection.base, selection.model))
     heard = before > MEMORY
@@ -143,23 +165,3 @@ def refused(selection: Selection) -> Selection:
     totals = [tried.evidence.total for tried in selection.first_round if tried.evidence]
     other = max(selection.other, *totals) + UNLIKELY
     return dataclasses.replace(selection, model=selection.base, accepted=(), rivals=(), other=other)
-
-
-def _gains(bench: Bench, selection: Selection, layer: Layer, limit: float) -> bool:
-    """Tell whether the freedom of a drift gains more than a limit [nats], parameters held."""
-    model = selection.model
-    is_known = any(layer.id == one.id for one in bench.drifts)
-    drifts = bench.drifts if is_known else (*bench.drifts, layer)
-    try:
-        candidate = bench.candidate([tried.layer for tried in selection.accepted], drifts)
-    except SpecError:
-        return False
-    units = units_of(candidate, bench.series, model.values(0))
-    point = extended(candidate, model.candidate, model.point, {})
-    quiet = looked_at(candidate, bench.series, model.noises, point)
-    for level in LEFT_LEVELS if np.isfinite(quiet.cost) else ():
-        noises = with_levels(model.noises, units, {layer.named(DRIFT): level})
-        free = looked_at(candidate, bench.series, noises, point, quiet.outcome)
-        if quiet.cost - free.cost > limit:
-            return True
-    return False

@@ -26,7 +26,7 @@ LEFT = 2.0
 """Times the threshold that a term gains where an accepted effect leaves something over."""
 LEFT_PART = 0.3
 """And this part of what the effect gained: a strong one is never described quite well."""
-MUCH_OVER = 0.38
+MUCH_OVER = 0.8
 """Part of what accepted effects gained that a term at their place gains beside them, from which on
 they are something else: the right ones left a third of it at most."""
 STILL = 0.5

@@ -46,6 +46,8 @@ CLEAR = 1.0
 """A rival of another name within this of the best [nats] makes the verdict ambiguous."""
 HIDDEN = 6.0
 """Times the threshold that an input must gain that acts in windows."""
+FREEDOM = 4.0
+"""Times the threshold that free drifts must gain where effects are to be something else."""
 UNKNOWN = 8.0
 """Times the threshold that a free drift must gain where no effect was accepted."""
 
@@ -94,7 +96,7 @@ def _judged_by_observer(case: Case, raw: Bench, ways: Sequence[Way], tell: Tell)
     else:
         formula = None
         is_other = says == "effect" and leaves_much(selection, over, most)
-        says, selection = _adequate(bench, selection, says, UNKNOWN * most, units, is_other, tell)
+        says, selection = _adequate(bench, selection, says, FREEDOM * most, units, is_other, tell)
     return Judgement(bench, base, selection, loci, says, thresholds, formula)
 
 
@@ -118,7 +120,7 @@ def _adequate(
     is_other = (
         is_other
         or remembers_mostly(bench, selection)
-        or may_be_plainer(selection.model, bench.series)
+        or may_be_plainer(selection.model, selection.accepted[0].layer, bench.series)
     )
     if not is_other and not (is_heard and is_inadequate(bench, selection, needed)):
         return says, selection

@@ -22,7 +22,7 @@ from language.document import Table
 from language.known import entries_of
 from language.rewrite import reads
 
-DISTURBED = 0.1
+DISTURBED = 0.3
 """Part that counts of what the small drifts of the base take up as well."""
 
 

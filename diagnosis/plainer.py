@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 from diagnosis.estimation import Estimate
 from diagnosis.evidence import inflation
+from diagnosis.layers import Layer
 from diagnosis.naming import covariance_of, place_path
 from diagnosis.search import Tried
 from diagnosis.series import Series
@@ -23,7 +24,9 @@ NEARLY = 0.9
 
 def plainest(best: Tried, tried: Sequence[Tried], series: Sequence[Series]) -> Tried:
     """Return a candidate at the place of the best one that is what that one may as well be."""
-    if best.estimate is None or best.evidence is None or not may_be_plainer(best.estimate, series):
+    if best.estimate is None or best.evidence is None:
+        return best
+    if not may_be_plainer(best.estimate, best.layer, series):
         return best
     for other in tried:
         if other.evidence is None or place_path(other.layer) != place_path(best.layer):
@@ -33,14 +36,15 @@ def plainest(best: Tried, tried: Sequence[Tried], series: Sequence[Series]) -> T
     return best
 
 
-def may_be_plainer(model: Estimate, series: Sequence[Series]) -> bool:
-    """Tell whether an effect of a model may as well be a plainer one."""
+def may_be_plainer(model: Estimate, layer: Layer, series: Sequence[Series]) -> bool:
+    """Tell whether an effect that a model holds may as well be a plainer one."""
     if model.normal is None:
         return False
     covariance, names = covariance_of(model)
     shrink = 1.0 / inflation(model, series)
+    brought = {layer.named(name) for name in own_names(layer.effect.body)}
     for one, z in zip(model.candidate.uncertain, model.point.shared, strict=True):
-        if one.plain is not None and not one.per_recording:
+        if one.name in brought and one.plain is not None and not one.per_recording:
             k = names.index(one.name)
             apart = float(z) - one.coordinate(one.plain)
             if shrink * apart**2 / (2.0 * covariance[k, k]) < PLAINLY:

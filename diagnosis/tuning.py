@@ -19,22 +19,29 @@ from diagnosis.series import Series
 from diagnosis.uncertain import Uncertain
 
 LEAST, MOST = 0.03, 3.0
-"""Standard deviations that a drift may have, in its unit."""
+"""Standard deviations that a drift may have, in its unit, while effects are named."""
+NOTHING_MORE: Mapping[str, float] = {}
 FARTHEST = 2.5
 """Factor by which a noise may be another one than was measured."""
 DRIFT_PRIOR, NOISE_PRIOR = 2.0, 0.5
 """Standard deviations of their logarithms: of drifts next to nothing is known."""
 
 
-def tuned(now: Estimate, series: Sequence[Series], units: Mapping[str, float]) -> Estimate:
+def tuned(
+    now: Estimate,
+    series: Sequence[Series],
+    units: Mapping[str, float],
+    most: Mapping[str, float] = NOTHING_MORE,
+) -> Estimate:
     """Return a fit with its parameters and the levels of its noises where both foresee best.
 
-    Only drifts that have a unit are moved. What feeds nothing back has no gain: its noises stay.
+    Only drifts that have a unit are moved, to three of these or to the `most` that is given. What
+    feeds nothing back has no gain: its noises stay.
     """
     if now.noises.is_alone or not np.isfinite(now.cost):
         return completed(now, series)
     known = noises_of(series, {})
-    levels = tuple(_levels(now.candidate, known, units))
+    levels = tuple(_levels(now.candidate, known, units, most))
     wide = dataclasses.replace(now.candidate, levels=levels)
     point = _widened(wide, now)
     noises = noises_at(wide, point, now.noises)
@@ -45,11 +52,14 @@ def tuned(now: Estimate, series: Sequence[Series], units: Mapping[str, float]) -
     return found if found.cost < now.cost else completed(now, series)
 
 
-def _levels(candidate: Candidate, known: Noises, units: Mapping[str, float]) -> Iterator[Uncertain]:
+def _levels(
+    candidate: Candidate, known: Noises, units: Mapping[str, float], most: Mapping[str, float]
+) -> Iterator[Uncertain]:
     """Yield the levels of a candidate that a fit may move, near what is known of them."""
     for name, unit in units.items():
         middle = unit * np.sqrt(LEAST * MOST)
-        yield _level(DRIFTS.format(name), middle, LEAST * unit, MOST * unit, DRIFT_PRIOR)
+        high = most.get(name, MOST) * unit
+        yield _level(DRIFTS.format(name), middle, LEAST * unit, high, DRIFT_PRIOR)
     noises = {
         SIGNAL.format(n): v for n, v in zip(candidate.predictor.seen, known.seen, strict=True)
     }

@@ -79,6 +79,8 @@ def test_innovations_remember_what_is_still_missing(
     quiet = dataclasses.replace(base, noises=dataclasses.replace(base.noises, drifts={}))
     alone = estimated(quiet.candidate, rubbing.series, quiet.noises, quiet.point)
     selection = accepting(bench, rubbing, effect, alone)
+    start = selection.model.candidate, rubbing.series, quiet.noises, selection.model.point
+    selection = dataclasses.replace(selection, model=estimated(*start))
     assert remembers(rubbing, selection) is does
     assert remembers_mostly(rubbing, selection) is does
 
@@ -171,4 +173,4 @@ def test_friction_that_does_not_rise_at_rest_is_a_plainer_one(
     true = {"T_c_w_em": 5.0, "rise_w_em": rise, "w_k_w_em": 60.0}
     own = with_effect(every, "stribeck_friction@w_em", true)
     selection = accepting(every, own, "stribeck_friction@w_em")
-    assert may_be_plainer(selection.model, own.series) is plainer
+    assert may_be_plainer(selection.model, selection.accepted[0].layer, own.series) is plainer
