@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.bench import Bench
-from diagnosis.estimation import Estimate, looked_at
+from diagnosis.estimation import Estimate, looked_like
 from diagnosis.evidence import inflation, inflations
 from diagnosis.layers import DRIFT, Layer, walks
 from diagnosis.level import units_of
@@ -26,15 +26,15 @@ from diagnosis.tuning import tuned
 from language.effect import own_names
 from language.problem import SpecError
 
-LEFT_PART = 0.06
+LEFT_PART = 0.12
 """Part of what was gained that drifts which are let free may gain beside it: forms differ."""
 FREE = 1000.0
 """Units that such a drift may have."""
 
 MEMORY = 1.2
 """Innovations that count as one from which on those of a model remember."""
-HEARD = 1.5
-"""The same from which on a name is taken back: a tone whose phase is not quite right has 1.44."""
+HEARD = 1.6
+"""The same from which on a name is taken back: a rate limit by steps has 1.54."""
 MEMORY_PART = 0.25
 """Part of what the base's innovations remembered that those of an adequate model may: noise has no
 memory, and a form that is not quite right leaves little of it."""
@@ -87,7 +87,7 @@ def _gain(bench: Bench, selection: Selection, drifts: Sequence[Layer]) -> float:
     walking = {layer.place for layer in layers if walks(layer)}
     most = {layer.named(DRIFT): FREE for layer in drifts if layer.place not in walking}
     point = extended(candidate, model.candidate, model.point, {})
-    quiet = looked_at(candidate, bench.series, model.noises, point)
+    quiet = looked_like(candidate, bench.series, model.noises, point, model)
     found = tuned(quiet, bench.series, units, most)
     return (model.cost - found.cost) / inflation(model, bench.series)
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from diagnosis.candidate import Candidate
 from diagnosis.gains import gains_of
+from diagnosis.likeness import seen_like
 from diagnosis.normal import Normal, foreseen, normal_of, stepped
 from diagnosis.point import Point, all_values_at, point_of, values_at
 from diagnosis.prediction import (
@@ -103,6 +104,29 @@ def looked_at(
     return Estimate(candidate, point, cost, outcome, gains, noises)
 
 
+def looked_like(
+    candidate: Candidate,
+    series: Sequence[Series],
+    noises: Noises,
+    point: Point,
+    like: Estimate | None,
+) -> Estimate:
+    """Return a candidate at a point, with gains made where its modes were seen: where it had them
+    itself, or where a model `like` it had them, whichever foresees better.
+    """
+    if like is None:
+        return looked_at(candidate, series, noises, point)
+    gains = gains_of(candidate, series, values_at(candidate, point, 0), noises)
+    own = _run(candidate, series, point, gains, noises)
+    if not own.is_whole:
+        return Estimate(candidate, point, np.inf, own, gains, noises)
+    near = seen_like(candidate, own, like.candidate, like.outcome)
+    first = looked_at(candidate, series, noises, point, own)
+    if near is own:
+        return first
+    return min(first, looked_at(candidate, series, noises, point, near), key=lambda one: one.cost)
+
+
 def with_normal(
     estimate: Estimate, series: Sequence[Series], known: Columns | None = None
 ) -> Estimate:
@@ -167,10 +191,14 @@ def followed(
     start: Mapping[str, float] | Point,
     rounds: int = MOST_ROUNDS,
     known: Columns | None = None,
+    like: Estimate | None = None,
 ) -> Estimate:
-    """Return where steps lead with slopes that are looked for once, and carried along them."""
+    """Return where steps lead with slopes that are looked for once, and carried along them.
+
+    A model `like` it may tell where the modes are at the start.
+    """
     point = start if isinstance(start, Point) else point_of(candidate, len(series), start)
-    now = looked_at(candidate, series, noises, point)
+    now = looked_like(candidate, series, noises, point, like)
     return _walked(with_normal(now, series, known), series, rounds) if _is_known(now) else now
 
 

@@ -8,7 +8,7 @@ from functools import partial
 
 from diagnosis.bench import Bench
 from diagnosis.candidate import Candidate
-from diagnosis.estimation import Estimate, followed, looked_at
+from diagnosis.estimation import Estimate, followed, looked_at, looked_like
 from diagnosis.layers import DRIFT, Layer
 from diagnosis.level import FIRST_LEVELS, units_of
 from diagnosis.point import extended, point_of
@@ -50,7 +50,7 @@ def _freed(bench: Bench, base: Estimate, candidate: Candidate, layer: Layer | No
     found = []
     near = extended(candidate, base.candidate, base.point, {})
     for point in (near, point_of(candidate, len(bench.series), {})):
-        now = looked_at(candidate, bench.series, noises, point)
+        now = looked_like(candidate, bench.series, noises, point, base)
         found.append(scanned(now, bench.series, units, name, WIDE_LEVELS))
     now = min(found, key=lambda one: one.cost)
     now = followed(candidate, bench.series, now.noises, now.point, ROUNDS)

@@ -34,7 +34,7 @@ from diagnosis.location import located, unexplained
 from diagnosis.locus import Locus
 from diagnosis.naming import verdict_id
 from diagnosis.place_sentence import place_sentence
-from diagnosis.plainer import may_be_plainer
+from diagnosis.plainer import may_be_plainer, plainer_ones
 from diagnosis.search import Tell
 from diagnosis.selection import Selection, selected
 from diagnosis.series import Series
@@ -116,17 +116,31 @@ def _adequate(
     if not selection.accepted or any(not has_parameters(t.layer) for t in selection.accepted):
         return says, selection
     is_heard = says == "effect" and not is_still(selection, units)
-    is_other = is_other or is_strained(selection) or piles_up(selection)
-    is_other = (
-        is_other
-        or remembers_mostly(bench, selection)
-        or may_be_plainer(selection.model, selection.accepted[0].layer, bench.series)
+    why = (
+        "terms at their places explain much beside them" if is_other else _why_not(selection, bench)
     )
-    if not is_other and not (is_heard and is_inadequate(bench, selection, needed)):
+    if not why and is_heard and is_inadequate(bench, selection, needed):
+        why = "free drifts explain much beside them"
+    if not why:
         return says, selection
     names = ", ".join(tried.layer.id for tried in selection.accepted)
-    tell(f"much is left unexplained beside {names}: it is something else")
+    tell(f"taken back: {names}: {why}, so it is something else")
     return "unknown", refused(selection)
+
+
+def _why_not(selection: Selection, bench: Bench) -> str:
+    """Return why accepted effects are something else; nothing where they seem to be right."""
+    first = selection.accepted[0]
+    if is_strained(selection):
+        return "they are pulled out of their ranges"
+    if piles_up(selection):
+        return "two at one place gain alike"
+    if remembers_mostly(bench, selection):
+        return "most recordings remember what is left"
+    is_known = any(plainer_ones(first, selection.first_round))
+    if not is_known and may_be_plainer(selection.model, first.layer, bench.series):
+        return "the first may as well be a plainer one"
+    return ""
 
 
 def _judged_by_simulation(

@@ -120,12 +120,13 @@ def settled(
     start: Mapping[str, float] | Point,
     units: Mapping[str, float],
     columns: Columns | None = None,
+    like: Estimate | None = None,
 ) -> Estimate:
     """Return parameters and levels found together, from levels that fit where parameters lead.
 
-    `columns` are slopes of the candidate near the start, if there are such.
+    `columns` are slopes of the candidate near the start, `like` a model near it, if there are such.
     """
-    now = followed(candidate, series, noises, start, known=columns)
+    now = followed(candidate, series, noises, start, known=columns, like=like)
     return tuned(levelled(now, series, units), series, units)
 
 
@@ -137,6 +138,7 @@ def fitted(
     units: Mapping[str, float],
     known: float = -np.inf,
     columns: Columns | None = None,
+    like: Estimate | None = None,
 ) -> Estimate:
     """Return a fit with next to no drift at first, or a better one with those that `noises` has.
 
@@ -145,11 +147,11 @@ def fitted(
     """
     quiet = {**noises.drifts, **{name: QUIET * unit for name, unit in units.items()}}
     still = dataclasses.replace(noises, drifts=quiet)
-    first = settled(candidate, series, still, start, units, columns)
+    first = settled(candidate, series, still, start, units, columns, like)
     is_quiet = all(noises.drifts.get(name, 0.0) <= quiet[name] for name in units)
     if is_quiet or first.cost < known:
         return first
-    second = settled(candidate, series, noises, start, units, columns)
+    second = settled(candidate, series, noises, start, units, columns, like)
     return min(first, second, key=lambda one: one.cost)
 
 
@@ -173,7 +175,7 @@ def recalibrated(first: Estimate, series: Sequence[Series], units: Mapping[str, 
         known = dataclasses.replace(first.noises, drifts=drifts)
         near = min(found, key=lambda one: one.cost, default=first)
         start, columns = near.point, near.columns
-        found.append(settled(first.candidate, series, known, start, units, columns))
+        found.append(settled(first.candidate, series, known, start, units, columns, near))
     return min(found, key=lambda one: one.cost)
 
 

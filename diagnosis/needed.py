@@ -70,8 +70,8 @@ def _without(
         return None
     start = extended(candidate, found.model.candidate, found.model.point, {})
     given = (found.base.noises, start, units)
-    make = partial(settled, candidate, bench.series, *given)
-    return bench.kept("settled", candidate, given, make)
+    make = partial(settled, candidate, bench.series, *given, like=found.model)
+    return bench.kept("settled", candidate, (*given, found.model.gains), make)
 
 
 def _credited(

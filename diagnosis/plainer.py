@@ -6,34 +6,62 @@ few nats more of what is left of any form.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import dataclasses
+from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 
+from diagnosis.bench import Bench
 from diagnosis.estimation import Estimate
-from diagnosis.evidence import inflation
+from diagnosis.evidence import evidence, inflation
 from diagnosis.layers import Layer
+from diagnosis.level import settled
 from diagnosis.naming import covariance_of, place_path
+from diagnosis.point import extended
 from diagnosis.search import Tried
 from diagnosis.series import Series
 from language.effect import own_names
 
 PLAINLY = 5.0
 """Nats that the recordings must tell an effect from what it is where it is a plainer one."""
-NEARLY = 0.9
+NEARLY = 0.7
 """Part of what it gained that the plainer one gains at least."""
 
 
-def plainest(best: Tried, tried: Sequence[Tried], series: Sequence[Series]) -> Tried:
-    """Return a candidate at the place of the best one that is what that one may as well be."""
-    if best.estimate is None or best.evidence is None:
+def plainest(
+    bench: Bench, base: Estimate, units: Mapping[str, float], best: Tried, tried: Sequence[Tried]
+) -> Tried:
+    """Return the plainer candidate that the best one gains too little over, or the best one.
+
+    The plainer one is fitted from there as well: which one fits better is not to be an accident.
+    """
+    model = best.estimate
+    if model is None or best.evidence is None:
         return best
-    if not may_be_plainer(best.estimate, best.layer, series):
-        return best
+    for other in plainer_ones(best, tried):
+        assert other.estimate is not None
+        candidate = other.estimate.candidate
+        start = extended(candidate, model.candidate, model.point, other.estimate.point)
+        given = (model.noises, start, units)
+        make = partial(settled, candidate, bench.series, *given, like=model)
+        again = bench.kept("settled", candidate, (*given, model.gains), make)
+        found = min(other.estimate, again, key=lambda one: one.cost)
+        known = evidence(found, base, bench.series)
+        if best.evidence.train - known.train < PLAINLY:
+            return dataclasses.replace(other, estimate=found, evidence=known)
+    return best
+
+
+def plainer_ones(best: Tried, tried: Sequence[Tried]) -> Iterator[Tried]:
+    """Yield the candidates that one which may be plainer may be: at its place, with fewer numbers,
+    that gained nearly as much.
+    """
+    if best.estimate is None or best.evidence is None or not _plain_ones(best.estimate, best.layer):
+        return
     for other in tried:
         if other.evidence is None or place_path(other.layer) != place_path(best.layer):
             continue
         if _numbers(other) < _numbers(best) and other.evidence.train > NEARLY * best.evidence.train:
-            return other
-    return best
+            yield other
 
 
 def may_be_plainer(model: Estimate, layer: Layer, series: Sequence[Series]) -> bool:
@@ -42,14 +70,22 @@ def may_be_plainer(model: Estimate, layer: Layer, series: Sequence[Series]) -> b
         return False
     covariance, names = covariance_of(model)
     shrink = 1.0 / inflation(model, series)
-    brought = {layer.named(name) for name in own_names(layer.effect.body)}
-    for one, z in zip(model.candidate.uncertain, model.point.shared, strict=True):
-        if one.name in brought and one.plain is not None and not one.per_recording:
-            k = names.index(one.name)
-            apart = float(z) - one.coordinate(one.plain)
-            if shrink * apart**2 / (2.0 * covariance[k, k]) < PLAINLY:
-                return True
+    for k, plain in _plain_ones(model, layer).items():
+        apart = float(model.point.shared[k]) - plain
+        place = names.index(model.candidate.names[k])
+        if shrink * apart**2 / (2.0 * covariance[place, place]) < PLAINLY:
+            return True
     return False
+
+
+def _plain_ones(model: Estimate, layer: Layer) -> dict[int, float]:
+    """Return the coordinates at which an effect is a plainer one, by their places."""
+    brought = {layer.named(name) for name in own_names(layer.effect.body)}
+    return {
+        k: one.coordinate(one.plain)
+        for k, one in enumerate(model.candidate.uncertain)
+        if one.name in brought and one.plain is not None and not one.per_recording
+    }
 
 
 def _numbers(tried: Tried) -> int:

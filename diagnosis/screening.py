@@ -17,6 +17,7 @@ from diagnosis.estimation import (
     SCREENED_ROUNDS,
     Estimate,
     looked_at,
+    looked_like,
     reached,
     regained,
     seen_at,
@@ -124,7 +125,7 @@ def _fair(base: Estimate, series: Sequence[Series]) -> float:
     """Return the cost [nats] of a base that takes the steps that candidates take, with gains made
     where it begins: those that it was left with may fit better by accident.
     """
-    here = looked_at(base.candidate, series, base.noises, base.point)
+    here = looked_at(base.candidate, series, base.noises, base.point, base.outcome)
     return regained(reached(here, series, base.columns, SCREENED_ROUNDS), series).cost
 
 
@@ -165,7 +166,7 @@ def _hinted(bench: Bench, some: Part, begun: Estimate, base: Estimate, least: fl
     first = extended(candidate, base.candidate, base.point, starts_of(candidate, base.values(0))[0])
     ends = [
         seen_at(found, bench.series, point),
-        looked_at(candidate, bench.series, base.noises, first),
+        looked_like(candidate, bench.series, base.noises, first, base),
     ]
     best = min(ends, key=lambda one: one.cost)
     return _Hint(found, best.point, base.cost - best.cost, is_seen=False)
@@ -205,7 +206,11 @@ def _raced(part: Part, candidate: Candidate, starts: Sequence[Point]) -> Estimat
     found: list[Estimate] = []
     near: Outcome | None = None
     for point in starts:
-        here = looked_at(candidate, series, part.base.noises, point, near)
+        here = (
+            looked_like(candidate, series, part.base.noises, point, part.base)
+            if near is None
+            else looked_at(candidate, series, part.base.noises, point, near)
+        )
         near = here.outcome if here.outcome.is_whole else near
         found.append(turned(here, series))
     found.sort(key=lambda one: one.cost)

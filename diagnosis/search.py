@@ -77,7 +77,7 @@ def searched(
         if start is None or place >= fits or gain < max(worth, HOPELESS * best):
             found.append(Tried(layer, gain))
             continue
-        given = (base.noises, start.point, start.columns, units, start.cost - WORTH)
+        given = (base.noises, start.point, start.columns, start.gains, units, start.cost - WORTH)
         make = partial(_fitted, bench, base, start, units)
         estimate = bench.kept("fitted", start.candidate, given, make)
         if not np.isfinite(estimate.cost):
@@ -97,7 +97,7 @@ def _fitted(bench: Bench, base: Estimate, start: Estimate, units: Mapping[str, f
     """
     candidate, known = start.candidate, start.cost - WORTH
     given = bench.series, base.noises
-    first = fitted(candidate, *given, start.point, units, known, start.columns)
+    first = fitted(candidate, *given, start.point, units, known, start.columns, start)
     if not np.isfinite(first.cost) or inflation(first, bench.series) < POOR:
         return first
     point = point_of(candidate, len(bench.series), {})

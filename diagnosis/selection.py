@@ -21,7 +21,7 @@ from diagnosis.search import Tell, Tried, searched
 from diagnosis.swap import swapped
 from diagnosis.threshold import EVERYWHERE, USUAL, Thresholds
 
-PART = 0.005
+PART = 0.002
 """A further effect gains at least this part of what the one before it gained: a strong effect is
 never described so well that nothing small is left beside it."""
 HOPE, HOPE_BESIDE = 0.25, 0.5
@@ -103,7 +103,7 @@ def selected(
             base = base if accepted else better
         rounds.append(tried)
         best = _enough(tried, needed, thresholds, left_out)
-        best = plainest(best, tried, bench.series) if best else None
+        best = plainest(bench, model, units, best, tried) if best else None
         if best is None or best.estimate is None or best.evidence is None:
             break
         gained = counted(best.evidence, left_out)
@@ -193,8 +193,8 @@ def _better_base(
         return None
     start = extended(model.candidate, best.estimate.candidate, best.estimate.point, {})
     given = (best.estimate.noises, start, units)
-    make = partial(settled, model.candidate, bench.series, *given)
-    again = bench.kept("settled", model.candidate, given, make)
+    make = partial(settled, model.candidate, bench.series, *given, like=best.estimate)
+    again = bench.kept("settled", model.candidate, (*given, best.estimate.gains), make)
     return again if again.cost < model.cost - BETTER else None
 
 

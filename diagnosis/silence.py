@@ -27,7 +27,7 @@ SHORTEST = 2.0
 """Seconds that a silence lasts at least: the states have to be found in it."""
 STARTS = (FIRST_LEVELS[0], FIRST_LEVELS[-1])
 """Levels of all drifts from which the silences are fitted."""
-MOST = 0.5
+MOST = 1.0 / 3.0
 """Part of the recordings that silences have at least, if parameters are to follow from them."""
 
 

@@ -12,6 +12,7 @@ from diagnosis.bench import Bench
 from diagnosis.estimation import Estimate
 from diagnosis.evidence import evidence
 from diagnosis.level import fitted
+from diagnosis.plainer import may_be_plainer
 from diagnosis.point import extended
 from diagnosis.search import Tell, Tried
 
@@ -45,7 +46,9 @@ def swapped(
                 continue
             start = extended(candidate, rival.estimate.candidate, rival.estimate.point, {})
             start = extended(candidate, model.candidate, model.point, start)
-            tried = fitted(candidate, bench.series, model.noises, start, units)
+            tried = fitted(candidate, bench.series, model.noises, start, units, like=model)
+            if may_be_plainer(tried, rival.layer, bench.series):
+                continue
             if _gain(tried, model, bench) > CLEARLY:
                 tell(f"{rival.layer.id} goes better with the others than {kept[k].layer.id}")
                 kept[k], model = rival, tried
