@@ -22,9 +22,8 @@ from diagnosis.bench import Bench
 from diagnosis.estimation import Estimate, estimated
 from diagnosis.evidence import evidence, inflations
 from diagnosis.joined import burnt
-from diagnosis.layers import effects_in, fitting, shipped_effects
+from diagnosis.layers import effects_in, fitting
 from diagnosis.level import settled, units_of
-from diagnosis.plainer import may_be_plainer
 from diagnosis.search import Tried
 from diagnosis.selection import Selection
 from diagnosis.series import Series
@@ -163,14 +162,3 @@ def test_what_is_pulled_out_of_its_range_is_something_else(
     selection = accepting(own, own, "coulomb_friction@w_em")
     assert is_strained(selection) is strained
     assert (strain(selection) < 1.0) is not strained
-
-
-@pytest.mark.parametrize(("rise", "plainer"), [(0.0, True), (3.0, False)])
-def test_friction_that_does_not_rise_at_rest_is_a_plainer_one(
-    bench: Bench, rise: float, plainer: bool
-) -> None:
-    every = dataclasses.replace(bench, effects=shipped_effects(), _made={})
-    true = {"T_c_w_em": 5.0, "rise_w_em": rise, "w_k_w_em": 60.0}
-    own = with_effect(every, "stribeck_friction@w_em", true)
-    selection = accepting(every, own, "stribeck_friction@w_em")
-    assert may_be_plainer(selection.model, selection.accepted[0].layer, own.series) is plainer

@@ -64,7 +64,7 @@ def test_what_is_far_behind_is_not_followed_further(bench: Bench) -> None:
     layers = {layer.id: layer for e in shipped_effects() for layer in fitting(bench.document, e)}
     names = ("coulomb_friction@w_em", "torque_gain@T_br")
     known = [(layers[name], bench.candidate((layers[name],))) for name in names]
-    series = recorded(known[0][1], {**TRUTH, "T_c_w_em": 40.0})
+    series = recorded(known[0][1], {**TRUTH, "T_c_w_em": 80.0})
     own = dataclasses.replace(bench, series=series, _made={})
     base = bench.candidate(())
     fitted = first_fit(base, series, units_of(base, series, {}))

@@ -1,0 +1,64 @@
+"""Friction that rises at rest gives way to dry friction where its rise is none."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import pytest
+
+from diagnosis.bench import Bench
+from diagnosis.estimation import Estimate
+from diagnosis.evidence import evidence
+from diagnosis.layers import fitting, shipped_effects
+from diagnosis.level import settled, units_of
+from diagnosis.plainer import may_be_plainer, plainer_ones, plainest
+from diagnosis.search import Tried
+from tests.diagnosis.test_estimation import bench
+from tests.diagnosis.test_location import based, with_effect
+
+__all__ = ["bench"]
+RISES, PLAIN = "stribeck_friction@w_em", "coulomb_friction@w_em"
+
+
+def rubbing(bench: Bench, rise: float) -> Bench:
+    """Return recordings with a friction at the motor that rises by a part of itself at rest."""
+    every = dataclasses.replace(bench, effects=shipped_effects(), _made={})
+    true = {"T_c_w_em": 5.0, "rise_w_em": rise, "w_k_w_em": 60.0}
+    return dataclasses.replace(with_effect(every, RISES, true), effects=every.effects)
+
+
+def tried(own: Bench, base: Estimate, effect: str) -> Tried:
+    """Return an effect fitted beside a base."""
+    layers = {layer.id: layer for e in own.effects for layer in fitting(own.document, e)}
+    units = units_of(base.candidate, own.series, base.values(0))
+    candidate = own.candidate((layers[effect],))
+    model = settled(candidate, own.series, base.noises, base.values(0), units)
+    known = evidence(model, base, own.series)
+    return Tried(layers[effect], known.train, model, known)
+
+
+@pytest.mark.parametrize(("rise", "named"), [(0.0, PLAIN), (3.0, RISES)])
+def test_what_may_as_well_be_plainer_gives_way(bench: Bench, rise: float, named: str) -> None:
+    own = rubbing(bench, rise)
+    base = based(own)
+    units = units_of(base.candidate, own.series, base.values(0))
+    best, other = tried(own, base, RISES), tried(own, base, PLAIN)
+    assert best.estimate is not None
+    assert may_be_plainer(best.estimate, best.layer, own.series) is (named == PLAIN)
+    assert plainest(own, base, units, best, [best, other]).layer.id == named
+    assert plainest(own, base, units, best, [best]) is best, "there is no plainer candidate"
+    assert plainest(own, base, units, other, [best, other]) is other, "it is the plainer one"
+
+
+def test_a_plainer_one_gains_nearly_as_much_at_the_same_place(bench: Bench) -> None:
+    own = rubbing(bench, 0.0)
+    base = based(own)
+    best, other = tried(own, base, RISES), tried(own, base, PLAIN)
+    assert best.evidence is not None
+    assert other.evidence is not None
+    assert list(plainer_ones(best, [best, other])) == [other]
+    weak = dataclasses.replace(other.evidence, train=0.5 * best.evidence.train)
+    assert not list(plainer_ones(best, [dataclasses.replace(other, evidence=weak)]))
+    away = dataclasses.replace(other.layer, place="w_w")
+    assert not list(plainer_ones(best, [dataclasses.replace(other, layer=away)]))
+    assert not list(plainer_ones(other, [best]))
