@@ -27,15 +27,16 @@ from diagnosis.point import Point, extended
 from diagnosis.prediction import Outcome
 from diagnosis.series import Series
 
-MOST_SCREENED = 5
+MOST_SCREENED = 3
 """Recordings that candidates are screened on first, spread over all."""
 MOST_ON_ALL = 10
 """Candidates that are then screened on all, those that gained most; and as many again at most that
 the others alone may show."""
 HINT = 2.0
 """Nats that a candidate gains at least, if it is to be looked at further."""
-STARTS = 2
-"""Starts of a candidate from which steps are made, the best ones."""
+STARTS, STARTS_BESIDE = 2, 1
+"""Starts of a candidate from which steps are made, the best ones: alone, and beside what was
+accepted, where a second one was hardly ever better."""
 RACE = 2
 """Steps from each of them; then the better one goes on alone."""
 STRONG = 2000.0
@@ -180,7 +181,7 @@ def _on_all(bench: Bench, some: Part, base: Estimate, hint: _Hint) -> Estimate:
         return hint.found
     candidate = hint.found.candidate
     whole = Part(list(range(len(bench.series))), bench, base)
-    starts = [hint.point, *_starts(whole, candidate)]
+    starts = [hint.point, *(() if hint.is_seen else _starts(whole, candidate))]
     make = partial(_reached, whole, candidate, starts)
     given = [base.candidate, base.point, base.noises, base.columns, *starts]
     return bench.kept("screened", candidate, given, make)
@@ -214,7 +215,8 @@ def _raced(part: Part, candidate: Candidate, starts: Sequence[Point]) -> Estimat
         near = here.outcome if here.outcome.is_whole else near
         found.append(turned(here, series))
     found.sort(key=lambda one: one.cost)
-    race = [reached(here, series, part.base.columns, RACE) for here in found[:STARTS]]
+    most = STARTS_BESIDE if part.base.candidate.layers else STARTS
+    race = [reached(here, series, part.base.columns, RACE) for here in found[:most]]
     return min(race, key=lambda one: one.cost)
 
 
