@@ -24,7 +24,7 @@ REACH = 0.2
 """Seconds in which a drift of one unit shows."""
 LEVELS = (0.0, 0.1, 0.3, 1.0, 3.0)
 """Standard deviations that a drift may have, in its unit; the last is the most while naming."""
-FIRST_LEVELS = (0.1, 1.0)
+FIRST_LEVELS = (0.1, 0.3, 1.0)
 """Those from which a base is fitted: a fit with much drift does not find its way to less."""
 QUIET = FIRST_LEVELS[0]
 """That from which a candidate is fitted as well."""

@@ -27,8 +27,9 @@ from diagnosis.point import Point, extended
 from diagnosis.prediction import Outcome
 from diagnosis.series import Series
 
-MOST_SCREENED = 3
-"""Recordings that candidates are screened on first, spread over all."""
+SCREENED_PART, FEWEST_SCREENED, MOST_SCREENED = 1 / 3, 3, 5
+"""The part of the recordings that candidates are screened on first, spread over all, and how many
+these are at least and at most."""
 MOST_ON_ALL = 10
 """Candidates that are then screened on all, those that gained most; and as many again at most that
 the others alone may show."""
@@ -110,9 +111,10 @@ def _apart(
 def part_of(bench: Bench, base: Estimate) -> Part:
     """Return the recordings to begin with, spread over all."""
     count = len(bench.series)
-    if count <= MOST_SCREENED:
+    screened = min(max(round(SCREENED_PART * count), FEWEST_SCREENED), MOST_SCREENED)
+    if count <= screened:
         return Part(list(range(count)), bench, base)
-    rows = [round(k * (count - 1) / (MOST_SCREENED - 1)) for k in range(MOST_SCREENED)]
+    rows = [round(k * (count - 1) / (screened - 1)) for k in range(screened)]
     series = tuple(bench.series[row] for row in rows)
     parts = [base.outcome.parts[row] for row in rows]
     columns = {name: np.concatenate([c[p] for p in parts]) for name, c in base.columns.items()}
@@ -181,7 +183,7 @@ def _on_all(bench: Bench, some: Part, base: Estimate, hint: _Hint) -> Estimate:
         return hint.found
     candidate = hint.found.candidate
     whole = Part(list(range(len(bench.series))), bench, base)
-    starts = [hint.point, *(() if hint.is_seen else _starts(whole, candidate))]
+    starts = [hint.point, *_starts(whole, candidate)]
     make = partial(_reached, whole, candidate, starts)
     given = [base.candidate, base.point, base.noises, base.columns, *starts]
     return bench.kept("screened", candidate, given, make)
