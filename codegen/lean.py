@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 from codegen.harness import tunable
 from codegen.source import stepped
-from language.operation import Assign, Block
+from codegen.unread import without_unread
 from language.program import Program
-from language.traversal import block_reads
 
 SHOWN = ("equation.", "work.")
 """What is set for those who look at an instance or at a step: beyond that nothing happens."""
@@ -20,15 +17,7 @@ def lean(program: Program) -> Program:
     Its tunable parameters and inputs stay the same, or the Program does.
     """
     whole = stepped(program)
-    blocks = dict(whole.blocks)
-    shown = {wire.source for wire in program.outputs}
-    while True:
-        read = shown.union(*(block_reads(block) for block in blocks.values()))
-        fewer = {name: _without(block, read) for name, block in blocks.items()}
-        if fewer == blocks:
-            break
-        blocks = fewer
-    made = dataclasses.replace(whole, blocks=blocks)
+    made = without_unread(whole, SHOWN)
     return made if _page(made) == _page(whole) else whole
 
 
@@ -36,12 +25,3 @@ def _page(program: Program) -> tuple[object, ...]:
     """What a caller sets from outside: tunable parameters, and inputs as they are held."""
     held = (v.name for v in stepped(program).variables if v.name.startswith("before."))
     return *tunable(program), *held
-
-
-def _without(block: Block, read: set[str]) -> Block:
-    """Leave out the assignments, not inside others, of values that are not read."""
-    return tuple(
-        op
-        for op in block
-        if not (isinstance(op, Assign) and op.target.startswith(SHOWN) and op.target not in read)
-    )
