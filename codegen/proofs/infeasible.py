@@ -13,7 +13,8 @@ from dataclasses import dataclass
 
 from codegen.expression import LOGIC, c_expression
 from codegen.names import SOLVED_ON_PAGE, CNames
-from codegen.proofs.symbolic import Fact, World
+from codegen.proofs.invariant import invariant
+from codegen.proofs.symbolic import World
 from codegen.proofs.terms import Range
 from codegen.statement import going_on, opposite
 from codegen.usage import locals_of
@@ -72,13 +73,12 @@ def never(
     `ranges` are those of variables between two steps, as far as they stay in them.
     """
     world = World(program)
-    facts = _invariant(world, ranges)
-    world.step()
+    claims = invariant(world, ranges)
     found: dict[int, bool] = {}
     for number in wanted:
         visits = world.visits.get(number, [])
         for outcome in (True, False):
-            if visits and all(world.excludes(visit, outcome, facts) for visit in visits):
+            if visits and all(world.excludes(visit, outcome, claims) for visit in visits):
                 found[number] = outcome
     return found
 
@@ -101,15 +101,3 @@ def _conditions(expr: Expr) -> Iterator[Expr]:
             yield from _conditions(operand)
         case _:
             yield expr
-
-
-def _invariant(world: World, ranges: Mapping[str, Range]) -> list[Fact]:
-    """Return what holds before every step: the largest part of what is proposed that stays."""
-    values = world.step()
-    first = world.after_init()
-    facts = [fact for fact in world.proposed(ranges) if world.holds(first, fact)]
-    while True:
-        stays = [fact for fact in facts if world.holds(values, fact, facts)]
-        if stays == facts:
-            return facts
-        facts = stays

@@ -6,11 +6,13 @@ is never true of it never is.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from codegen.proofs.terms import Limits, Range, Terms
+from codegen.proofs.fact import AtMost, Fact, Same, Within, in_loop, runs_of
+from codegen.proofs.terms import Range, Terms
+from codegen.statement import going_on
 from language.operation import (
     Assign,
     Binary,
@@ -32,13 +34,27 @@ from language.operation import (
     Unary,
     Value,
 )
-from language.program import MODE, Program
-from language.run import MODE as RUN_MODE
-from language.traversal import block_writes, reached, walk
+from language.program import Program
+from language.traversal import block_writes
 
 EFFORT = 20_000_000
 """Units of z3's own count for one question: some seconds, and the same answer on every machine."""
-Fact = tuple[str, Limits]
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A fact of a loop, by its `id`, or, with 0, of steps."""
+
+    loop: int
+    fact: Fact
+
+
+@dataclass(frozen=True)
+class Held:
+    """A claim where it is known, or where it has to hold."""
+
+    claim: Claim
+    term: Any
 
 
 @dataclass(frozen=True)
@@ -60,56 +76,93 @@ class World:
         self.kinds |= {c.name: c.type for c in program.constants}
         fixed = (c for c in program.constants if c.kind == "fixed")
         self.fixed = {c.name: self.terms.value(c.value) for c in fixed}
-        self.start: Mapping[str, Any] = {}
+        self.page: list[Any] = []
+        self.known: list[Held] = []
+        self.duties: list[Held] = []
         self.visits: dict[int, list[Visit]] = {}
-
-    def proposed(self, ranges: Mapping[str, Range]) -> Iterator[Fact]:
-        """Yield what may hold of variables between two steps."""
-        yield from ranges.items()
-        for name, infos in ((MODE, self.program.modes), (RUN_MODE, self.program.run_modes)):
-            if name in self.kinds and infos:
-                yield name, frozenset(info.number for info in infos)
-        for block in self.program.blocks.values():
-            for op in walk(block):
-                if isinstance(op, Count):
-                    yield op.timer, frozenset(range(op.limit))
-                    yield op.timer, frozenset(range(op.limit + 1))
 
     def after_init(self) -> dict[str, Any]:
         """Return what variables are before the first step: 0 or false, and what `init` sets."""
         zero = {"real": 0.0, "truth": False}
         values = {name: self.terms.value(zero.get(kind, 0)) for name, kind in self.kinds.items()}
-        values |= self.fixed
+        values |= {c.name: self._any(c.name) for c in self.program.constants} | self.fixed
         self._block(self.program.blocks["init"], values, self.terms.value(True))
         return values
 
-    def step(self) -> dict[str, Any]:
-        """Return what variables are after one step from anywhere; its conditions are noted."""
-        self.visits = {}
+    def holds_at(self, values: Mapping[str, Any], fact: Fact) -> bool:
+        """Prove a fact of some values."""
+        return self._is_never([self.z3.Not(self._term(fact, values))])
+
+    def step(self, facts: Sequence[Fact]) -> None:
+        """Follow one step from anywhere that some facts allow; its conditions are noted, what is
+        known where a step or a turn begins, and what has to hold where they end.
+        """
+        self.visits, self.known, self.duties = {}, [], []
         values = {name: self._any(name) for name in self.kinds} | self.fixed
-        self.start = dict(values)
-        self._block(self.program.blocks["step"], values, self.terms.value(True))
-        return values
+        always = self.terms.value(True)
+        tunable = [c for c in self.program.constants if c.kind == "tunable" and not c.items]
+        self.page = [self._inside(values[c.name], c.range) for c in tunable if c.range]
+        claims = [Claim(0, fact) for fact in facts]
+        self.known += [Held(claim, self._term(claim.fact, values)) for claim in claims]
+        self._block(self.program.blocks["step"], values, always)
+        self.duties += [Held(claim, self._term(claim.fact, values)) for claim in claims]
 
-    def holds(self, values: Mapping[str, Any], fact: Fact, before: Collection[Fact] = ()) -> bool:
-        """Prove a fact of some values, where others held before the step."""
-        name, limits = fact
-        wrong = self.z3.Not(self.terms.within(values[name], limits))
-        return self._is_never([wrong, *self._all(before)])
+    def lost(self, claims: Collection[Claim]) -> frozenset[Claim]:
+        """Return those of some claims that are not proven where all of them are known."""
+        known = [held.term for held in self.known if held.claim in claims]
+        left = [duty for duty in self.duties if duty.claim in claims]
+        found = set[Claim]()
+        while left:
+            z3, terms = self.z3, [duty.term for duty in left]
+            solver = self._solver([z3.Not(z3.And(*terms)), *known, *self.page])
+            told = solver.check()
+            if told == z3.unsat:
+                break
+            if told == z3.sat:
+                model = solver.model()
+                is_held = [z3.is_true(model.eval(term, model_completion=True)) for term in terms]
+            else:
+                is_held = [self._is_never([z3.Not(term), *known, *self.page]) for term in terms]
+            gone = {duty.claim for duty, held in zip(left, is_held, strict=True) if not held}
+            if told != z3.sat or not gone:
+                return frozenset(found | gone)
+            found |= gone
+            left = [duty for duty in left if duty.claim not in gone]
+        return frozenset(found)
 
-    def excludes(self, visit: Visit, outcome: bool, before: Collection[Fact]) -> bool:
+    def excludes(self, visit: Visit, outcome: bool, claims: Collection[Claim]) -> bool:
         """Prove that a condition never has an outcome where it is come by."""
         condition = visit.condition if outcome else self.z3.Not(visit.condition)
-        return self._is_never([condition, visit.path, *self._all(before)])
+        known = [held.term for held in self.known if held.claim in claims]
+        return self._is_never([condition, visit.path, *known, *self.page])
 
-    def _all(self, facts: Collection[Fact]) -> list[Any]:
-        return [self.terms.within(self.start[name], limits) for name, limits in facts]
+    def _inside(self, value: Any, ends: Range) -> Any:
+        if self.z3.is_fp(value):
+            return self.terms.within(value, ends)
+        return self.z3.And(value >= int(ends[0]), value <= int(ends[1]))
 
-    def _is_never(self, facts: list[Any]) -> bool:
+    def _term(self, fact: Fact, values: Mapping[str, Any]) -> Any:
+        z3 = self.z3
+        match fact:
+            case Within(name, limits, where):
+                within = self.terms.within(values[name], limits)
+                return z3.Implies(values[where[0]] == where[1], within) if where else within
+            case AtMost(name, others, factor, more, going):
+                most = factor * sum(values[other] for other in others) + more
+                if going is not None:
+                    most = most + z3.If(self._expr(going, dict(values), None), 0, 1)
+                return values[name] <= most
+            case Same(name, _, comparison):
+                return values[name] == self._expr(comparison, dict(values), None)
+
+    def _solver(self, facts: list[Any]) -> Any:
         solver = self.z3.Solver()
         solver.set("rlimit", EFFORT)
-        solver.add(*facts)
-        return bool(solver.check() == self.z3.unsat)
+        solver.add(*facts, *self.terms.lemmas(facts))
+        return solver
+
+    def _is_never(self, facts: list[Any]) -> bool:
+        return bool(self._solver(facts).check() == self.z3.unsat)
 
     def _any(self, name: str) -> Any:
         return self.terms.new(self.kinds.get(name, "real"), name)
@@ -135,8 +188,8 @@ class World:
                 which = values[selector]
                 for number, case in cases:
                     self._merge(which == number, case, (), values, path)
-            case Loop(_, index, body):
-                self._loop(index, body, values, path)
+            case Loop():
+                self._loop(op, values, path)
             case Count():
                 self._count(op, values, path)
             case FaultBit():
@@ -147,7 +200,7 @@ class World:
     def _count(self, op: Count, values: dict[str, Any], path: Any) -> None:
         z3, now = self.z3, values[op.timer]
         test = self._decided(op.condition, values, path)
-        counts = self._visited(id(op), now < op.limit, z3.And(path, test))
+        counts = self._visited(id(op), now < op.limit, self._and(path, test))
         values[op.timer] = z3.If(test, z3.If(counts, now + 1, now), 0)
 
     def _merge(
@@ -155,8 +208,8 @@ class World:
     ) -> None:
         z3 = self.z3
         one, two = dict(values), dict(values)
-        self._block(then, one, z3.And(path, test))
-        self._block(other, two, z3.And(path, z3.Not(test)))
+        self._block(then, one, self._and(path, test))
+        self._block(other, two, self._and(path, z3.Not(test)))
         for name in one | two:
             a, b = one.get(name), two.get(name)
             if a is None or b is None:
@@ -164,18 +217,44 @@ class World:
             elif a is not b:
                 values[name] = z3.If(test, a, b)
 
-    def _loop(self, index: str, body: Block, values: dict[str, Any], path: Any) -> None:
-        """Any turn of a loop begins with any values of what the loop sets, and so ends all."""
-        names = {index, *block_writes(body)}
-        for op in walk(body):
-            if isinstance(op, Run):
-                for run in reached(op.block, self.program.blocks):
-                    names |= set(block_writes(self.program.blocks[run]))
+    def _loop(self, loop: Loop, values: dict[str, Any], path: Any) -> None:
+        """A turn begins with any values of what the loop sets that its facts allow, and the loop
+        ends with such values, too.
+        """
+        z3, body = self.z3, loop.body
+        names = {loop.index, *block_writes(body)}
+        for run in runs_of(self.program, body):
+            names |= set(block_writes(self.program.blocks[run]))
+        claims = [Claim(id(loop), fact) for fact in in_loop(self.program, loop)]
+        claims = [claim for claim in claims if claim.fact.names <= {*values, *names}]
+        values[loop.index] = z3.IntVal(0)
+        self._owe(claims, values, path)
         for name in sorted(names):
-            values[name] = self.terms.new("whole", name) if name == index else self._any(name)
-        self._block(body, dict(values), path)
+            values[name] = self.terms.new("whole", name) if name == loop.index else self._any(name)
+        turn = values[loop.index]
+        self._know(claims, values, z3.And(path, turn >= 0, turn <= loop.count))
+        self._visited(id(loop), turn < loop.count, z3.And(path, turn >= 0, turn <= loop.count))
+        inside = z3.And(path, turn >= 0, turn < loop.count)
+        at_end = dict(values)
+        self._block(body, at_end, inside)
+        at_end[loop.index] = turn + 1
+        going = going_on(loop.index, body)[0]
+        more = inside if going is None else z3.And(inside, self._expr(going, dict(values), None))
+        self._owe(claims, at_end, more)
         for name in sorted(names):
             values[name] = self._any(name)
+        values[loop.index] = self.terms.new("whole", loop.index)
+        self._know(claims, values, path)
+
+    def _know(self, claims: Sequence[Claim], values: Mapping[str, Any], path: Any) -> None:
+        for claim in claims:
+            known = self.z3.Implies(path, self._term(claim.fact, values))
+            self.known.append(Held(claim, known))
+
+    def _owe(self, claims: Sequence[Claim], values: Mapping[str, Any], path: Any) -> None:
+        for claim in claims:
+            owed = self.z3.Implies(path, self._term(claim.fact, values))
+            self.duties.append(Held(claim, owed))
 
     # ---- expressions -----------------------------------------------------------------------
 
@@ -187,16 +266,21 @@ class World:
         match condition:
             case Binary("and", left, right):
                 test = self._decided(left, values, path)
-                return z3.And(test, self._decided(right, values, z3.And(path, test)))
+                return z3.And(test, self._decided(right, values, self._and(path, test)))
             case Binary("or", left, right):
                 test = self._decided(left, values, path)
-                return z3.Or(test, self._decided(right, values, z3.And(path, z3.Not(test))))
+                return z3.Or(test, self._decided(right, values, self._and(path, z3.Not(test))))
             case Unary("not", Binary() as operand):
                 return z3.Not(self._decided(operand, values, path))
         return self._visited(id(condition), self._expr(condition, values, path), path)
 
+    def _and(self, path: Any, test: Any) -> Any:
+        """Return where a path goes on; none where a fact is looked at."""
+        return None if path is None else self.z3.And(path, test)
+
     def _visited(self, number: int, condition: Any, path: Any) -> Any:
-        self.visits.setdefault(number, []).append(Visit(condition, path))
+        if path is not None:
+            self.visits.setdefault(number, []).append(Visit(condition, path))
         return condition
 
     def _expr(self, expr: Expr, values: dict[str, Any], path: Any) -> Any:
@@ -223,7 +307,7 @@ class World:
                 return terms.compare(operator, *pair)
             case Select(condition, then, other):
                 test = self._decided(condition, values, path)
-                one = self._expr(then, values, z3.And(path, test))
-                return z3.If(test, one, self._expr(other, values, z3.And(path, z3.Not(test))))
+                one = self._expr(then, values, self._and(path, test))
+                return z3.If(test, one, self._expr(other, values, self._and(path, z3.Not(test))))
             case Call(function, arguments):
                 return terms.call(function, [self._expr(a, values, path) for a in arguments])

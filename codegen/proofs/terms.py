@@ -6,9 +6,10 @@ included. What + - * / and functions give is left open: any function of the same
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any
 
-from language.number import NumberType
+from language.number import LARGEST, NumberType
 
 Range = tuple[float, float]
 Limits = Range | frozenset[int]
@@ -23,7 +24,9 @@ class Terms:
 
         self.z3 = z3
         self.real = z3.FPSort(*((11, 53) if number == "float64" else (8, 24)))
+        self.largest = LARGEST[number]
         self.count = 0
+        self.products: dict[int, tuple[Any, Any, Any]] = {}
 
     def value(self, value: float | int | bool) -> Any:
         """Return a literal."""
@@ -44,6 +47,8 @@ class Terms:
     def within(self, value: Any, limits: Limits) -> Any:
         """Return whether a value is within limits."""
         z3 = self.z3
+        if isinstance(limits, frozenset) and z3.is_bool(value):
+            return z3.Or(*(value == bool(number) for number in sorted(limits)))
         if isinstance(limits, frozenset):
             return z3.Or(*(value == number for number in sorted(limits)))
         low, high = (self.value(float(end)) for end in limits)
@@ -56,12 +61,36 @@ class Terms:
     def sum(self, operator: str, left: Any, right: Any) -> Any:
         """Return what + - * / give."""
         if self.z3.is_fp(left):
-            return self.z3.Function(f"real {operator}", self.real, self.real, self.real)(
+            made = self.z3.Function(f"real {operator}", self.real, self.real, self.real)(
                 left, right
             )
+            if operator == "*":
+                self.products[made.get_id()] = made, left, right
+            return made
         if operator == "/":
             return self.new("whole", "quotient")
         return {"+": left + right, "-": left - right, "*": left * right}[operator]
+
+    def lemmas(self, facts: Collection[Any]) -> list[Any]:
+        """Return what is known of the products in some facts: one with a factor that is no larger
+        than 1 in size is no larger than the other factor, rounded or not.
+        """
+        z3 = self.z3
+        one, largest = self.value(1.0), self.value(self.largest)
+        found, seen, stack = [], set[int](), list(facts)
+        while stack:
+            part = stack.pop()
+            number = part.get_id()
+            if number in seen:
+                continue
+            seen.add(number)
+            stack += part.children()
+            if number in self.products:
+                made, *factors = self.products[number]
+                for a, b in (factors, factors[::-1]):
+                    is_known = z3.And(z3.fpLEQ(z3.fpAbs(a), one), z3.fpLEQ(z3.fpAbs(b), largest))
+                    found.append(z3.Implies(is_known, z3.fpLEQ(z3.fpAbs(made), z3.fpAbs(b))))
+        return found
 
     def compare(self, operator: str, left: Any, right: Any) -> Any:
         """Return a relation; with a NaN it is false, except `!=`."""
