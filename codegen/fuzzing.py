@@ -65,22 +65,6 @@ def fuzzed(
         return _run(app, runs, ticks * len(table), seed)
 
 
-def records_of(
-    program: Program, ranges: Mapping[str, Range], runs: int, ticks: int, seed: int
-) -> list[list[bytes]]:
-    """Return the sequences that libFuzzer tried as records of inputs, one for each tick.
-
-    The page is the default one. Raises ToolMissing, BuildError.
-    """
-    table = words(program, ranges)
-    record = struct.Struct(f"<{len(table) + 1}d")
-    tried = dict(fuzzed(program, ranges, runs, ticks, seed).tried)
-    return [
-        [record.pack(*values, 0.0) for values in values_of(program, table, sequence)]
-        for sequence in tried
-    ]
-
-
 def words(program: Program, ranges: Mapping[str, Range]) -> list[Words]:
     """Return what the bytes 0 to 255 mean for each input that a tick is fed."""
     return [_words(v, program, ranges.get(short(v.name))) for v in fed(program)]
@@ -137,10 +121,14 @@ def _tried(data: bytes) -> Iterator[tuple[bytes, int]]:
 
 
 def _words_header(table: list[Words]) -> str:
+    sizes = f"#define ABSOLUTE {ABSOLUTE}\n#define FIRST {SPREAD // 2}\n#define LONGEST {LONGEST}\n"
+    return sizes + table_text(table)
+
+
+def table_text(table: list[Words]) -> str:
     """Return the table as C: hexadecimal digits of each double."""
     rows = ",\n".join(f"    {{{', '.join(_literal(word) for word in own)}}}" for own in table)
-    sizes = f"#define ABSOLUTE {ABSOLUTE}\n#define FIRST {SPREAD // 2}\n#define LONGEST {LONGEST}\n"
-    return f"{sizes}static const double word[{len(table)}][{WORDS}] = {{\n{rows}\n}};\n"
+    return f"static const double word[{len(table)}][{WORDS}] = {{\n{rows}\n}};\n"
 
 
 def _literal(value: float) -> str:

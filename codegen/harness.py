@@ -75,15 +75,22 @@ def tunable(program: Program) -> tuple[Constant, ...]:
 
 
 def write_harness(
-    program: Program, folder: Path, machine: Machine = HOST, main: Main = LOCKSTEP
+    program: Program,
+    folder: Path,
+    machine: Machine = HOST,
+    main: Main = LOCKSTEP,
+    more: Mapping[str, object] | None = None,
 ) -> list[Path]:
-    """Write the C files of a program and a main around them; return the sources to compile."""
+    """Write the C files of a program and a main around them; return the sources to compile.
+
+    `more` is what the template of that main reads beside what each one does.
+    """
     (folder / "harness").mkdir(exist_ok=True)
     own = (*machine.files, *main.files)
     for name in (*INCLUDED, *own):
         shutil.copyfile(harness_file(name), folder / "harness" / name)
     files = c_files(program)
-    files["main.c"] = render(main.template, _context(program))
+    files["main.c"] = render(main.template, {**_context(program), **(more or {})})
     for name, text in files.items():
         (folder / name).write_text(text)
     names = (*files, *(f"harness/{name}" for name in own))

@@ -7,21 +7,20 @@ far as it was evaluated, and in the outcome (masking MC/DC, FAA CAST-6 2001; cla
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import re
-import struct
 import tempfile
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from codegen.build import FLAGS, run_executable
-from codegen.harness import fed, tunable, write_harness
+from codegen.exploring import write_explorer
+from codegen.harness import write_harness
 from codegen.machine import HOST
-from codegen.proofs.infeasible import never, places_of
+from codegen.proofs.infeasible import Place, never, places_of
 from codegen.proofs.terms import Range
 from codegen.source import STATIC, c_program
 from codegen.tool import output_of
@@ -29,10 +28,8 @@ from language.program import Program
 
 COMPILER, MERGER, EXPORTER = "clang-19", "llvm-profdata-19", "llvm-cov-19"
 COVERED = ("-fprofile-instr-generate", "-fcoverage-mapping", "-fcoverage-mcdc")
-APP, POOL, MERGED = "app", "counts_%1m.profraw", "counts.profdata"
+APP, EXPLORER, POOL, MERGED = "app", "explorer", "counts_%1m.profraw", "counts.profdata"
 FUNCTION = re.compile(rf"(?:{STATIC})?void (\w+)\(")
-Key = tuple[str, str]
-"""The block and the text of a decision."""
 CASE = re.compile(r"case\b|default\b")
 
 
@@ -53,6 +50,9 @@ class Decision:
         """How many conditions are neither shown nor proven to be infeasible."""
         pairs = zip(self.shown, self.never, strict=True)
         return sum(not shown and outcome is None for shown, outcome in pairs)
+
+
+T = TypeVar("T", Decision, Place)
 
 
 @dataclass(frozen=True)
@@ -91,70 +91,108 @@ def with_proofs(found: Covered, program: Program, ranges: Mapping[str, Range]) -
     `ranges` are those of its variables between two steps, as far as they stay in them.
     """
     made = c_program(program)
-    places: dict[Key, list[tuple[int, ...]]] = {}
-    for place in places_of(made):
-        places.setdefault((place.block, place.text), []).append(place.conditions)
-    missed = {(decision.block, decision.text) for decision in found.missed}
-    wanted = [n for key, all_of in places.items() if key in missed for of in all_of for n in of]
+    places = _by_block(places_of(made))
+    decisions = _by_block(found.decisions)
+    missed = [block for block, of in decisions.items() if any(not all(d.shown) for d in of)]
+    wanted = [n for block in missed for place in places.get(block, ()) for n in place.conditions]
     proven = never(made, ranges, wanted)
-    counts = Counter((decision.block, decision.text) for decision in found.decisions)
-    decisions = []
-    for decision in found.decisions:
-        key = decision.block, decision.text
-        all_of = places.get(key, [])
-        claimed = _claimed(all_of, proven, decision) if len(all_of) >= counts[key] else ()
-        decisions.append(dataclasses.replace(decision, never=claimed or decision.never))
-    return dataclasses.replace(found, decisions=tuple(decisions))
+    claimed = {
+        id(decision): _claimed(at, proven, decision)
+        for block in missed
+        for decision, at in _placed(decisions[block], places.get(block, []))
+    }
+    replaced = (replace(d, never=claimed.get(id(d)) or d.never) for d in found.decisions)
+    return replace(found, decisions=tuple(replaced))
+
+
+def _by_block(things: Iterable[T]) -> dict[str, list[T]]:
+    found: dict[str, list[T]] = {}
+    for thing in things:
+        found.setdefault(thing.block, []).append(thing)
+    return found
+
+
+def _placed(
+    decisions: Sequence[Decision], places: Sequence[Place]
+) -> Iterator[tuple[Decision, list[Place]]]:
+    """Yield the decisions of a block with their places: where both are the same in the same order,
+    each has one, else all that have its text, unless there are fewer of these than of decisions.
+    """
+    if [d.text for d in decisions] == [place.text for place in places]:
+        yield from ((d, [place]) for d, place in zip(decisions, places, strict=True))
+        return
+    counts = Counter(d.text for d in decisions)
+    for decision in decisions:
+        found = [place for place in places if place.text == decision.text]
+        yield decision, found if len(found) >= counts[decision.text] else []
 
 
 def _claimed(
-    places: Sequence[tuple[int, ...]], proven: Mapping[int, bool], decision: Decision
+    places: Sequence[Place], proven: Mapping[int, bool], decision: Decision
 ) -> tuple[bool | None, ...]:
-    """Return what is proven of each condition at all places of a block where it may stand: several
-    have the same text.
-    """
+    """Return what is proven of each condition at all places where it may stand."""
     found: list[bool | None] = []
     for position, shown in enumerate(decision.shown):
-        outcomes = {proven.get(of[position]) for of in places if len(of) == len(decision.shown)}
+        of = [place.conditions for place in places if len(place.conditions) == len(decision.shown)]
+        outcomes = {proven.get(conditions[position]) for conditions in of}
         found.append(outcomes.pop() if len(outcomes) == 1 and not shown else None)
     return tuple(found)
 
 
-def turned(program: Program, sequence: Sequence[bytes]) -> list[bytes]:
-    """Return a sequence with another page from its second record on: each tunable parameter at the
-    end of its range that it is not at.
-    """
-    page = []
-    for constant in tunable(program):
-        low, high = constant.range or (constant.value, constant.value)
-        page.append(float(high if constant.value == low else low))
-    head = struct.Struct(f"<{len(fed(program)) + 1}d")
-    values = head.unpack_from(sequence[1])
-    return [sequence[0], head.pack(*values[:-1], 1.0) + struct.pack(f"<{len(page)}d", *page)]
+def mcdc(
+    program: Program,
+    sequences: Sequence[Sequence[bytes]],
+    ways: Sequence[bytes] = (),
+    ranges: Mapping[str, Range] | None = None,
+) -> Covered:
+    """Run the C of a Program on sequences of input records, and on ways through it, and tell what
+    they show of it.
 
-
-def mcdc(program: Program, sequences: Sequence[Sequence[bytes]]) -> Covered:
-    """Run the C of a Program on sequences of input records and tell what they show of it.
-
-    Records are those of a `Tape`. Raises ToolMissing, BuildError.
+    Records are those of a `Tape`, ways those of `explored` with the same `ranges` of inputs.
+    Raises ToolMissing, BuildError.
     """
     file = f"{program.name}.c"
     with tempfile.TemporaryDirectory(prefix="modewright-") as name:
         folder = Path(name)
-        sources = [str(path) for path in write_harness(program, folder)]
-        flags = [*(flag for flag in FLAGS if flag != "-O2"), "-O1", *COVERED]
-        output_of([COMPILER, *flags, *sources, "-o", APP, *HOST.link(folder)], folder)
         counting = {"LLVM_PROFILE_FILE": str(folder / POOL)}  # a run adds to what is there
+        app = _built(write_harness(program, folder), folder, HOST.link(folder))
         for sequence in sequences:
-            run_executable(folder / APP, b"".join(sequence), counting)
+            run_executable(app, b"".join(sequence), counting)
+        steps = sum(map(len, sequences))
+        if ways:
+            steps += _go(ways, program, ranges or {}, folder, counting)
         pools = sorted(path.name for path in folder.glob("counts_*.profraw"))
         output_of([MERGER, "merge", "-sparse", *pools, "-o", MERGED], folder)
         command = [EXPORTER, "export", APP, f"-instr-profile={MERGED}", str(folder / file)]
         found = json.loads(output_of(command, folder))
         text = (folder / file).read_text().split("\n")
     (counted,) = found["data"][0]["files"]
-    steps = sum(map(len, sequences))
-    return Covered(file, len(sequences), steps, tuple(_decisions(program.name, counted, text)))
+    decisions = tuple(_decisions(program.name, counted, text))
+    return Covered(file, len(sequences) + len(ways), steps, decisions)
+
+
+def _built(sources: Sequence[Path], folder: Path, link: Sequence[str], app: str = APP) -> Path:
+    flags = [*(flag for flag in FLAGS if flag != "-O2"), "-O1", *COVERED]
+    output_of([COMPILER, *flags, *map(str, sources), "-o", app, *link], folder)
+    return folder / app
+
+
+def _go(
+    ways: Sequence[bytes],
+    program: Program,
+    ranges: Mapping[str, Range],
+    folder: Path,
+    counting: Mapping[str, str],
+) -> int:
+    """Go some ways through the C of a Program; return how many steps these are."""
+    sources = write_explorer(program, ranges, folder)
+    app = _built(sources, folder, ("-DALONE", "-lm"), EXPLORER)
+    names = []
+    for number, way in enumerate(ways):
+        names.append(str(folder / f"{number}.way"))
+        Path(names[-1]).write_bytes(way)
+    (done,) = output_of([str(app), *names], folder, counting).split()
+    return int(done)
 
 
 def _decisions(name: str, counted: dict[str, Any], text: Sequence[str]) -> Iterator[Decision]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from codegen.comment import comment as safe
@@ -13,6 +13,19 @@ from language.number import NumberType, decimal
 from language.program import MODE, Constant, Program, Variable
 from language.units import shown_unit
 
+SOLVED = {
+    "A": "the linear part of the rates",
+    "E": "e^(A h), h the whole step",
+    "F": "the integral of e^(A t) over the whole step",
+    "Eh": "e^(A h/2)",
+    "Fh": "the integral of e^(A t) over half of the step",
+    "Phi": "e^(A T) of the observer, T the period",
+    "Gamma": "what inputs that are held over the period add to the states",
+    "G": "what f that is held over the period adds to the states",
+    "C": "measurements by states",
+    "L": "the gain of the correction",
+}
+"""Matrices of solved numbers, by their letter."""
 GROUPS = {
     "state": "",
     "discrete": "discrete variables",
@@ -54,6 +67,7 @@ class Field:
     comment: str
     value: str = ""
     size: int = 0
+    title: str = ""
 
 
 def page_of(program: Program) -> list[Field]:
@@ -64,7 +78,7 @@ def page_of(program: Program) -> list[Field]:
 def members(program: Program, page: Page) -> dict[str, Any]:
     """The members of the structures."""
     number, constants, variables = program.number, program.constants, program.variables
-    solved = [_constant(c, number) for c in constants if c.kind == "solved"]
+    solved = _solved([c for c in constants if c.kind == "solved"], number)
     return {
         "calibration": page_of(program),
         "derived": [_constant(c, number) for c in constants if c.kind == "derived"],
@@ -88,6 +102,21 @@ def field_of(variable: Variable, number: NumberType) -> Field:
         comment = f"{shown_unit(variable.unit)}; {variable.about}"
     member = c_member(variable.name)
     return Field(c_type(variable, number), member, safe(comment), size=variable.size)
+
+
+def _solved(constants: list[Constant], number: NumberType) -> list[Field]:
+    """Return solved numbers, `solved.<mode>_<letter>.<row>.<column>` where they are of a matrix,
+    the first of each with its title.
+    """
+    begun = {""}
+    found = []
+    for constant in constants:
+        group, *entry = constant.name.split(".")[1:]
+        about = SOLVED.get(group.rpartition("_")[2], "") if entry else ""
+        title = safe(f"{group}_row__column: {about}") if about else ""
+        found.append(replace(_constant(constant, number), title="" if title in begun else title))
+        begun.add(title)
+    return found
 
 
 def _constant(constant: Constant, number: NumberType) -> Field:

@@ -17,7 +17,7 @@ PURPOSES = {
     "elapse": "Time passes: what is left of the step and of waits",
     "equations": "Equations[ of mode {}]",
     "guards": "Guards[ of mode {}]",
-    "half": "States halfway through a step, if it is a whole one[, in mode {}]: Eh x + Fh pull",
+    "half": "States halfway through the whole step[, in mode {}]: Eh x + Fh pull",
     "hear": "Decides between the wishes of regions[: {}]",
     "jump": "Transitions[ of mode {}]: the first one that is due is taken",
     "keep": "Keeps the values that are read later: delays, and ticks that are looked back to",
@@ -32,7 +32,7 @@ PURPOSES = {
     "micro_step": "One micro-step: choose, leave, reset, enter",
     "move": "Flows[ in mode {}] over work->h, or until a guard turns true",
     "point": "States at work->s after the start of the step: its polynomial",
-    "predict": "Prediction of the observer[ in mode {}] over one period",
+    "predict": "Prediction of the observer[ in mode {}] over one period; f_*: rates less A x + B u",
     "pull": "What of the rates[ in mode {}] is not linear in the states: pull = rate - A x",
     "quit": "Leaves region[ {}] with all that is active in it",
     "rates": "Rates of the states[ in mode {}]",
@@ -41,7 +41,7 @@ PURPOSES = {
     "run": "The model over one tick[, in mode {}]",
     "segment": "One piece of the step: flow, then what is due at its end",
     "select_transitions": "The transitions of one micro-step",
-    "series": "Coefficients of the polynomial through the step[ in mode {}]",
+    "series": "Coefficients of the polynomial through the step[ in mode {}], 0 of what rests",
     "settle": "Transitions until none is enabled",
     "spread": "The covariance over one period[: {}]",
     "late": "What a change of an input at an unknown instant has done[: {}]",
@@ -53,7 +53,7 @@ PURPOSES = {
     "until": "Whether `until` holds[, for transition {}]",
     "update": "Updates[ of mode {}], from the values of this tick",
     "watch": "What each guard is now",
-    "whole": "States at the end of a step, if it is a whole one[, in mode {}]: E x + F pull",
+    "whole": "States at the end of the whole step[, in mode {}]: E x + F pull",
 }
 """By the words that the name of a block begins with; `{}` is what follows them, and what stands in
 brackets is said where something does.

@@ -30,6 +30,7 @@ from codegen.purpose import purpose
 from codegen.rendering import render, version
 from codegen.scratch import STEP, Scratch, scratch_of, with_own
 from codegen.statement import INDENT, WIDTH, Writer
+from codegen.unread import without_unread
 from codegen.usage import Usage, locals_of, turning, usages
 from language.functions import FUNCTIONS_OF
 from language.invariant import GROUP, INVARIANTS
@@ -79,7 +80,7 @@ def c_files(program: Program, by_amount: bool = True) -> dict[str, str]:
 
 def c_program(program: Program, by_amount: bool = True) -> Program:
     """Return the Program that C is printed of: the same bits, in the way that suits C."""
-    return leaping(gated(stepped(program), by_amount))
+    return leaping(gated(without_unread(stepped(program), ("work.",)), by_amount))
 
 
 def stepped(program: Program) -> Program:

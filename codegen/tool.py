@@ -61,9 +61,11 @@ def told(
         raise BuildError(f"{tool} was not done after {SECONDS} s") from None
 
 
-def output_of(command: Sequence[str], folder: Path) -> str:
-    """Return what a tool prints. Raises ToolMissing; BuildError with what it said."""
-    done = told(command, folder)
+def output_of(command: Sequence[str], folder: Path, more: Mapping[str, str] | None = None) -> str:
+    """Return what a tool prints, with `more` in its environment. Raises ToolMissing; BuildError
+    with what it said.
+    """
+    done = told(command, folder, more)
     if done.returncode:
         raise BuildError(done.stderr.strip() or f"{command[0]} ended with {done.returncode}")
     return done.stdout

@@ -165,8 +165,9 @@ def activation_variables(automaton: Automaton) -> list[Variable]:
         kind = value_type_of(automaton, edge)
         seen = "value" if edge.is_change else "opposite"
         found.append(Variable(edge.opposite, "truth", about=f"{seen} seen in `{edge.mode}`"))
-        found.append(Variable(f"work.level_{edge.number}", kind))
-        found.append(Variable(f"work.edge_{edge.number}", "truth"))
+        about = "what is looked at for an edge"
+        found.append(Variable(f"work.level_{edge.number}", kind, about=about))
+        found.append(Variable(f"work.edge_{edge.number}", "truth", about="that edge is now"))
         if edge.is_change:
             about = f"value of the tick before in `{edge.mode}`"
             found.append(Variable(f"memory.last_{edge.number}", kind, about=about))

@@ -57,7 +57,7 @@ FUNCTIONS: Mapping[str, str] = {
     "ln": "`log(x)` is the natural logarithm",
     "log10": "`log(x) / log(10)`",
     "log2": "`log(x) / log(2)`",
-    **dict.fromkeys(("pow", "power"), "`x^2` for a whole power, else `exp(2.5 * log(x))`"),
+    "power": "`x^2` for a whole power, else `pow(x, 2.5)`",
     "atan": "`atan2(y, x)`: of a number x it is `atan2(x, 1)`",
     "send": "events are raised by a transition: `raise: name`",
 }

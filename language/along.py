@@ -118,6 +118,9 @@ class Along:
                 return divide(change, multiply(real(2.0), whole))
             case "log":
                 return divide(change, first)
+            case "pow":
+                base = _times(multiply(arguments[1], _lower(first, arguments[1])), change)
+                return _sum(base, _times(multiply(whole, Call("log", (first,))), changes[1]))
             case "sin":
                 return _times(Call("cos", (first,)), change)
             case "cos":
@@ -127,6 +130,10 @@ class Along:
             case "tanh":
                 return _times(subtract(real(1.0), multiply(whole, whole)), change)
         raise NoRate(function)
+
+
+def _lower(base: Expr, degree: Expr) -> Expr:
+    return Call("pow", (base, subtract(degree, real(1.0))))
 
 
 def _negative(expr: Expr) -> Expr:

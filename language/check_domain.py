@@ -27,8 +27,20 @@ HELP = {
     "divisor": "exclude 0 by an enclosing `if`, or by `max(..., limit)`",
     "root": "`sqrt(max(..., 0))`, or exclude it by an enclosing `if`",
     "log": "`log(max(..., 0.001))`, or exclude it by an enclosing `if`",
+    "power": "`pow(max(..., 0), ...)`, or exclude it by an enclosing `if`",
+    "inverse power": "`pow(max(..., 0.001), ...)`, or exclude it by an enclosing `if`",
 }
-OUTSIDE: Mapping[str, Literal["==", "<", "<="]] = {"divisor": "==", "root": "<", "log": "<="}
+LABELS = {
+    "divisor": "this divisor may be 0",
+    "root": "this may be below 0, which has no square root",
+    "log": "this may be 0 or below, which has no logarithm",
+    "power": "this may be below 0, and `pow` takes bases of 0 and more",
+    "inverse power": "this may be 0 or below, which has no power of a degree below 0",
+}
+OUTSIDE: Mapping[str, Literal["==", "<", "<="]] = {
+    **{"divisor": "==", "root": "<", "log": "<="},
+    **{"power": "<", "inverse power": "<="},
+}
 """How what is outside of each domain compares with 0."""
 
 
@@ -148,11 +160,7 @@ class _ModeDomains:
         if self._is_excluded(what, tree):
             return
         span = f"{interval.low:.4g} to {interval.high:.4g}"
-        label = f"this divisor may be 0: it lies from {span}"
-        if what == "root":
-            label = f"this may be below 0, which has no square root: it lies from {span}"
-        if what == "log":
-            label = f"this may be 0 or below, which has no logarithm: it lies from {span}"
+        label = f"{LABELS[what]}: it lies from {span}"
         self.problems.error("domain", tree.span, label, HELP[what])
 
     def _is_excluded(self, what: str, tree: Tree) -> bool:

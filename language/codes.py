@@ -56,7 +56,7 @@ CODES: Mapping[str, tuple[str, str]] = {
     "overflow": ("MW311", "A whole number may leave its type."),
     "domain": (
         "MW312",
-        "A divisor may be 0, or a root or logarithm be one of what is below 0.",
+        "A divisor may be 0, or a root, a logarithm or a power be one of what is below 0.",
     ),
     "constant": ("MW313", "What has to be constant reads something that changes."),
     "loop": ("MW314", "Values follow from each other in a circle."),

@@ -52,6 +52,11 @@ def derivative(tree: Tree, name: str, at: At) -> Tree:
         case Application("atan2", (y, x), _):
             turn = minus(times(x, derivative(y, name, at)), times(y, derivative(x, name, at)))
             return over(turn, plus(power(x, 2), power(y, 2)))
+        case Application("pow", (base, degree), span):
+            lower = Application("pow", (base, minus(degree, number(1, span))), span)
+            by_base = times(times(degree, lower), derivative(base, name, at))
+            by_degree = times(times(tree, _call("log", base)), derivative(degree, name, at))
+            return plus(by_base, by_degree)
         case Application(function, (argument,), _) if function in OUTER:
             return times(OUTER[function](argument), derivative(argument, name, at))
         case _:
@@ -158,4 +163,4 @@ OUTER: Mapping[str, Callable[[Tree], Tree]] = {
     "tan": lambda u: plus(number(1, u.span), power(_call("tan", u), 2)),
 }
 """Derivative of each smooth function of one argument."""
-SMOOTH = {*OUTER, "atan2"}
+SMOOTH = {*OUTER, "atan2", "pow"}

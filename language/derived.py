@@ -53,7 +53,7 @@ def with_model(
             a=_formulas(a, f"{observer.key}.A"),
             b=_formulas(b, f"{observer.key}.B"),
             c=_formulas(c, f"{observer.key}.C"),
-            f={row: Formula(tree, f"{observer.key}.f.{row}") for row, tree in f.items()},
+            f={row: Formula(tree, f"{observer.key}.of") for row, tree in f.items()},
             g={row: Formula(tree, f"{observer.key}.g.{row}") for row, tree in g.items()},
             constants={
                 part: Formula(tree, f"{observer.key}.{part}")

@@ -95,6 +95,9 @@ LAMBERT_BELOW = (2027025.0, 945945.0, 51975.0, 630.0, 1.0)
 """x - tanh x = x z above(z) / below(z), z = x^2, within 2^-56.9 of x up to 0.625: Lambert's
 continued fraction x/(1 + z/(3 + z/(5 + ... + z/15))), whose coefficients are whole numbers."""
 
+PIECES = ("series", "centre", "upper")
+"""Locals of a series, four coefficients each."""
+
 X = Ref("work.x")
 
 
@@ -131,6 +134,22 @@ class Circle:
 
 
 @dataclass(frozen=True)
+class Powers:
+    """The numbers of exp in one type: within `lowest` and `highest` its value is normal.
+
+    `least` is the exponent of 2 at the lowest; `rounding` rounds to whole numbers.
+    """
+
+    lowest: Value
+    highest: Value
+    least: Value
+    per_ln_2: Value
+    ln_2: tuple[Value, Value]
+    series: tuple[float, ...]
+    rounding: Value
+
+
+@dataclass(frozen=True)
 class Lambert:
     """The numbers of tanh in one type: x - tanh x = x z above(z) / below(z), z = x^2.
 
@@ -162,7 +181,10 @@ def horner(coefficients: tuple[float, ...], x: Expr, rest: Expr | None = None) -
     return result
 
 
-def exponential() -> Function:
+POWERS = Powers(EXP_LOWEST, EXP_HIGHEST, real(-1021.0), PER_LN_2, LN_2, EXP_SERIES, ROUND)
+
+
+def exponential(of: Powers = POWERS) -> Function:
     """e^x = 2^k e^r, k whole, |r| <= ln 2 / 2 (Cody & Waite 1980, Software Manual).
 
     ln 2 has two parts; head = x - k ln2_1 is exact, r = head - tail, and the sum
@@ -170,20 +192,35 @@ def exponential() -> Function:
     x is clamped to [-708, 709]: the result is never infinite, zero or subnormal.
     """
     body = Body()
-    bounded = body.let("bounded", within(X, EXP_LOWEST, EXP_HIGHEST))
-    power = nearest(multiply(bounded, PER_LN_2))
+    bounded = body.let("bounded", within(X, of.lowest, of.highest))
+    body.let("y", raised(body, bounded, None, of))
+    span = f"{of.lowest.value:g} <= x <= {of.highest.value:g}"
+    return body.function("exp", f"e^x; {span}, clamped; error < 0.95 ULP")
+
+
+def raised(body: Body, bounded: Ref, rest: Expr | None, of: Powers) -> Expr:
+    """Return e^(bounded + rest), `bounded` within the bounds of exp and `rest` far smaller."""
+    power = nearest(multiply(bounded, of.per_ln_2), of.rounding)
     # The comparison is for NaN: pow2 gets a whole number always.
-    exponent = body.let("exponent", Select(Compare(">", bounded, EXP_LOWEST), power, real(-1021.0)))
-    head = body.let("head", subtract(bounded, multiply(exponent, LN_2[0])))
-    tail = body.let("tail", multiply(exponent, LN_2[1]))
+    is_known = Compare(">", bounded, of.lowest)
+    exponent = body.let("exponent", Select(is_known, power, of.least))
+    head = body.let("head", subtract(bounded, multiply(exponent, of.ln_2[0])))
+    low = multiply(exponent, of.ln_2[1])
+    tail = body.let("tail", low if rest is None else subtract(low, rest))
     r = body.let("r", subtract(head, tail))
-    upper = body.let("upper", horner(EXP_SERIES[7:], r))
-    middle = body.let("middle", horner(EXP_SERIES[4:7], r, upper))
-    series = body.let("series", horner(EXP_SERIES[:4], r, middle))
+    series = pieced(body, of.series, r)
     curved = subtract(multiply(multiply(r, r), series), tail)
     scaled = body.let("scaled", add(real(1.0), add(head, curved)))
-    body.let("y", multiply(Call("pow2", (exponent,)), scaled))
-    return body.function("exp", "e^x; -708 <= x <= 709, clamped; error < 0.95 ULP")
+    return multiply(Call("pow2", (exponent,)), scaled)
+
+
+def pieced(body: Body, coefficients: tuple[float, ...], x: Expr) -> Expr:
+    """Return c0 + x (c1 + x (c2 + ...)), at most four coefficients a local."""
+    rest: Expr | None = None
+    for k in reversed(range(0, len(coefficients), 4)):
+        rest = body.let(PIECES[k // 4], horner(coefficients[k : k + 4], x, rest))
+    assert rest is not None
+    return rest
 
 
 def reduced(body: Body) -> tuple[Ref, Ref, Ref]:

@@ -7,20 +7,17 @@ in ULP of the exact result, were measured at every float32 of the domain (tests/
 
 from __future__ import annotations
 
-from language.elementary import Body, Circle, Lambert, X, horner, nearest, quartered, within
+from language.elementary import Body, Circle, Lambert, Powers, horner, quartered
 from language.logarithm import SERIES_SINGLE, Binades
 from language.number import LARGEST
 from language.operation import (
-    Call,
-    Compare,
     Ref,
-    Select,
     add,
     multiply,
     real,
     subtract,
 )
-from language.program import Function
+from language.power import PowerNumbers
 from language.tangent import ArcNumbers
 
 ROUND = real(1.5 * 2.0**23)
@@ -70,23 +67,6 @@ LAMBERT_BELOW = (945.0, 420.0, 15.0)
 continued fraction x/(1 + z/(3 + z/(5 + z/(7 + z/9))))."""
 
 
-def exponential() -> Function:
-    """e^x = 2^k e^r, k whole, |r| <= ln 2 / 2, as in elementary.py; x is clamped to [-87, 88]."""
-    body = Body()
-    bounded = body.let("bounded", within(X, EXP_LOWEST, EXP_HIGHEST))
-    power = nearest(multiply(bounded, PER_LN_2), ROUND)
-    # The comparison is for NaN: pow2 gets a whole number always.
-    exponent = body.let("exponent", Select(Compare(">", bounded, EXP_LOWEST), power, real(-126.0)))
-    head = body.let("head", subtract(bounded, multiply(exponent, LN_2[0])))
-    tail = body.let("tail", multiply(exponent, LN_2[1]))
-    r = body.let("r", subtract(head, tail))
-    series = body.let("series", horner(EXP_SERIES, r))
-    curved = subtract(multiply(multiply(r, r), series), tail)
-    scaled = body.let("scaled", add(real(1.0), add(head, curved)))
-    body.let("y", multiply(Call("pow2", (exponent,)), scaled))
-    return body.function("exp", "e^x; -87 <= x <= 88, clamped; error < 0.95 ULP")
-
-
 def reduced(body: Body) -> tuple[Ref, Ref, Ref]:
     """Return (quadrant 0 1 2 3, head, tail): x is head + tail past a multiple of pi/2.
 
@@ -122,6 +102,7 @@ def kernels(body: Body, head: Ref, tail: Ref) -> tuple[Ref, Ref]:
 
 
 CIRCLE = Circle(reduced, kernels, TINY, "1000")
+POWERS = Powers(EXP_LOWEST, EXP_HIGHEST, real(-126.0), PER_LN_2, LN_2, EXP_SERIES, ROUND)
 LAMBERT = Lambert(LAMBERT_ABOVE, LAMBERT_BELOW, TANH_FULL, TINY)
 ARC = ArcNumbers(
     series=(
@@ -162,3 +143,4 @@ BINADES = Binades(
     -126, (64, 32, 16, 8, 4, 2, 1), LARGEST["float32"], 1.4142135381698608, SERIES_SINGLE, LN_2
 )
 """Of log in float32."""
+POWER = PowerNumbers("float32", BINADES, POWERS, 6, 2.0**12 + 1.0)

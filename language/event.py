@@ -99,5 +99,9 @@ def happens(chart: Chart, transition: Transition) -> Expr | None:
 
 def event_variables(size: int) -> list[Variable]:
     """Return the queue of a tick."""
-    found = [Variable(ref.name, "whole") for ref in (HEAD, TAIL, EVENT)]
+    found = [
+        Variable(HEAD.name, "whole", about="place in the queue of the event that is heard next"),
+        Variable(TAIL.name, "whole", about="place in the queue of the event that is raised next"),
+        Variable(EVENT.name, "whole", about="event that is heard in this micro-step, 0: none"),
+    ]
     return [*found, Variable(QUEUE, "whole", size=max(size, 1), about="events that wait")]

@@ -45,6 +45,7 @@ from language.operation import (
 from language.problem import Problems, Span
 from language.program import Constant, Variable
 from language.taylor import in_ranges, largest, row_sum_norm, taylor_terms
+from language.units import per_second
 
 LARGEST_NORM = 4.0
 """|A h| up to which the Taylor sum is accurate and short (docs/language.md, section 9)."""
@@ -120,7 +121,7 @@ def linear_motion(
     for name in field.automaton.modes:
         made[f"series_{name}"] = _series(field, name, solved, terms)
     variables = [
-        Variable(f"work.pull_{name}", "real", f"({state.unit.dimension})/s")
+        Variable(f"work.pull_{name}", "real", str(per_second(state.unit.dimension)))
         for name, state in field.automaton.states.items()
     ]
     number = Variable("work.order", "real", about="order of a term")
@@ -246,6 +247,7 @@ def _series(field: Field, mode: str, solved: Solved, terms: int) -> Block:
     before: dict[str, Expr] = {name: Item(f"work.series_{name}", index) for name in field.states}
     body: list[Op] = [Assign("work.order", add(order, real(1.0)))]
     for i, name in enumerate(field.states):
-        value = divide(total(_row(field, mode, "A", a, i, before)), order)
+        products = _row(field, mode, "A", a, i, before)
+        value = divide(total(products), order) if products else real(0.0)
         body.append(Store(f"work.series_{name}", add(index, whole(1)), value))
     return (*ops, Loop(max(0, terms - 1), "work.term", tuple(body)))

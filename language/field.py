@@ -38,7 +38,11 @@ from language.region import (
     transitions,
 )
 from language.turning import levels, turned
+from language.units import per_second
 from language.wiring import equation_variables
+
+ALWAYS = Value(True)
+"""Of a transition that is taken where no other one is."""
 
 
 @dataclass(frozen=True)
@@ -89,11 +93,14 @@ def field_variables(field: Field) -> list[Variable]:
     """Return the work variables that the blocks of a field use."""
     found = []
     for state, thing in field.automaton.states.items():
-        unit = str(thing.unit.dimension)
-        found.append(Variable(f"work.at_{state}", "real", unit))
-        found.append(Variable(f"work.rate_{state}", "real", f"({unit})/s"))
+        dimension = thing.unit.dimension
+        about = "where it is evaluated"
+        found.append(Variable(f"work.at_{state}", "real", str(dimension), about=about))
+        found.append(
+            Variable(f"work.rate_{state}", "real", str(per_second(dimension)), about=about)
+        )
     found += equation_variables(field.automaton, "work.at_")
-    about = "a guard of the active mode, in the order of its transitions"
+    about = "a guard of the mode that flows, in the order of its transitions"
     found += [Variable(f"work.guard_{slot}", "truth", about=about) for slot in field.slots]
     found += action_variables(field.automaton)
     return found
@@ -154,7 +161,7 @@ def jump(mode: Mode, enabled: Mapping[int, Expr], fire: Mapping[int, Block]) -> 
     """Return the choice of one transition: the enabled one with the smallest priority."""
     ops: Block = ()
     for k, _ in reversed(by_priority(mode)):
-        ops = (Branch(enabled[k], fire[k], ops),)
+        ops = fire[k] if enabled[k] == ALWAYS else (Branch(enabled[k], fire[k], ops),)
     return ops
 
 

@@ -22,7 +22,7 @@ SAME = {"abs": 1, "min": 2, "max": 2, "clip": 3}
 """Functions whose arguments and value have one dimension, with their number of arguments."""
 MOST_LAYERS = 4
 """Functions of whole numbers inside each other: each holds copies of what is inside."""
-NUMBERS = {"exp": 1, "log": 1, "tanh": 1, "floor": 1, "sign": 1}
+NUMBERS = {"exp": 1, "log": 1, "tanh": 1, "floor": 1, "sign": 1, "pow": 2}
 ANGLES = {"sin": 1, "cos": 1, "tan": 1}
 ARGUMENTS = {**SAME, **NUMBERS, **ANGLES, "sqrt": 1, "atan2": 2}
 KNOWN = (*ARGUMENTS, *MEMORY, "lookup", "in", "der")
@@ -103,10 +103,12 @@ def _elementary(
         return result
     if name == "sign":
         return NUMBER
-    fine = first.is_bare and (first.angle is None or first.angle == (name in ANGLES))
-    if not fine and not is_zero(tree.arguments[0]):
-        want = "an angle" if name in ANGLES else "a number"
-        check.report("dimension", tree.span, f"`{name}` takes {want}, this is in `{first.shown}`")
+    want, angle = ("an angle", 1) if name in ANGLES else ("a number", 0)
+    for argument, kind in zip(tree.arguments, kinds, strict=True):
+        fine = kind.is_bare and kind.angle in (None, angle)
+        if not fine and not is_zero(argument):
+            label = f"`{name}` takes {want}, this is in `{kind.shown}`"
+            check.report("dimension", tree.span, label)
     return NUMBER
 
 

@@ -8,18 +8,29 @@ from language import elementary_single as of_single
 from language.elementary import cosine, exponential, hyperbolic_tangent, sine
 from language.logarithm import logarithm
 from language.number import NumberType
+from language.power import power_of
 from language.program import Function
 from language.tangent import angle_of, tangent
 
-MADE = (sine(), cosine(), exponential(), hyperbolic_tangent(), tangent(), angle_of(), logarithm())
+MADE = (
+    sine(),
+    cosine(),
+    exponential(),
+    hyperbolic_tangent(),
+    tangent(),
+    angle_of(),
+    logarithm(),
+    power_of(),
+)
 MADE_SINGLE = (
     sine(of_single.CIRCLE),
     cosine(of_single.CIRCLE),
-    of_single.exponential(),
+    exponential(of_single.POWERS),
     hyperbolic_tangent(of_single.LAMBERT),
     tangent(of_single.CIRCLE),
     angle_of(of_single.ARC),
     logarithm(of_single.BINADES),
+    power_of(of_single.POWER),
 )
 FUNCTIONS: Mapping[str, Function] = {function.name: function for function in MADE}
 """In float64; a function that calls another one (tanh calls exp) comes after it."""

@@ -181,6 +181,11 @@ class Ranging:
             self.report("root", tree.arguments[0], parts[0])
         if self.report and name == "log" and parts[0].low <= 0.0:
             self.report("log", tree.arguments[0], parts[0])
+        if self.report and name == "pow":
+            may_divide = parts[1].low < 0.0
+            if parts[0].low < 0.0 or (may_divide and parts[0].low == 0.0):
+                kind = "inverse power" if may_divide else "power"
+                self.report(kind, tree.arguments[0], parts[0])
         return _function(name, parts)
 
     def _limited(self, condition: Tree, holds: bool, limits: Limits) -> Limits:
@@ -276,6 +281,9 @@ def _function(name: str, parts: list[Interval]) -> Interval:
             return Interval(math.sqrt(max(first.low, 0.0)), math.sqrt(max(first.high, 0.0)), known)
         case "exp":
             return Interval(_exponential(first.low), _exponential(first.high), known)
+        case "pow":
+            base = Interval(max(first.low, 0.0), max(first.high, 0.0), first.known)
+            return _corners(base, parts[1], _to_power)
         case "log":
             return Interval(_logarithm(first.low), _logarithm(first.high), known)
         case "sin" | "cos" | "tanh" | "sign":
@@ -292,6 +300,13 @@ def _function(name: str, parts: list[Interval]) -> Interval:
 
 def _logarithm(value: float) -> float:
     return math.log(min(max(value, sys.float_info.min), sys.float_info.max))
+
+
+def _to_power(base: float, degree: float) -> float:
+    power = degree * _logarithm(base)
+    if base <= 0.0 < degree:
+        return 0.0
+    return _exponential(power) if power == power else 1.0  # 1 to an infinity
 
 
 def _exponential(value: float) -> float:

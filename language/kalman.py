@@ -38,6 +38,7 @@ from language.parameter import tunables_of
 from language.problem import Problems
 from language.program import Constant, ObserverInfo, Variable
 from language.riccati import discrete_noise, steady_gain
+from language.units import per_second
 
 
 @dataclass(frozen=True)
@@ -119,9 +120,9 @@ def observer_variables(automaton: Automaton) -> list[Variable]:
         if mode.observer is None:
             continue
         for name in mode.observer.states:
-            unit = str(automaton.states[name].unit.dimension)
-            found[f"p{name}"] = Variable(f"work.predicted_{name}", "real", unit)
-            found[f"f{name}"] = Variable(f"work.f_{name}", "real", f"({unit})/s")
+            dimension = automaton.states[name].unit.dimension
+            found[f"p{name}"] = Variable(f"work.predicted_{name}", "real", str(dimension))
+            found[f"f{name}"] = Variable(f"work.f_{name}", "real", str(per_second(dimension)))
         for name in mode.observer.measures:
             unit = str(automaton.inputs[name].unit.dimension)
             about = f"{name} minus its prediction, 0 where there is no new value"

@@ -12,6 +12,7 @@ from language.elementary import LN_2, Body, X, horner, within
 from language.number import LARGEST
 from language.operation import (
     Compare,
+    Expr,
     Ref,
     Select,
     Value,
@@ -75,8 +76,21 @@ def logarithm(of: Binades = DOUBLE) -> Function:
     power of two; then halving finds k. x is clamped to the normal numbers above 0.
     """
     body = Body()
+    k, f = halved(body, X, of)
+    s = body.let("s", divide(f, add(real(2.0), f)))
+    square = body.let("square", multiply(s, s))
+    series = body.let("series", multiply(square, horner(of.series, square)))
+    half = body.let("half", multiply(multiply(real(0.5), f), f))
+    tail = add(multiply(s, add(half, series)), multiply(k, of.ln_2[1]))
+    body.let("y", subtract(multiply(k, of.ln_2[0]), subtract(subtract(half, tail), f)))
+    about = f"natural logarithm; 2^{of.lowest} <= x, clamped; error < 0.9 ULP"
+    return body.function("log", about)
+
+
+def halved(body: Body, x: Expr, of: Binades) -> tuple[Ref, Ref]:
+    """Return (k, f): x within its bounds is 2^k (1 + f), sqrt 1/2 < 1 + f <= sqrt 2, exactly."""
     smallest = real(2.0**of.lowest)
-    m = body.let("bounded", within(X, smallest, real(of.largest)))
+    m = body.let("bounded", within(x, smallest, real(of.largest)))
     is_large = Compare(">=", m, real(1.0))
     k: Ref = body.let("k_0", Select(is_large, real(0.0), real(float(of.lowest))))
     m = body.let("m_0", Select(is_large, m, multiply(m, real(2.0**-of.lowest))))
@@ -87,11 +101,4 @@ def logarithm(of: Binades = DOUBLE) -> Function:
     is_below = Compare("<=", m, real(of.root_2))
     k = body.let("k", Select(is_below, k, add(k, real(1.0))))
     f = body.let("f", subtract(Select(is_below, m, multiply(real(0.5), m)), real(1.0)))
-    s = body.let("s", divide(f, add(real(2.0), f)))
-    square = body.let("square", multiply(s, s))
-    series = body.let("series", multiply(square, horner(of.series, square)))
-    half = body.let("half", multiply(multiply(real(0.5), f), f))
-    tail = add(multiply(s, add(half, series)), multiply(k, of.ln_2[1]))
-    body.let("y", subtract(multiply(k, of.ln_2[0]), subtract(subtract(half, tail), f)))
-    about = f"natural logarithm; 2^{of.lowest} <= x, clamped; error < 0.9 ULP"
-    return body.function("log", about)
+    return k, f

@@ -70,9 +70,12 @@ def chart_variables(charting: Charting) -> list[Variable]:
     for node in charting.chart.nodes[ROOT + 1 :]:
         about = f"what `{node.path}` was left in"
         found.append(Variable(kept(node).name, "whole", about=about))
-        found += [Variable(flag(node).name, "truth") for flag in (leaves_flag, enters_flag)]
-    found += [Variable(name, "whole") for name in (STEPS.name, TURN)]
-    found += [Variable(BUSY.name, "truth")]
+        for verb, flag in (("left", leaves_flag), ("entered", enters_flag)):
+            about = f"`{node.path}` is {verb} in this micro-step"
+            found.append(Variable(flag(node).name, "truth", about=about))
+    found.append(Variable(STEPS.name, "whole", about="micro-steps of this tick"))
+    found.append(Variable(TURN, "whole"))
+    found.append(Variable(BUSY.name, "truth", about="another micro-step follows"))
     size = _log_size(charting)
     about = "transitions of this tick, 0 after those of a micro-step"
     found.append(Variable(LOG, "whole", size=size, about=about))

@@ -24,6 +24,7 @@ from language.operation import (
     whole,
 )
 from language.program import Variable
+from language.units import per_second
 
 TERMS = 2
 
@@ -35,7 +36,7 @@ def midpoint(field: Field) -> Method:
         blocks[f"step_{name}"] = _step(field, name)
         blocks[f"series_{name}"] = _series(field)
     variables = [
-        Variable(f"work.{what}_{name}", "real", f"({state.unit.dimension})/s")
+        Variable(f"work.{what}_{name}", "real", str(per_second(state.unit.dimension)))
         for what in ("first", "middle")
         for name, state in field.automaton.states.items()
     ]

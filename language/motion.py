@@ -36,6 +36,7 @@ from language.operation import (
 )
 from language.program import Constant, Variable
 from language.region import slots
+from language.units import per_second
 
 MERGE_ULPS = 4096
 """Events nearer than this are one instant (rule 10): rounding moves a crossing by some ten ULPs."""
@@ -110,10 +111,12 @@ def motion_variables(field: Field, method: Method) -> list[Variable]:
         *(Variable(f"work.guard_{k}_at_high", "truth") for k in field.slots),
     ]
     for name, state in field.automaton.states.items():
-        unit = str(state.unit.dimension)
-        found.append(Variable(f"work.end_{name}", "real", unit))
-        found.append(Variable(f"work.sum_{name}", "real", f"({unit})/s"))
-        found.append(Variable(f"work.series_{name}", "real", unit, size=method.terms))
+        dimension = state.unit.dimension
+        unit, rate = str(dimension), str(per_second(dimension))
+        found.append(Variable(f"work.end_{name}", "real", unit, about="at the end of the step"))
+        found.append(Variable(f"work.sum_{name}", "real", rate))
+        about = "factor of s; those of s^2, s^3, ... have one more 1/s each"
+        found.append(Variable(f"work.series_{name}", "real", rate, about=about, size=method.terms))
     return [*found, *method.variables]
 
 

@@ -23,6 +23,7 @@ from language.operation import (
     whole,
 )
 from language.program import Variable
+from language.units import per_second
 
 TERMS = 3
 
@@ -34,12 +35,12 @@ def rk4(field: Field) -> Method:
         blocks[f"step_{name}"] = _step(field, name)
         blocks[f"series_{name}"] = _series(field, name)
     variables = [
-        Variable(f"work.k{stage}_{name}", "real", f"({state.unit.dimension})/s")
+        Variable(f"work.k{stage}_{name}", "real", str(per_second(state.unit.dimension)))
         for stage in (1, 2, 3, 4)
         for name, state in field.automaton.states.items()
     ]
     slopes = [
-        Variable(f"work.slope_{name}", "real", f"({state.unit.dimension})/s")
+        Variable(f"work.slope_{name}", "real", str(per_second(state.unit.dimension)))
         for name, state in field.automaton.states.items()
     ]
     return Method(blocks, TERMS, (), (*variables, *slopes))

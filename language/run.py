@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from language.check_memory import uses_memory
 from language.evaluate import Scalar
 from language.field import (
+    ALWAYS,
     Field,
     at_state,
     by_mode,
@@ -48,6 +49,7 @@ from language.parallel import Selection, parallel_blocks, parallel_step
 from language.parameter import constant_names, typed
 from language.problem import Problems
 from language.program import Constant, MotionInfo, Variable, mode_variable
+from language.region import by_priority
 from language.syntax import form
 from language.wiring import enter_initial
 
@@ -212,7 +214,10 @@ def _switches(field: Field, problems: Problems) -> dict[str, Block]:
 
 
 def _switch(field: Field, mode: Mode) -> Block:
+    """A crossing is located where a guard is true: if none of the others is, the last one is."""
     enabled: dict[int, Expr] = {k: Ref(f"work.guard_{k}") for k in range(len(mode.transitions))}
+    for k, _ in by_priority(mode)[-1:]:
+        enabled[k] = ALWAYS
     return switch(field, mode, enabled, {})
 
 

@@ -67,11 +67,20 @@ def selection_variables(charting: Charting) -> list[Variable]:
     """Return the variables of wishes and of what is taken."""
     found = []
     for region in charting.chart.regions:
-        found += [Variable(make(region.region), "whole") for make in (wish, taken)]
-        found += [Variable(name(region), "whole") for name in (_low, _high)]
-        found.append(Variable(_heard(region), "truth"))
-    found += [Variable("work.keeps", "truth"), Variable(FIRST.name, "truth")]
-    return [*found, Variable(OVER.name, "truth")]
+        name = region.region
+        found += [
+            Variable(wish(name), "whole", about="transition that the region wishes for, 0: none"),
+            Variable(taken(name), "whole", about="transition that it takes, 0: none"),
+            Variable(_low(region), "whole", about="first node of what its wish leaves"),
+            Variable(_high(region), "whole", about="last node of what its wish leaves"),
+            Variable(_heard(region), "truth", about="its wish was decided on"),
+        ]
+    return [
+        *found,
+        Variable("work.keeps", "truth", about="no transition that is taken leaves the same"),
+        Variable(FIRST.name, "truth", about="this is the first micro-step of the tick"),
+        Variable(OVER.name, "truth", about="no further micro-step is allowed"),
+    ]
 
 
 def _watched(charting: Charting, node: Node, mode: Mode) -> tuple[Block, Block]:

@@ -30,6 +30,7 @@ BOUNDS: Mapping[str, tuple[float, float]] = {
     "tanh": (-1.0, 1.0),
     "atan2": (-math.pi, math.pi),
     "exp": (0.0, math.inf),
+    "pow": (0.0, math.inf),
     "log": (-708.4, 709.8),
 }
 """What is known of functions that z3 has no theory of."""

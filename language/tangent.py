@@ -6,7 +6,7 @@ import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from language.elementary import CIRCLE, Body, Circle, X, by_quadrant, horner
+from language.elementary import CIRCLE, Body, Circle, X, by_quadrant, pieced
 from language.operation import (
     Call,
     Compare,
@@ -81,9 +81,6 @@ class ArcNumbers:
 
 
 DOUBLE = ArcNumbers(ATAN_SERIES, BASES, 2.0**1000, 2.0**-100, sys.float_info.max)
-PIECES = ("series", "centre", "upper")
-"""Locals of the series, four coefficients each."""
-
 RISE, RUN = Ref("work.rise"), Ref("work.run")
 
 
@@ -140,15 +137,6 @@ def angle_of(numbers: ArcNumbers = DOUBLE, error: str = "1.5") -> Function:
     body.let("y", Select(Compare("<=", up, real(0.0)), flat, half_turn))
     about = f"angle of (run, rise), in (-pi, pi] rad; error < {error} ULP"
     return body.function("atan2", about, ("rise", "run"))
-
-
-def pieced(body: Body, coefficients: tuple[float, ...], x: Expr) -> Expr:
-    """Return c0 + x (c1 + x (c2 + ...)), at most four coefficients a local."""
-    rest: Expr | None = None
-    for k in reversed(range(0, len(coefficients), 4)):
-        rest = body.let(PIECES[k // 4], horner(coefficients[k : k + 4], x, rest))
-    assert rest is not None
-    return rest
 
 
 def scaled(body: Body, numbers: ArcNumbers, smaller: Expr, larger: Expr) -> tuple[Ref, Ref]:

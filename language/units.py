@@ -156,6 +156,13 @@ def product(a: Dimension, b: Dimension, sign: int = 1) -> Dimension:
     return Dimension(powers, None)
 
 
+def per_second(a: Dimension) -> Dimension:
+    """Return the dimension of the rate of a quantity, whose power of the angle stays."""
+    if a == UNKNOWN:
+        return UNKNOWN
+    return Dimension(tuple(x - y for x, y in zip(a.powers, SECOND.powers, strict=True)), a.angle)
+
+
 def power(a: Dimension, exponent: int) -> Dimension:
     """Return the dimension of a^exponent."""
     if a.is_number or exponent == 1:

@@ -9,11 +9,11 @@ from pathlib import Path
 from codegen.asam import a2l as asam
 from codegen.can_database import FIRST, dbc as dbc_of
 from codegen.cmake import cmake_file
+from codegen.exploring import explored
 from codegen.fmi.archive import fmu as fmu_of
 from codegen.fmi.variable import Version
-from codegen.fuzzing import records_of
 from codegen.instructions import Instructions, instructions as counted
-from codegen.mcdc import Covered, mcdc as covered, turned, with_proofs
+from codegen.mcdc import Covered, mcdc as covered, with_proofs
 from codegen.metrics import Metrics, metrics as measured
 from codegen.proofs.all import CHECKS, proofs
 from codegen.proofs.proof import Proof
@@ -154,7 +154,7 @@ def mcdc(
     is_proven: bool = True,
 ) -> Covered:
     """Tell which conditions of the C of an automaton are shown to matter by the tests of the
-    project, and by `runs` sequences of libFuzzer; and, if that `is_proven`, which cannot be.
+    project, and by what libFuzzer finds in `runs`; and, if that `is_proven`, which cannot be.
 
     Raises SpecError; ValueError where there is nothing to run it on; ToolMissing, BuildError.
     """
@@ -162,14 +162,11 @@ def mcdc(
     sequences = [tape.inputs for tape in _tested(program, root, numbers)]
     if runs and not automaton.is_sampled:
         raise ValueError(f"{automaton.name} is continuous: sequences are those of sampled automata")
-    if runs:
-        sequences += records_of(program, _ranges(automaton), runs, TICKS, SEED)
-    if not sequences:
+    ways = explored(program, _ranges(automaton), runs, SEED) if runs else ()
+    if not sequences and not ways:
         hint = ": give it `--runs`" if automaton.is_sampled else ""
         raise ValueError(f"no test of the project runs {automaton.name} as it is{hint}")
-    if "compare_stamps" in program.blocks:
-        sequences += [turned(program, one) for one in sequences if len(one) > 1][:1]
-    found = covered(program, sequences)
+    found = covered(program, sequences, ways, _ranges(automaton))
     if not (is_proven and automaton.is_sampled):
         return found
     return with_proofs(found, program, _held(automaton, program))

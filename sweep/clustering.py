@@ -20,6 +20,8 @@ from sweep.processes import MOST_DEATHS
 
 SECONDS = 30.0
 """How long [s] a scheduler may take to answer, and the first worker to join."""
+ASKED = 4
+"""How often a scheduler is asked whose first answer comes with something else."""
 CLOSING = 5.0
 """How long [s] a connection may take to end."""
 TALKATIVE = ("distributed", "tornado", "asyncio")
@@ -72,13 +74,24 @@ def connected(
         security = _security(address, credentials)
         stack.enter_context(_quiet())
         try:
-            client = Client(where, security=security, timeout=seconds)
-        except (OSError, ValueError, RuntimeError) as error:
+            client = _client(where, security, seconds)
+        except (OSError, ValueError, RuntimeError, AssertionError) as error:
             reason = str(error).splitlines()[0] if str(error) else type(error).__name__
             raise ClusterError(f"{address.url}: no scheduler answers: {reason}") from None
         stack.callback(_end, client)
         _require_workers(client, staff, seconds)
         yield client
+
+
+def _client(where: Any, security: Security | None, seconds: float) -> Client:
+    """Return a client; a scheduler that is busy with another one's blocks is asked again.
+
+    Dask asserts that the first answer comes alone, and a message to all clients may come with it.
+    """
+    for _ in range(ASKED - 1):
+        with suppress(AssertionError):
+            return Client(where, security=security, timeout=seconds)
+    return Client(where, security=security, timeout=seconds)
 
 
 @contextmanager

@@ -49,16 +49,19 @@ def places_of(program: Program) -> Iterator[Place]:
         place = CNames(program, local[name], SOLVED_ON_PAGE)
         for op in walk(block):
             tests = [(test, test) for test in _inside(op)]
+            if isinstance(op, Loop):
+                yield Place(name, f"{place(op.index)} < {op.count}", (id(op),))
             if isinstance(op, Loop) and (condition := going_on(op.index, op.body)[0]) is not None:
                 tests.append((opposite(condition), condition))
             if isinstance(op, Branch):
                 tests.append((op.condition, op.condition))
             if isinstance(op, Count):
                 tests.append((opposite(op.condition), op.condition))
-                yield Place(name, f"{place(op.timer)} < {op.limit}U", (id(op),))
             for shown, test in tests:
                 numbers = tuple(id(condition) for condition in _conditions(test))
                 yield Place(name, c_expression(shown, place), numbers)
+            if isinstance(op, Count):
+                yield Place(name, f"{place(op.timer)} < {op.limit}U", (id(op),))
 
 
 def never(

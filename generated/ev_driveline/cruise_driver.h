@@ -66,6 +66,8 @@ void cruise_driver_Init(cruise_driver_Self *self, const volatile cruise_driver_C
 
 /* After a change of the page: cruise_driver_Derive, and a fault if solved numbers do not fit it */
 void cruise_driver_Calibrate(cruise_driver_Self *self, const volatile cruise_driver_Cal *cal);
+
+/* What follows from the page, whose values must be within their ranges: this is not checked */
 void cruise_driver_Derive(const volatile cruise_driver_Cal *cal, cruise_driver_Derived *derived);
 
 /* One tick of 1/100 s */

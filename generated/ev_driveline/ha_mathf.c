@@ -132,8 +132,9 @@ float ha_expf(float x)
     const float head = bounded - (exponent * 0.69314575F);
     const float tail = exponent * 1.4286068e-06F;
     const float r = head - tail;
+    const float centre = 0.0013847038F;
     const float series = 0.49999994F + (r * (0.16666509F + (r * (0.04166801F + (r * (0.00836999F
-        + (r * 0.0013847038F)))))));
+        + (r * centre)))))));
     const float scaled = 1.0F + (head + ((r * r * series) - tail));
     return ha_pow2f(exponent) * scaled;
 }
@@ -364,6 +365,126 @@ float ha_logf(float x)
     const float series = square * (0.66666776F + (square * (0.3997759F + (square * 0.29870573F))));
     const float half = 0.5F * f * f;
     return (k * 0.69314575F) - (half - ((s * (half + series)) + (k * 1.4286068e-06F)) - f);
+}
+
+/* base^degree; base >= 0, its power within that of exp, clamped; error < 0.95 ULP */
+float ha_powf(float base, float degree)
+{
+    float bounded_degree;
+    if (degree > 1.1529215e+18F) {
+        bounded_degree = 1.1529215e+18F;
+    } else if (degree < (-1.1529215e+18F)) {
+        bounded_degree = -1.1529215e+18F;
+    } else {
+        bounded_degree = degree;
+    }
+    float bounded;
+    if (base > 3.4028235e+38F) {
+        bounded = 3.4028235e+38F;
+    } else if (base < 1.1754944e-38F) {
+        bounded = 1.1754944e-38F;
+    } else {
+        bounded = base;
+    }
+    const float k_0 = (bounded >= 1.0F) ? 0.0F : (-126.0F);
+    const float m_0 = (bounded >= 1.0F) ? bounded : (bounded * 8.507059e+37F);
+    const float k_64 = (m_0 < 1.8446744e+19F) ? k_0 : (k_0 + 64.0F);
+    const float m_64 = (m_0 < 1.8446744e+19F) ? m_0 : (m_0 * 5.421011e-20F);
+    const float k_32 = (m_64 < 4294967300.0F) ? k_64 : (k_64 + 32.0F);
+    const float m_32 = (m_64 < 4294967300.0F) ? m_64 : (m_64 * 2.3283064e-10F);
+    const float k_16 = (m_32 < 65536.0F) ? k_32 : (k_32 + 16.0F);
+    const float m_16 = (m_32 < 65536.0F) ? m_32 : (m_32 * 1.5258789e-05F);
+    const float k_8 = (m_16 < 256.0F) ? k_16 : (k_16 + 8.0F);
+    const float m_8 = (m_16 < 256.0F) ? m_16 : (m_16 * 0.00390625F);
+    const float k_4 = (m_8 < 16.0F) ? k_8 : (k_8 + 4.0F);
+    const float m_4 = (m_8 < 16.0F) ? m_8 : (m_8 * 0.0625F);
+    const float k_2 = (m_4 < 4.0F) ? k_4 : (k_4 + 2.0F);
+    const float m_2 = (m_4 < 4.0F) ? m_4 : (m_4 * 0.25F);
+    const float k_1 = (m_2 < 2.0F) ? k_2 : (k_2 + 1.0F);
+    const float m_1 = (m_2 < 2.0F) ? m_2 : (m_2 * 0.5F);
+    const float k = (m_1 <= 1.4142135F) ? k_1 : (k_1 + 1.0F);
+    const float f = ((m_1 <= 1.4142135F) ? m_1 : (0.5F * m_1)) - 1.0F;
+    const float s_below = 2.0F + f;
+    const float s_below_lost = f - (s_below - 2.0F);
+    const float s = f / s_below;
+    const float s_wide = 4097.0F * s;
+    const float s_high = s_wide - (s_wide - s);
+    const float s_low = s - s_high;
+    const float s_below_wide = 4097.0F * s_below;
+    const float s_below_high = s_below_wide - (s_below_wide - s_below);
+    const float s_below_low = s_below - s_below_high;
+    const float s_back = s * s_below;
+    const float s_back_lost =
+        (s_high * s_below_high) - s_back + (s_high * s_below_low) + (s_low * s_below_high)
+        + (s_low * s_below_low);
+    const float s_lost = (f - s_back - s_back_lost - (s * s_below_lost)) / s_below;
+    const float square = s * s;
+    const float square_lost =
+        (s_high * s_high) - square + (s_high * s_low) + (s_low * s_high) + (s_low * s_low);
+    const float higher =
+        square * (0.4F + (square * (0.2857143F + (square * (0.22222222F + (square * (0.18181819F
+        + (square * 0.15384616F))))))));
+    const float factor = 0.6666667F + higher;
+    const float square_wide = 4097.0F * square;
+    const float square_high = square_wide - (square_wide - square);
+    const float square_low = square - square_high;
+    const float factor_wide = 4097.0F * factor;
+    const float factor_high = factor_wide - (factor_wide - factor);
+    const float factor_low = factor - factor_high;
+    const float cubic = square * factor;
+    const float cubic_lost = (square_high * factor_high) - cubic + (square_high * factor_low)
+        + (square_low * factor_high) + (square_low * factor_low);
+    const float cubic_rest =
+        cubic_lost + ((square * (higher - (factor - 0.6666667F) + (-1.9868216e-08F)))
+        + ((square_lost + (2.0F * s * s_lost)) * factor));
+    const float cubic_wide = 4097.0F * cubic;
+    const float cubic_high = cubic_wide - (cubic_wide - cubic);
+    const float cubic_low = cubic - cubic_high;
+    const float curved = s * cubic;
+    const float curved_lost =
+        (s_high * cubic_high) - curved + (s_high * cubic_low) + (s_low * cubic_high)
+        + (s_low * cubic_low);
+    const float curved_rest = curved_lost + ((s * cubic_rest) + (s_lost * cubic));
+    const float twice = 2.0F * s;
+    const float whole = k * 0.69314575F;
+    const float sum_1 = whole + twice;
+    const float sum_1_lost = twice - (sum_1 - whole);
+    const float sum_2 = sum_1 + curved;
+    const float sum_2_lost = curved - (sum_2 - sum_1);
+    const float low =
+        sum_1_lost + sum_2_lost + (curved_rest + (2.0F * s_lost) + (k * 1.4286068e-06F));
+    const float log = sum_2 + low;
+    const float log_lost = low - (log - sum_2);
+    const float bounded_degree_wide = 4097.0F * bounded_degree;
+    const float bounded_degree_high = bounded_degree_wide - (bounded_degree_wide - bounded_degree);
+    const float bounded_degree_low = bounded_degree - bounded_degree_high;
+    const float log_wide = 4097.0F * log;
+    const float log_high = log_wide - (log_wide - log);
+    const float log_low = log - log_high;
+    const float power = bounded_degree * log;
+    const float power_lost =
+        (bounded_degree_high * log_high) - power + (bounded_degree_high * log_low)
+        + (bounded_degree_low * log_high) + (bounded_degree_low * log_low);
+    float bounded_power;
+    if (power > 88.0F) {
+        bounded_power = 88.0F;
+    } else if (power < (-87.0F)) {
+        bounded_power = -87.0F;
+    } else {
+        bounded_power = power;
+    }
+    const float rest = (bounded_power == power) ? (power_lost + (bounded_degree * log_lost)) : 0.0F;
+    const float exponent =
+        (bounded_power > (-87.0F)) ? ((bounded_power * 1.442695F) + 12582912.0F - 12582912.0F) :
+        (-126.0F);
+    const float head = bounded_power - (exponent * 0.69314575F);
+    const float tail = (exponent * 1.4286068e-06F) - rest;
+    const float r = head - tail;
+    const float centre = 0.0013847038F;
+    const float series = 0.49999994F + (r * (0.16666509F + (r * (0.04166801F + (r * (0.00836999F
+        + (r * centre)))))));
+    const float scaled = 1.0F + (head + ((r * r * series) - tail));
+    return ((base <= 0.0F) && (degree > 0.0F)) ? 0.0F : (ha_pow2f(exponent) * scaled);
 }
 
 /* The interval of an axis that x is in, and the part of it before x: 0 or 1 outside */

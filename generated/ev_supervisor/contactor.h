@@ -64,6 +64,8 @@ void contactor_Init(contactor_Self *self, const volatile contactor_Cal *cal);
 
 /* After a change of the page: contactor_Derive, and a fault if solved numbers do not fit it */
 void contactor_Calibrate(contactor_Self *self, const volatile contactor_Cal *cal);
+
+/* What follows from the page, whose values must be within their ranges: this is not checked */
 void contactor_Derive(const volatile contactor_Cal *cal, contactor_Derived *derived);
 
 /* One tick of 1/100 s */

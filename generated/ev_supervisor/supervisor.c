@@ -988,8 +988,6 @@ static inline void hear(const supervisor_Self *self, supervisor_Work *work)
     }
     work->takes_main = 0U;
     work->heard_main = false;
-    work->low_main = 1;
-    work->high_main = 0;
     switch (work->wish_main) {
     case supervisor_FIRED_main_open_shut:
         work->low_main = 15;
@@ -1005,8 +1003,6 @@ static inline void hear(const supervisor_Self *self, supervisor_Work *work)
     }
     work->takes_pre = 0U;
     work->heard_pre = false;
-    work->low_pre = 1;
-    work->high_pre = 0;
     switch (work->wish_pre) {
     case supervisor_FIRED_pre_open_shut:
         work->low_pre = 18;

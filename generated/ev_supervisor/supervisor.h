@@ -126,47 +126,47 @@ typedef struct {
 
 /* Values that live within one step */
 typedef struct {
-    bool level_1;
-    bool edge_1;
-    uint16_t wish_chart;
-    uint16_t takes_chart;
-    int32_t low_chart;
-    int32_t high_chart;
-    bool heard_chart;
-    uint16_t wish_operation_drive_torque;
-    uint16_t takes_operation_drive_torque;
-    int32_t low_operation_drive_torque;
-    int32_t high_operation_drive_torque;
-    bool heard_operation_drive_torque;
-    uint16_t wish_operation_drive_derating;
-    uint16_t takes_operation_drive_derating;
-    int32_t low_operation_drive_derating;
-    int32_t high_operation_drive_derating;
-    bool heard_operation_drive_derating;
-    uint16_t wish_main;
-    uint16_t takes_main;
-    int32_t low_main;
-    int32_t high_main;
-    bool heard_main;
-    uint16_t wish_pre;
-    uint16_t takes_pre;
-    int32_t low_pre;
-    int32_t high_pre;
-    bool heard_pre;
-    bool keeps;
-    bool is_first;
-    bool is_over;
-    int32_t head;
-    int32_t tail;
-    int32_t event;
+    bool level_1; /* what is looked at for an edge */
+    bool edge_1; /* that edge is now */
+    uint16_t wish_chart; /* transition that the region wishes for, 0: none */
+    uint16_t takes_chart; /* transition that it takes, 0: none */
+    int32_t low_chart; /* first node of what its wish leaves */
+    int32_t high_chart; /* last node of what its wish leaves */
+    bool heard_chart; /* its wish was decided on */
+    uint16_t wish_operation_drive_torque; /* transition that the region wishes for, 0: none */
+    uint16_t takes_operation_drive_torque; /* transition that it takes, 0: none */
+    int32_t low_operation_drive_torque; /* first node of what its wish leaves */
+    int32_t high_operation_drive_torque; /* last node of what its wish leaves */
+    bool heard_operation_drive_torque; /* its wish was decided on */
+    uint16_t wish_operation_drive_derating; /* transition that the region wishes for, 0: none */
+    uint16_t takes_operation_drive_derating; /* transition that it takes, 0: none */
+    int32_t low_operation_drive_derating; /* first node of what its wish leaves */
+    int32_t high_operation_drive_derating; /* last node of what its wish leaves */
+    bool heard_operation_drive_derating; /* its wish was decided on */
+    uint16_t wish_main; /* transition that the region wishes for, 0: none */
+    uint16_t takes_main; /* transition that it takes, 0: none */
+    int32_t low_main; /* first node of what its wish leaves */
+    int32_t high_main; /* last node of what its wish leaves */
+    bool heard_main; /* its wish was decided on */
+    uint16_t wish_pre; /* transition that the region wishes for, 0: none */
+    uint16_t takes_pre; /* transition that it takes, 0: none */
+    int32_t low_pre; /* first node of what its wish leaves */
+    int32_t high_pre; /* last node of what its wish leaves */
+    bool heard_pre; /* its wish was decided on */
+    bool keeps; /* no transition that is taken leaves the same */
+    bool is_first; /* this is the first micro-step of the tick */
+    bool is_over; /* no further micro-step is allowed */
+    int32_t head; /* place in the queue of the event that is heard next */
+    int32_t tail; /* place in the queue of the event that is raised next */
+    int32_t event; /* event that is heard in this micro-step, 0: none */
     int32_t queue[5]; /* events that wait */
-    bool enter_operation_standby;
-    bool enter_operation_precharge;
-    bool enter_operation_ready;
-    bool exit_operation_drive;
-    bool enter_fault;
-    int32_t steps;
-    bool is_busy;
+    bool enter_operation_standby; /* `operation.standby` is entered in this micro-step */
+    bool enter_operation_precharge; /* `operation.precharge` is entered in this micro-step */
+    bool enter_operation_ready; /* `operation.ready` is entered in this micro-step */
+    bool exit_operation_drive; /* `operation.drive` is left in this micro-step */
+    bool enter_fault; /* `fault` is entered in this micro-step */
+    int32_t steps; /* micro-steps of this tick */
+    bool is_busy; /* another micro-step follows */
     float reset_T_cmd; /* N*m */
     bool reset_main_cmd;
     bool reset_pre_cmd;
@@ -241,6 +241,8 @@ void supervisor_Init(supervisor_Self *self, const volatile supervisor_Cal *cal);
 
 /* After a change of the page: supervisor_Derive, and a fault if solved numbers do not fit it */
 void supervisor_Calibrate(supervisor_Self *self, const volatile supervisor_Cal *cal);
+
+/* What follows from the page, whose values must be within their ranges: this is not checked */
 void supervisor_Derive(const volatile supervisor_Cal *cal, supervisor_Derived *derived);
 
 /* One tick of 1/100 s */

@@ -137,14 +137,13 @@ double ha_exp(double x)
     const double head = bounded - (exponent * 0.6931471805598903);
     const double tail = exponent * 5.497923018708371e-14;
     const double r = head - tail;
-    const double upper =
-        2.7557558513417143e-06 + (r * (2.763019225057943e-07 + (r * 2.5007202378603645e-08)));
-    const double middle =
+    const double upper = 2.763019225057943e-07 + (r * 2.5007202378603645e-08);
+    const double centre =
         0.0013888888943694578 + (r * (0.00019841269546225928 + (r * (2.4801493177744308e-05
-        + (r * upper)))));
+        + (r * (2.7557558513417143e-06 + (r * upper)))))));
     const double series =
         0.5000000000000011 + (r * (0.16666666666666466 + (r * (0.041666666666528816
-        + (r * (0.00833333333347021 + (r * middle)))))));
+        + (r * (0.00833333333347021 + (r * centre)))))));
     const double scaled = 1.0 + (head + ((r * r * series) - tail));
     return ha_pow2(exponent) * scaled;
 }
@@ -393,6 +392,138 @@ double ha_log(double x)
     const double half = 0.5 * f * f;
     return (k * 0.6931471805598903) - (half - ((s * (half + series)) + (k * 5.497923018708371e-14))
         - f);
+}
+
+/* base^degree; base >= 0, its power within that of exp, clamped; error < 0.95 ULP */
+double ha_pow(double base, double degree)
+{
+    double bounded_degree;
+    if (degree > 1.152921504606847e+18) {
+        bounded_degree = 1.152921504606847e+18;
+    } else if (degree < (-1.152921504606847e+18)) {
+        bounded_degree = -1.152921504606847e+18;
+    } else {
+        bounded_degree = degree;
+    }
+    double bounded;
+    if (base > 1.7976931348623157e+308) {
+        bounded = 1.7976931348623157e+308;
+    } else if (base < 2.2250738585072014e-308) {
+        bounded = 2.2250738585072014e-308;
+    } else {
+        bounded = base;
+    }
+    const double k_0 = (bounded >= 1.0) ? 0.0 : (-1022.0);
+    const double m_0 = (bounded >= 1.0) ? bounded : (bounded * 4.49423283715579e+307);
+    const double k_512 = (m_0 < 1.3407807929942597e+154) ? k_0 : (k_0 + 512.0);
+    const double m_512 = (m_0 < 1.3407807929942597e+154) ? m_0 : (m_0 * 7.458340731200207e-155);
+    const double k_256 = (m_512 < 1.157920892373162e+77) ? k_512 : (k_512 + 256.0);
+    const double m_256 = (m_512 < 1.157920892373162e+77) ? m_512 : (m_512 * 8.636168555094445e-78);
+    const double k_128 = (m_256 < 3.402823669209385e+38) ? k_256 : (k_256 + 128.0);
+    const double m_128 = (m_256 < 3.402823669209385e+38) ? m_256 : (m_256 * 2.938735877055719e-39);
+    const double k_64 = (m_128 < 1.8446744073709552e+19) ? k_128 : (k_128 + 64.0);
+    const double m_64 = (m_128 < 1.8446744073709552e+19) ? m_128 : (m_128 * 5.421010862427522e-20);
+    const double k_32 = (m_64 < 4294967296.0) ? k_64 : (k_64 + 32.0);
+    const double m_32 = (m_64 < 4294967296.0) ? m_64 : (m_64 * 2.3283064365386963e-10);
+    const double k_16 = (m_32 < 65536.0) ? k_32 : (k_32 + 16.0);
+    const double m_16 = (m_32 < 65536.0) ? m_32 : (m_32 * 1.52587890625e-05);
+    const double k_8 = (m_16 < 256.0) ? k_16 : (k_16 + 8.0);
+    const double m_8 = (m_16 < 256.0) ? m_16 : (m_16 * 0.00390625);
+    const double k_4 = (m_8 < 16.0) ? k_8 : (k_8 + 4.0);
+    const double m_4 = (m_8 < 16.0) ? m_8 : (m_8 * 0.0625);
+    const double k_2 = (m_4 < 4.0) ? k_4 : (k_4 + 2.0);
+    const double m_2 = (m_4 < 4.0) ? m_4 : (m_4 * 0.25);
+    const double k_1 = (m_2 < 2.0) ? k_2 : (k_2 + 1.0);
+    const double m_1 = (m_2 < 2.0) ? m_2 : (m_2 * 0.5);
+    const double k = (m_1 <= 1.4142135623730951) ? k_1 : (k_1 + 1.0);
+    const double f = ((m_1 <= 1.4142135623730951) ? m_1 : (0.5 * m_1)) - 1.0;
+    const double s_below = 2.0 + f;
+    const double s_below_lost = f - (s_below - 2.0);
+    const double s = f / s_below;
+    const double s_wide = 134217729.0 * s;
+    const double s_high = s_wide - (s_wide - s);
+    const double s_low = s - s_high;
+    const double s_below_wide = 134217729.0 * s_below;
+    const double s_below_high = s_below_wide - (s_below_wide - s_below);
+    const double s_below_low = s_below - s_below_high;
+    const double s_back = s * s_below;
+    const double s_back_lost =
+        (s_high * s_below_high) - s_back + (s_high * s_below_low) + (s_low * s_below_high)
+        + (s_low * s_below_low);
+    const double s_lost = (f - s_back - s_back_lost - (s * s_below_lost)) / s_below;
+    const double square = s * s;
+    const double square_lost =
+        (s_high * s_high) - square + (s_high * s_low) + (s_low * s_high) + (s_low * s_low);
+    const double higher =
+        square * (0.4 + (square * (0.2857142857142857 + (square * (0.2222222222222222
+        + (square * (0.18181818181818182 + (square * (0.15384615384615385
+        + (square * (0.13333333333333333 + (square * (0.11764705882352941
+        + (square * (0.10526315789473684 + (square * (0.09523809523809523
+        + (square * (0.08695652173913043 + (square * 0.08))))))))))))))))))));
+    const double factor = 0.6666666666666666 + higher;
+    const double square_wide = 134217729.0 * square;
+    const double square_high = square_wide - (square_wide - square);
+    const double square_low = square - square_high;
+    const double factor_wide = 134217729.0 * factor;
+    const double factor_high = factor_wide - (factor_wide - factor);
+    const double factor_low = factor - factor_high;
+    const double cubic = square * factor;
+    const double cubic_lost = (square_high * factor_high) - cubic + (square_high * factor_low)
+        + (square_low * factor_high) + (square_low * factor_low);
+    const double cubic_rest = cubic_lost + ((square * (higher - (factor - 0.6666666666666666)
+        + 3.700743415417188e-17)) + ((square_lost + (2.0 * s * s_lost)) * factor));
+    const double cubic_wide = 134217729.0 * cubic;
+    const double cubic_high = cubic_wide - (cubic_wide - cubic);
+    const double cubic_low = cubic - cubic_high;
+    const double curved = s * cubic;
+    const double curved_lost =
+        (s_high * cubic_high) - curved + (s_high * cubic_low) + (s_low * cubic_high)
+        + (s_low * cubic_low);
+    const double curved_rest = curved_lost + ((s * cubic_rest) + (s_lost * cubic));
+    const double twice = 2.0 * s;
+    const double whole = k * 0.6931471805598903;
+    const double sum_1 = whole + twice;
+    const double sum_1_lost = twice - (sum_1 - whole);
+    const double sum_2 = sum_1 + curved;
+    const double sum_2_lost = curved - (sum_2 - sum_1);
+    const double low =
+        sum_1_lost + sum_2_lost + (curved_rest + (2.0 * s_lost) + (k * 5.497923018708371e-14));
+    const double log = sum_2 + low;
+    const double log_lost = low - (log - sum_2);
+    const double bounded_degree_wide = 134217729.0 * bounded_degree;
+    const double bounded_degree_high = bounded_degree_wide - (bounded_degree_wide - bounded_degree);
+    const double bounded_degree_low = bounded_degree - bounded_degree_high;
+    const double log_wide = 134217729.0 * log;
+    const double log_high = log_wide - (log_wide - log);
+    const double log_low = log - log_high;
+    const double power = bounded_degree * log;
+    const double power_lost =
+        (bounded_degree_high * log_high) - power + (bounded_degree_high * log_low)
+        + (bounded_degree_low * log_high) + (bounded_degree_low * log_low);
+    double bounded_power;
+    if (power > 709.0) {
+        bounded_power = 709.0;
+    } else if (power < (-708.0)) {
+        bounded_power = -708.0;
+    } else {
+        bounded_power = power;
+    }
+    const double rest = (bounded_power == power) ? (power_lost + (bounded_degree * log_lost)) : 0.0;
+    const double exponent =
+        (bounded_power > (-708.0)) ? ((bounded_power * 1.4426950408889634) + 6755399441055744.0
+        - 6755399441055744.0) : (-1021.0);
+    const double head = bounded_power - (exponent * 0.6931471805598903);
+    const double tail = (exponent * 5.497923018708371e-14) - rest;
+    const double r = head - tail;
+    const double upper = 2.763019225057943e-07 + (r * 2.5007202378603645e-08);
+    const double centre =
+        0.0013888888943694578 + (r * (0.00019841269546225928 + (r * (2.4801493177744308e-05
+        + (r * (2.7557558513417143e-06 + (r * upper)))))));
+    const double series =
+        0.5000000000000011 + (r * (0.16666666666666466 + (r * (0.041666666666528816
+        + (r * (0.00833333333347021 + (r * centre)))))));
+    const double scaled = 1.0 + (head + ((r * r * series) - tail));
+    return ((base <= 0.0) && (degree > 0.0)) ? 0.0 : (ha_pow2(exponent) * scaled);
 }
 
 /* The interval of an axis that x is in, and the part of it before x: 0 or 1 outside */

@@ -13,7 +13,7 @@ from modewright.console import console, working
 def mcdc(
     automaton: Annotated[str, typer.Argument(help="an automaton: its name or file")],
     runs: Annotated[
-        int, typer.Option(min=0, help="sequences that libFuzzer adds to those of the tests")
+        int, typer.Option(min=0, help="runs in which libFuzzer looks for other ways")
     ] = 0,
     proofs: Annotated[
         bool, typer.Option(help="look for proofs that no input can show what was not shown")
@@ -27,7 +27,7 @@ def mcdc(
 
     \b
     modewright mcdc supervisor
-    modewright mcdc estimator_simple --runs 4000
+    modewright mcdc estimator_simple --runs 100000
     modewright mcdc estimator --no-proofs --json
     """
     from modewright import code, show, show_code

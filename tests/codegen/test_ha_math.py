@@ -41,12 +41,13 @@ equations:
   whole: floor(u)
   slope: tan(u * 1 rad)
   heading: atan2(u, v)
+  raised: pow(u, v)
   along: lookup(curve, u)
   over: lookup(plane, u, v)
 modes: {only: {}}
 outputs:
-  [s, c, e, t, log_u, size, root, least, most, limited, direction, whole, slope, heading, along,
-    over]
+  [s, c, e, t, log_u, size, root, least, most, limited, direction, whole, slope, heading,
+    raised, along, over]
 """
 SIGNALS = {"sin": "s", "cos": "c", "exp": "e", "tanh": "t", "abs": "size", "sqrt": "root"}
 SIGNALS |= {"floor": "whole", "tan": "slope", "log": "log_u"}

@@ -25,7 +25,7 @@ from language.program import Function, short
 
 Real = Callable[..., float]
 
-EXACT = {name: getattr(mpmath, name) for name in FUNCTIONS}
+EXACT = {name: getattr(mpmath, "power" if name == "pow" else name) for name in FUNCTIONS}
 
 
 def pow2(k: float) -> float:

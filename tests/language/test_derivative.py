@@ -39,6 +39,7 @@ SMOOTH = [
     "sqrt(x + 1) / sqrt(x)",
     "if z > 0 then x^2 else x",
     "tan(x / 2) * atan2(x, z - x)",
+    "pow(x^2 + 1, 1.7) * pow(z^2 + 1, sin(x * 1 rad))",
     "log(x^2 + z^2 + 1) * x",
 ]
 BRANCHED = [

@@ -18,6 +18,7 @@ RANGES = {"a": Interval(-2.0, 3.0, True), "b": Interval(0.5, 4.0, True)}
 TEXTS = [
     *("a + b", "a - b", "a * b", "a / b", "-a * a", "a^3 - b^2", "b^-2", "abs(a) - b", "max(a, b)"),
     *("min(a, 1)", "clip(a, -1, 1)", "sqrt(b) * a", "exp(a)", "tanh(a) + sin(b)", "floor(a)"),
+    *("pow(b, a)", "pow(abs(a), 1.5) - b", "pow(b, 0.5)"),
     *("log(b)", "log(a * a + 0.5) - b"),
     *("if a > 1 then a else b", "if abs(a) > 1 then 1 / a else 0", "sign(a) * b", "atan2(a, b)"),
     *("if not (a <= 1) and b < 2 then a - b else 0", "b / (a * a + 1)", "clip(a, b, 5)"),

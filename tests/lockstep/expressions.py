@@ -48,7 +48,7 @@ REALS = (
     *("leaf", "+", "+", "-", "-", "*", "*", "/", "/", "negative", "select", "select"),
     *("sum of product", "sum of product", "sum of product"),
     *("abs", "sqrt", "min", "max", "clip", "sign", "sin", "cos", "exp", "tanh", "pow2", "count"),
-    *("floor", "tan", "atan2", "rounded", "log"),
+    *("floor", "tan", "atan2", "rounded", "log", "pow"),
 )
 TRUTHS = ("leaf", "compare", "compare", "compare", "whole", "same", "not", "and", "or", "select")
 RELATIONS = ("<", "<=", ">", ">=", "==", "!=")
@@ -90,7 +90,7 @@ def reals(draw: Draw, scope: Scope, depth: int) -> Expr:
             return Unary("-", part())
         case "select":
             return Select(draw(truths(scope, depth - 1)), part(), part())
-        case "min" | "max" | "atan2":
+        case "min" | "max" | "atan2" | "pow":
             return Call(kind, (part(), part()))
         case "clip":
             return Call(kind, (part(), part(), part()))

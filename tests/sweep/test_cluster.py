@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import functools
 import shutil
@@ -13,7 +14,7 @@ from pathlib import Path
 import pytest
 from distributed import Client, LocalCluster, Security
 
-from sweep import cluster
+from sweep import cluster, clustering
 from sweep.address import Address, Credentials, address_of
 from sweep.block import Block
 from sweep.cluster import Cluster
@@ -119,6 +120,24 @@ def test_workers_with_other_code_are_refused_before_a_store_is_made(client: Clie
         connected(address, NONE, Staff(older)),
     ):
         pass
+
+
+@pytest.mark.parametrize(("failures", "answers"), [(3, True), (4, False)])
+def test_a_scheduler_that_is_busy_with_another_client_is_asked_again(
+    client: Client, monkeypatch: pytest.MonkeyPatch, failures: int, answers: bool
+) -> None:
+    """Dask's own assertion fails where a message to all clients comes with its first answer."""
+    left = iter([True] * failures)
+
+    def busy(*args: object, **options: object) -> Client:
+        assert not next(left, False)
+        return Client(*args, **options)
+
+    monkeypatch.setattr(clustering, "Client", busy)
+    address = Address(url=client.scheduler.address)
+    expected = contextlib.nullcontext() if answers else pytest.raises(ClusterError, match="answers")
+    with expected, connected(address, NONE, STAFF) as found:
+        assert found.scheduler.address == client.scheduler.address
 
 
 def test_a_worker_looks_at_its_code_before_it_looks_at_the_study() -> None:

@@ -13,7 +13,7 @@ from modewright.code import mcdc
 from tests.verify.proofs import AUTOMATA, ISSUE
 from tests.verify.store import ROOT, Figure, measured
 
-RUNS = 4000
+RUNS = 100_000
 
 
 def main() -> int:

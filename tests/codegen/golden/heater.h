@@ -79,6 +79,8 @@ void heater_Init(heater_Self *self, const volatile heater_Cal *cal);
 
 /* After a change of the page: heater_Derive, and a fault if solved numbers do not fit it */
 void heater_Calibrate(heater_Self *self, const volatile heater_Cal *cal);
+
+/* What follows from the page, whose values must be within their ranges: this is not checked */
 void heater_Derive(const volatile heater_Cal *cal, heater_Derived *derived);
 
 /* One tick of 1/10 s */

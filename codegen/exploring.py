@@ -1,0 +1,98 @@
+"""Exploring: ways through generated C that libFuzzer finds, with any page and inputs that are held.
+
+A way is bytes: three for each number of the page that is another one, then groups of ticks - how
+many, and the word of each input (`words`). MC/DC counts what they show (`mcdc.py`).
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from codegen.build import FLAGS, BuildError
+from codegen.fuzzing import ABSOLUTE, FUZZER, SPREAD, STUCK, Range, table_text, words
+from codegen.harness import Main, fed, write_harness
+from codegen.names import SOLVED_ON_PAGE, CNames, c_type
+from codegen.sanitizers import APP, ran
+from codegen.source import stepped
+from codegen.tool import output_of
+from language.program import Program
+
+MAIN = Main("explore_main.c.jinja")
+CHANGES, GROUPS = 4, 96
+"""Most numbers of a page that are others, and most groups of ticks."""
+FACTORS = (0.0, -1.0, 0.5, 2.0, 1.1, 0.9, 10.0, -10.0, 100.0, 1e-3, 1e6, 1e30)
+HOLDS = (*(1,) * 16, *(2,) * 6, 3, 3, 5, 5, 8, 12, 20, 50, 120, 600)
+"""Ticks of a group: mostly one, and as many as a wait takes."""
+SOLVED_RANGE = (-1e30, 1e30)
+CORPUS, WORDS = "corpus", "words.h"
+
+
+def explored(
+    program: Program, ranges: Mapping[str, Range], runs: int, seed: int
+) -> tuple[bytes, ...]:
+    """Return ways that together show all that libFuzzer found in so many runs.
+
+    `ranges` are those of inputs by name. Raises ToolMissing, BuildError.
+    """
+    with tempfile.TemporaryDirectory(prefix="modewright-") as name:
+        folder = Path(name)
+        sources = write_explorer(program, ranges, folder)
+        flags = [flag for flag in FLAGS if flag != "-O2"]
+        command = [FUZZER, *flags, "-O1", "-fsanitize=fuzzer", *map(str, sources)]
+        output_of([*command, "-o", APP, "-lm"], folder)
+        (folder / CORPUS).mkdir()
+        limits = [f"-runs={runs}", f"-max_len={longest(program)}", "-len_control=0"]
+        rest = [f"-seed={seed}", f"-timeout={STUCK}", "-use_value_profile=1", CORPUS]
+        done = ran(folder / APP, [*limits, *rest])
+        if done.found:
+            raise BuildError(done.found[0])
+        return tuple(path.read_bytes() for path in sorted((folder / CORPUS).iterdir()))
+
+
+def longest(program: Program) -> int:
+    """Return the size of the longest way [bytes]."""
+    return 3 * CHANGES + GROUPS * (1 + len(fed(program)))
+
+
+def write_explorer(program: Program, ranges: Mapping[str, Range], folder: Path) -> list[Path]:
+    """Write the C of a program and what goes its ways; return the sources to compile."""
+    sources = write_harness(program, folder, main=MAIN, more={"page": page_of(program)})
+    numbers = {
+        "ABSOLUTE": ABSOLUTE,
+        "FIRST": SPREAD // 2,
+        "CHANGES": f"{CHANGES}U",
+        "FACTORS": f"{len(FACTORS)}U",
+        "HOLDS": f"{len(HOLDS)}U",
+        "LONGEST": longest(program),
+    }
+    lines = [f"#define {name} {number}" for name, number in numbers.items()]
+    lines.append(_array("double", "factor", FACTORS))
+    lines.append(_array("uint16_t", "hold", HOLDS))
+    (folder / WORDS).write_text("\n".join([*lines, table_text(words(program, ranges))]))
+    return sources
+
+
+def page_of(program: Program) -> list[dict[str, Any]]:
+    """Return the single numbers of a page: their members, types and ranges."""
+    program = stepped(program)
+    place = CNames(program, solved=SOLVED_ON_PAGE)
+    found = []
+    for one in program.constants:
+        if one.kind in ("tunable", "solved") and not one.items and one.type != "truth":
+            low, high = one.range or (SOLVED_RANGE if one.type == "real" else (0, 1))
+            found.append(
+                {
+                    "member": place(one.name).removeprefix("cal->"),
+                    "type": c_type(one, program.number),
+                    "low": float(low),
+                    "high": float(high),
+                }
+            )
+    return found
+
+
+def _array(kind: str, name: str, numbers: Sequence[float]) -> str:
+    return f"static const {kind} {name}[] = {{{', '.join(map(repr, numbers))}}};"

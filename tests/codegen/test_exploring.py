@@ -1,0 +1,59 @@
+"""Exploring: ways through generated C, with waits of many ticks and with other pages."""
+
+from __future__ import annotations
+
+import shutil
+
+import pytest
+
+from codegen.exploring import explored, page_of
+from codegen.fuzzing import FUZZER
+from codegen.mcdc import EXPORTER, mcdc
+from language.program import Program
+from modewright.api import program as program_named
+from tests.language.making import program
+
+pytestmark = pytest.mark.skipif(
+    not (shutil.which(EXPORTER) and shutil.which(FUZZER)),
+    reason="no clang-19: make system-packages",
+)
+SLOW = """language: 1
+automaton: slow
+period: 10 ms
+numbers: float32
+parameters: {least: {value: 5, tunable: true, range: [0, 7]}}
+inputs: {u: {unit: "1", range: [0, 6]}}
+initial: unlit
+modes:
+  unlit: {transitions: {lit: {when: u > 1, wait: 4 s}}}
+  lit: {transitions: {unlit: {when: least > 6 or u < 1}}}
+outputs: [mode]
+"""
+RANGES = {"u": (0.0, 6.0)}
+
+
+def slow() -> Program:
+    return program(SLOW)
+
+
+def test_a_page_is_its_single_numbers_with_their_ranges() -> None:
+    assert page_of(slow()) == [{"member": "least", "type": "float", "low": 0.0, "high": 7.0}]
+
+
+def test_solved_numbers_of_a_page_may_be_any() -> None:
+    solved = {one["member"]: one for one in page_of(program_named("estimator_float32"))}
+    assert solved["J_em"]["high"] == pytest.approx(0.2)
+    assert solved["solved.stamp_J_em"]["high"] == 1e30
+    assert solved["solved.drive_L_w_w__y_w"]["type"] == "float"
+
+
+def test_a_wait_of_many_ticks_and_another_page_are_found() -> None:
+    """`least > 6` is false with the page of the spec, and true with one where it is 7."""
+    ways = explored(slow(), RANGES, 20_000, 1)
+    assert ways == explored(slow(), RANGES, 20_000, 1)
+    found = mcdc(slow(), [], ways, RANGES)
+    assert found.sequences == len(ways) and found.steps > 400
+    shown = {decision.text: decision.shown for decision in found.decisions}
+    assert shown["self->timer.unlit_lit > 400U"] == (True,)
+    assert shown["(cal->least > 6.0F) || (self->latched.u < 1.0F)"] == (True, True)
+    assert found.missed == mcdc(slow(), [], ways[::-1], RANGES).missed
