@@ -247,7 +247,6 @@ def _series(field: Field, mode: str, solved: Solved, terms: int) -> Block:
     before: dict[str, Expr] = {name: Item(f"work.series_{name}", index) for name in field.states}
     body: list[Op] = [Assign("work.order", add(order, real(1.0)))]
     for i, name in enumerate(field.states):
-        products = _row(field, mode, "A", a, i, before)
-        value = divide(total(products), order) if products else real(0.0)
+        value = divide(total(_row(field, mode, "A", a, i, before)), order)
         body.append(Store(f"work.series_{name}", add(index, whole(1)), value))
     return (*ops, Loop(max(0, terms - 1), "work.term", tuple(body)))

@@ -77,11 +77,11 @@ def test_what_may_be_read_before_it_is_set_is_found(step: Block, found: set[str]
     assert early(*step, sets=(SET_A,), uses=(USE_A,)) == found
 
 
-def test_a_tick_that_runs_a_model_sets_four_of_its_work_values_when_it_begins() -> None:
+def test_a_tick_that_runs_a_model_sets_three_of_its_work_values_when_it_begins() -> None:
     text = c_files(shipped("estimator"))["estimator.c"]
     begin = text[text.index("*const work = &self->work;") : text.index("work->left = 0.001;")]
-    assert begin.count(" = ") == 5  # the pointer, then these
-    for line in ("guard_0 = false;", "guard_1 = false;", "elapsed = 0.0;", "crossed = false;"):
+    assert begin.count(" = ") == 4  # the pointer, then these
+    for line in ("guard_0 = false;", "elapsed = 0.0;", "crossed = false;"):
         assert f"work->{line}" in begin
 
 

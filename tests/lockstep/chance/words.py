@@ -79,7 +79,7 @@ _FORMS: tuple[Callable[[Part], str], ...] = (
     *(lambda p: f"min({p()}, 0)", lambda p: f"max(0, {p()})", lambda p: f"min(0, {p()})"),
     *(lambda p: f"clip({p()}, -2, {p()})", lambda p: f"clip({p()}, 0, 1.5)"),
     *(lambda p: f"sign({p()})", lambda p: f"floor({p()})", lambda p: f"abs({p()})"),
-    *(lambda p: f"sqrt(abs({p()}))", lambda p: f"sqrt(max({p()}, 0))"),
+    *(lambda p: f"sqrt(abs({p()}))", lambda p: f"pow(max({p()}, 0), 1.5)"),
     *(lambda p: f"sin(({p()}) * 1 rad)", lambda p: f"cos(({p()}) * 1 rad)"),
     *(lambda p: f"tan(({p()}) * 1 rad)", lambda p: f"atan2({p()}, {p()}) / 1 rad"),
     *(lambda p: f"exp(-log(abs({p()}) + 1))", lambda p: f"exp(clip({p()}, -30, 4))"),
