@@ -18,7 +18,7 @@ from codegen.names import SOLVED_ON_PAGE, CNames, c_type
 from codegen.sanitizers import APP, ran
 from codegen.source import stepped
 from codegen.tool import output_of
-from language.program import Program
+from language.program import Constant, Program
 
 MAIN = Main("explore_main.c.jinja")
 CHANGES, GROUPS = 4, 96
@@ -26,7 +26,7 @@ CHANGES, GROUPS = 4, 96
 FACTORS = (0.0, -1.0, 0.5, 2.0, 1.1, 0.9, 10.0, -10.0, 100.0, 1e-3, 1e6, 1e30)
 HOLDS = (*(1,) * 16, *(2,) * 6, 3, 3, 5, 5, 8, 12, 20, 50, 120, 600)
 """Ticks of a group: mostly one, and as many as a wait takes."""
-SOLVED_RANGE = (-1e30, 1e30)
+ANY = (-1e30, 1e30)
 CORPUS, WORDS = "corpus", "words.h"
 
 
@@ -82,16 +82,17 @@ def page_of(program: Program) -> list[dict[str, Any]]:
     found = []
     for one in program.constants:
         if one.kind in ("tunable", "solved") and not one.items and one.type != "truth":
-            low, high = one.range or (SOLVED_RANGE if one.type == "real" else (0, 1))
-            found.append(
-                {
-                    "member": place(one.name).removeprefix("cal->"),
-                    "type": c_type(one, program.number),
-                    "low": float(low),
-                    "high": float(high),
-                }
-            )
+            low, high = _range(one)
+            member, kind = place(one.name).removeprefix("cal->"), c_type(one, program.number)
+            found.append({"member": member, "type": kind, "low": low, "high": high})
     return found
+
+
+def _range(one: Constant) -> Range:
+    """Return the range of a number of a page: one without may be any, a word one of its list."""
+    if one.range:
+        return float(one.range[0]), float(one.range[1])
+    return (0.0, float(len(one.values) - 1)) if one.values else ANY
 
 
 def _array(kind: str, name: str, numbers: Sequence[float]) -> str:

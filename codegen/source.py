@@ -104,19 +104,7 @@ def module_context(program: Program, page: Page = CONSTANTS) -> dict[str, Any]:
     scratch = scratch_of(program, shared, used, page.holds_solved)
     if scratch and scratch.block != STEP:
         used = with_own(program, used, scratch)
-    own = apart(program)
-    modes, run_modes = ([m.name for m in of] for of in (program.modes, program.run_modes))
-    keywords = {name: _keyword(name, own) for name in program.blocks}
-    blocks = [
-        {
-            **_block(
-                program, name, local[name], turned[name], used, kinds, page, scratch, keywords[name]
-            ),
-            "purpose": purpose(name, modes, run_modes),
-            "keyword": keywords[name],
-        }
-        for name in _callees_first(program)
-    ]
+    blocks = _blocks(program, local, turned, used, kinds, page, scratch)
     return {
         **_names(program),
         **members(program, page),
@@ -209,6 +197,29 @@ def _begun(
         return None
     zero = {"bool": "false", REAL[program.number]: literal(0.0, program.number)}
     return [(c_member(v.name), zero.get(kinds[v.name], "0")) for v in scratch.early]
+
+
+def _blocks(
+    program: Program,
+    local: Mapping[str, frozenset[str]],
+    turned: Mapping[str, frozenset[str]],
+    used: Mapping[str, Usage],
+    kinds: Mapping[str, str],
+    page: Page,
+    scratch: Scratch | None,
+) -> list[dict[str, Any]]:
+    """Return the functions of a module, those that are called first."""
+    own = apart(program)
+    modes, run_modes = ([m.name for m in of] for of in (program.modes, program.run_modes))
+    found = []
+    for name in _callees_first(program):
+        keyword = _keyword(name, own)
+        block = _block(
+            program, name, local[name], turned[name], used, kinds, page, scratch, keyword
+        )
+        about = purpose(name, modes, run_modes)
+        found.append({**block, "purpose": about, "keyword": keyword})
+    return found
 
 
 def _block(

@@ -11,7 +11,7 @@ from typing import Literal
 
 from language.balance import coefficient_of
 from language.inquiry import Inquiry
-from language.interval import ANYTHING, Interval, Ranging
+from language.interval import ANYTHING, Interval
 from language.memory import actions
 from language.model import CHART, Automaton, Mode
 from language.moment import Moment
@@ -19,6 +19,7 @@ from language.operation import Compare, Unary, real
 from language.order import equation_order
 from language.parameter import parameter_order
 from language.problem import Problems, SpecError
+from language.ranging import Ranging
 from language.region import sources
 from language.syntax import Likeness, Tree
 from language.truth import decisions

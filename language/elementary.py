@@ -1,4 +1,4 @@
-"""Elementary: sin, cos, exp and tanh in float64 as operations, for the engine and for codegen.
+"""Elementary: sin, cos and tanh in float64 as operations, for the engine and for codegen.
 
 No libm: its results depend on the CPU and on the C library. Here are only + - * /, comparisons,
 selection, abs and exact powers of two (codegen rules R5 and R6), each of which IEEE 754 defines to
@@ -39,30 +39,6 @@ ROUND = real(1.5 * 2.0**52)
 TINY = real(2.0**-27)
 """Below it sin x and tanh x are x to 2^-54 / 3 relative; keeps -0.0 and the subnormals."""
 
-EXP_LOWEST, EXP_HIGHEST = real(-708.0), real(709.0)
-"""Within them e^x is finite and normal, and its power of two is within -1021 and 1023."""
-PER_LN_2 = real(1.4426950408889634)
-LN_2 = real(0.6931471805598903), real(5.497923018708371e-14)
-"""ln 2 in two parts; the first is a multiple of 2^-42, so its multiples up to 2^10 are exact."""
-EXP_SERIES = (
-    0.5000000000000011,
-    0.16666666666666466,
-    0.041666666666528816,
-    0.00833333333347021,
-    0.0013888888943694578,
-    0.00019841269546225928,
-    2.4801493177744308e-05,
-    2.7557558513417143e-06,
-    2.763019225057943e-07,
-    2.5007202378603645e-08,
-)
-"""(e^r - 1 - r) / r^2, degree 9 in r, |r| <= ln 2 / 2; error of e^r 2^-57.9 relative.
-
-This and the next two: minimax by mpmath at 60 digits (Remez exchange; Lawson's weights for this
-one), the lowest coefficient rounded to double and fixed, the rest fitted anew, and so on upwards;
-the errors are those of the rounded coefficients.
-"""
-
 ANGLE = 1e5
 """Bound of the argument of sin and cos [rad]: 63 662 quarter turns, fewer than 2^16."""
 PER_QUARTER = real(0.6366197723675814)
@@ -76,7 +52,12 @@ SIN_SERIES = (
     -2.5050760240823352e-08,
     1.5896909130064357e-10,
 )
-"""(sin r / r - 1) / r^2, degree 5 in r^2, |r| <= pi/4; error of sin r / r 2^-58.0."""
+"""(sin r / r - 1) / r^2, degree 5 in r^2, |r| <= pi/4; error of sin r / r 2^-58.0.
+
+This and the next one: minimax by mpmath at 60 digits (Remez exchange), the lowest coefficient
+rounded to double and fixed, the rest fitted anew, and so on upwards; the errors are those of the
+rounded coefficients.
+"""
 COS_SERIES = (
     0.0416666666666666,
     -0.0013888888888874474,
@@ -134,22 +115,6 @@ class Circle:
 
 
 @dataclass(frozen=True)
-class Powers:
-    """The numbers of exp in one type: within `lowest` and `highest` its value is normal.
-
-    `least` is the exponent of 2 at the lowest; `rounding` rounds to whole numbers.
-    """
-
-    lowest: Value
-    highest: Value
-    least: Value
-    per_ln_2: Value
-    ln_2: tuple[Value, Value]
-    series: tuple[float, ...]
-    rounding: Value
-
-
-@dataclass(frozen=True)
 class Lambert:
     """The numbers of tanh in one type: x - tanh x = x z above(z) / below(z), z = x^2.
 
@@ -179,39 +144,6 @@ def horner(coefficients: tuple[float, ...], x: Expr, rest: Expr | None = None) -
     for number in reversed(lower):
         result = add(real(number), x if result == real(1.0) else multiply(x, result))
     return result
-
-
-POWERS = Powers(EXP_LOWEST, EXP_HIGHEST, real(-1021.0), PER_LN_2, LN_2, EXP_SERIES, ROUND)
-
-
-def exponential(of: Powers = POWERS) -> Function:
-    """e^x = 2^k e^r, k whole, |r| <= ln 2 / 2 (Cody & Waite 1980, Software Manual).
-
-    ln 2 has two parts; head = x - k ln2_1 is exact, r = head - tail, and the sum
-    1 + (head + (r^2 p(r) - tail)) adds the large terms last (Muller 2016, Elementary Functions).
-    x is clamped to [-708, 709]: the result is never infinite, zero or subnormal.
-    """
-    body = Body()
-    bounded = body.let("bounded", within(X, of.lowest, of.highest))
-    body.let("y", raised(body, bounded, None, of))
-    span = f"{of.lowest.value:g} <= x <= {of.highest.value:g}"
-    return body.function("exp", f"e^x; {span}, clamped; error < 0.95 ULP")
-
-
-def raised(body: Body, bounded: Ref, rest: Expr | None, of: Powers) -> Expr:
-    """Return e^(bounded + rest), `bounded` within the bounds of exp and `rest` far smaller."""
-    power = nearest(multiply(bounded, of.per_ln_2), of.rounding)
-    # The comparison is for NaN: pow2 gets a whole number always.
-    is_known = Compare(">", bounded, of.lowest)
-    exponent = body.let("exponent", Select(is_known, power, of.least))
-    head = body.let("head", subtract(bounded, multiply(exponent, of.ln_2[0])))
-    low = multiply(exponent, of.ln_2[1])
-    tail = body.let("tail", low if rest is None else subtract(low, rest))
-    r = body.let("r", subtract(head, tail))
-    series = pieced(body, of.series, r)
-    curved = subtract(multiply(multiply(r, r), series), tail)
-    scaled = body.let("scaled", add(real(1.0), add(head, curved)))
-    return multiply(Call("pow2", (exponent,)), scaled)
 
 
 def pieced(body: Body, coefficients: tuple[float, ...], x: Expr) -> Expr:

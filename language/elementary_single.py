@@ -7,7 +7,8 @@ in ULP of the exact result, were measured at every float32 of the domain (tests/
 
 from __future__ import annotations
 
-from language.elementary import Body, Circle, Lambert, Powers, horner, quartered
+from language.elementary import Body, Circle, Lambert, horner, quartered
+from language.exponent import Powers
 from language.logarithm import SERIES_SINGLE, Binades
 from language.number import LARGEST
 from language.operation import (

@@ -94,7 +94,7 @@ def field_variables(field: Field) -> list[Variable]:
     found = []
     for state, thing in field.automaton.states.items():
         dimension = thing.unit.dimension
-        about = "where it is evaluated"
+        about = "at the point that is looked at"
         found.append(Variable(f"work.at_{state}", "real", str(dimension), about=about))
         found.append(
             Variable(f"work.rate_{state}", "real", str(per_second(dimension)), about=about)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from language import elementary_single as of_single
-from language.elementary import cosine, exponential, hyperbolic_tangent, sine
+from language.elementary import cosine, hyperbolic_tangent, sine
+from language.exponent import exponential
 from language.logarithm import logarithm
 from language.number import NumberType
 from language.power import power_of

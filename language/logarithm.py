@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from language.elementary import LN_2, Body, X, horner, within
+from language.elementary import Body, X, horner, within
+from language.exponent import LN_2
 from language.number import LARGEST
 from language.operation import (
     Compare,

@@ -11,7 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 
-from language.elementary import POWERS, Body, Powers, horner, raised, within
+from language.elementary import Body, horner, within
+from language.exponent import POWERS, Powers, raised
 from language.logarithm import DOUBLE, Binades, halved
 from language.number import NumberType, rounded
 from language.operation import (
@@ -73,7 +74,9 @@ def power_of(numbers: PowerNumbers = DOUBLE_POWER) -> Function:
 
 
 def _logarithm(body: Body, pairs: _Pairs, numbers: PowerNumbers) -> tuple[Ref, Ref]:
-    """Return (head, tail): log of the base is their sum, within 2^-65 (float32: 2^-36) of it."""
+    """Return (head, tail), whose sum is log of the base but for 2^-63 of it, in float32 2^-34: the
+    largest errors among 40 000 and 20 000 bases.
+    """
     k, f = halved(body, BASE, numbers.log)
     first, *more = (Fraction(2, 2 * n + 3) for n in range(numbers.terms))
     large, small = _parts(first, numbers.number)

@@ -22,6 +22,7 @@ SECONDS = 30.0
 """How long [s] a scheduler may take to answer, and the first worker to join."""
 ASKED = 4
 """How often a scheduler is asked whose first answer comes with something else."""
+TALKED_OVER = "its scheduler was asked {} times, and each answer came with something else"
 CLOSING = 5.0
 """How long [s] a connection may take to end."""
 TALKATIVE = ("distributed", "tornado", "asyncio")
@@ -75,7 +76,9 @@ def connected(
         stack.enter_context(_quiet())
         try:
             client = _client(where, security, seconds)
-        except (OSError, ValueError, RuntimeError, AssertionError) as error:
+        except AssertionError:
+            raise ClusterError(f"{address.url}: {TALKED_OVER.format(ASKED)}") from None
+        except (OSError, ValueError, RuntimeError) as error:
             reason = str(error).splitlines()[0] if str(error) else type(error).__name__
             raise ClusterError(f"{address.url}: no scheduler answers: {reason}") from None
         stack.callback(_end, client)

@@ -57,16 +57,16 @@ typedef struct {
 
 /* Values that live within one step */
 typedef struct {
-    double at_w_w; /* rad/s; where it is evaluated */
-    double rate_w_w; /* rad/s^2; where it is evaluated */
-    double at_w_em; /* rad/s; where it is evaluated */
-    double rate_w_em; /* rad/s^2; where it is evaluated */
-    double at_theta_d; /* rad; where it is evaluated */
-    double rate_theta_d; /* rad/s; where it is evaluated */
-    double at_theta_b; /* rad; where it is evaluated */
-    double rate_theta_b; /* rad/s; where it is evaluated */
-    double at_T_l; /* N*m; where it is evaluated */
-    double rate_T_l; /* W; where it is evaluated */
+    double at_w_w; /* rad/s; at the point that is looked at */
+    double rate_w_w; /* rad/s^2; at the point that is looked at */
+    double at_w_em; /* rad/s; at the point that is looked at */
+    double rate_w_em; /* rad/s^2; at the point that is looked at */
+    double at_theta_d; /* rad; at the point that is looked at */
+    double rate_theta_d; /* rad/s; at the point that is looked at */
+    double at_theta_b; /* rad; at the point that is looked at */
+    double rate_theta_b; /* rad/s; at the point that is looked at */
+    double at_T_l; /* N*m; at the point that is looked at */
+    double rate_T_l; /* W; at the point that is looked at */
     bool guard_0; /* a guard of the mode that flows, in the order of its transitions */
     bool guard_1; /* a guard of the mode that flows, in the order of its transitions */
     double merge; /* s; what crosses within it is one instant */

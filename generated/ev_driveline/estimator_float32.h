@@ -293,12 +293,12 @@ typedef struct {
 /* Values that live within one step */
 typedef struct {
     float left; /* s; rest of the tick, or of its substep */
-    float at_w_w; /* rad/s; where it is evaluated */
-    float rate_w_w; /* rad/s^2; where it is evaluated */
-    float at_w_em; /* rad/s; where it is evaluated */
-    float rate_w_em; /* rad/s^2; where it is evaluated */
-    float at_theta_d; /* rad; where it is evaluated */
-    float at_theta_b; /* rad; where it is evaluated */
+    float at_w_w; /* rad/s; at the point that is looked at */
+    float rate_w_w; /* rad/s^2; at the point that is looked at */
+    float at_w_em; /* rad/s; at the point that is looked at */
+    float rate_w_em; /* rad/s^2; at the point that is looked at */
+    float at_theta_d; /* rad; at the point that is looked at */
+    float at_theta_b; /* rad; at the point that is looked at */
     bool guard_0; /* a guard of the mode that flows, in the order of its transitions */
     bool guard_1; /* a guard of the mode that flows, in the order of its transitions */
     float h; /* s; step to flow over */

@@ -37,7 +37,7 @@ bmw_i3_CALIBRATION const volatile bmw_i3_Cal bmw_i3_default_cal = {
 
 /* Values that live within one step */
 typedef struct {
-    double at_v; /* m/s; where it is evaluated */
+    double at_v; /* m/s; at the point that is looked at */
 } Work;
 
 /* Guards of mode always */

@@ -49,8 +49,8 @@ typedef struct {
 
 /* Values that live within one step */
 typedef struct {
-    double at_z; /* m; where it is evaluated */
-    double rate_z; /* m/s; where it is evaluated */
+    double at_z; /* m; at the point that is looked at */
+    double rate_z; /* m/s; at the point that is looked at */
     bool guard_0; /* a guard of the mode that flows, in the order of its transitions */
     bool guard_1; /* a guard of the mode that flows, in the order of its transitions */
     double merge; /* s; what crosses within it is one instant */

@@ -36,9 +36,9 @@ emps_CALIBRATION const volatile emps_Cal emps_default_cal = {
 
 /* Values that live within one step */
 typedef struct {
-    double at_q; /* m; where it is evaluated */
-    double at_v; /* m/s; where it is evaluated */
-    double at_F_dr; /* N; where it is evaluated */
+    double at_q; /* m; at the point that is looked at */
+    double at_v; /* m/s; at the point that is looked at */
+    double at_F_dr; /* N; at the point that is looked at */
 } Work;
 
 /* Guards of mode always */

@@ -40,8 +40,8 @@ leaf_motor_side_CALIBRATION const volatile leaf_motor_side_Cal leaf_motor_side_d
 
 /* Values that live within one step */
 typedef struct {
-    double at_w_em; /* rad/s; where it is evaluated */
-    double at_theta_d; /* rad; where it is evaluated */
+    double at_w_em; /* rad/s; at the point that is looked at */
+    double at_theta_d; /* rad; at the point that is looked at */
 } Work;
 
 /* Guards of mode always */

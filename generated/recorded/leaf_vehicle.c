@@ -47,9 +47,9 @@ leaf_vehicle_CALIBRATION const volatile leaf_vehicle_Cal leaf_vehicle_default_ca
 
 /* Values that live within one step */
 typedef struct {
-    double at_w_em; /* rad/s; where it is evaluated */
-    double at_w_w; /* rad/s; where it is evaluated */
-    double at_theta_d; /* rad; where it is evaluated */
+    double at_w_em; /* rad/s; at the point that is looked at */
+    double at_w_w; /* rad/s; at the point that is looked at */
+    double at_theta_d; /* rad; at the point that is looked at */
 } Work;
 
 /* Guards of mode always */

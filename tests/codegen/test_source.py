@@ -117,6 +117,23 @@ def test_every_key_of_an_assignment_stands_beside_its_target(name: str) -> None:
                 assert (target, op.key) in pairs
 
 
+def test_what_nothing_reads_is_not_printed() -> None:
+    """Angles have no rate of their own here: it is in the linear part."""
+    assert "work.rate_theta_d" in {variable.name for variable in program("estimator").variables}
+    for text in (files := files_of("estimator")).values():
+        assert "rate_theta_d" not in text
+    assert "double rate_w_w; /* rad/s^2; at the point that is looked at */" in files["estimator.h"]
+
+
+def test_each_matrix_of_a_page_is_told_of_once() -> None:
+    header = files_of("estimator")["estimator.h"]
+    title = "        /* drive_L_row__column: the gain of the correction */\n"
+    assert header.count(title) == 1
+    assert header[header.index(title) + len(title) :].startswith(
+        "        double drive_L_theta_d__y"
+    )
+
+
 @pytest.mark.parametrize("name", AUTOMATA)
 def test_files_carry_the_digest_but_no_date_and_no_place(name: str) -> None:
     files = files_of(name)

@@ -9,7 +9,7 @@ from fractions import Fraction
 import mpmath
 import pytest
 
-from language import elementary, logarithm, tangent
+from language import elementary, exponent, logarithm, tangent
 from language.functions import FUNCTIONS
 from language.operation import (
     Assign,
@@ -83,10 +83,10 @@ def test_reduction_constants() -> None:
     for part in (first, second):
         assert (part.numerator * 63_662).bit_length() <= 53
     assert abs(third) < Fraction(1, 2**73)
-    first, second = values_of(*elementary.LN_2)
+    first, second = values_of(*exponent.LN_2)
     assert (first * 2**42).denominator == 1
     assert (first.numerator * 1023).bit_length() <= 53
-    rest = mpmath.log(2) - sum(mpmath.mpf(part.value) for part in elementary.LN_2)
+    rest = mpmath.log(2) - sum(mpmath.mpf(part.value) for part in exponent.LN_2)
     assert abs(rest) < mpmath.mpf(2) ** -102
     nearest_angle = mpmath.mpf(WORST_ANGLE) - 29 * mpmath.pi / 2
     assert mpmath.mpf(2) ** -61 < abs(nearest_angle) < mpmath.mpf(2) ** -60
@@ -102,7 +102,7 @@ def test_series_errors() -> None:
         wrong = mpmath.cos(r) - (1 - z / 2 + z * z * polynomial(elementary.COS_SERIES, z))
         assert abs(wrong) < mpmath.mpf(2) ** -64.1
         for r in (mpmath.log(2) / 2 * i / 400, -mpmath.log(2) / 2 * i / 400):
-            e = 1 + r + r * r * polynomial(elementary.EXP_SERIES, r)
+            e = 1 + r + r * r * polynomial(exponent.EXP_SERIES, r)
             assert abs(e / mpmath.exp(r) - 1) < mpmath.mpf(2) ** -57.9
 
 

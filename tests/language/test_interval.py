@@ -8,9 +8,10 @@ import pytest
 from hypothesis import given, strategies as st
 
 from language.evaluate import evaluate
-from language.interval import ANYTHING, Interval, Ranging
+from language.interval import ANYTHING, Interval
 from language.lower import expression
 from language.operation import Ref
+from language.ranging import Ranging
 from language.syntax import Likeness, Tree
 from tests.language.making import tree
 
@@ -58,6 +59,8 @@ def test_every_value_lies_in_the_interval(text: str, a: float, b: float) -> None
         ("a * a", 0.0, 9.0),
         ("abs(a)", 0.0, 3.0),
         ("1 / b", 0.25, 2.0),
+        ("pow(b, 2)", 0.25, 16.0),
+        ("pow(abs(a), 3)", 0.0, 27.0),
         ("max(a, 1)", 1.0, 3.0),
         ("max(c, 1)", 1.0, math.inf),
         ("c^2", 0.0, math.inf),
@@ -75,6 +78,10 @@ def test_bounds_are_as_narrow_as_the_operations_give(text: str, low: float, high
         ("b / (a + 2)", ["divisor 6"]),
         ("a^-1", ["divisor 1"]),
         ("sqrt(a)", ["root 6"]),
+        ("pow(a, 2)", ["power 5"]),
+        ("pow(b - 0.5, 2)", []),
+        ("pow(b - 0.5, a)", ["inverse power 5"]),
+        ("1 / (16 - pow(b, 2))", ["divisor 6"]),
         ("sqrt(max(a, 0))", []),
         ("if a > 0 then b / a else 0", []),
         ("if a >= 0 then b / a else 0", ["divisor 20"]),
