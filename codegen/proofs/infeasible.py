@@ -1,19 +1,23 @@
 """Infeasible: conditions of the C of a sampled Program that no input makes true, or false: proofs.
 
-One step is followed from any values that an invariant allows, with any inputs and any page
-(`symbolic.py`, `terms.py`). The invariant is what is left of a proposal once all is out that does
-not hold at the start or does not stay (Houdini, Flanagan and Leino 2001): ranges of variables, ends
-of counters, numbers of modes.
+A step is followed from cut to cut (`cut.py`, `symbolic.py`, `terms.py`) from any values that facts
+allow, with any inputs and any page within its ranges (`fact.py`, `invariant.py`). What facts alone
+do not exclude is asked of z3's Spacer, which looks for facts of its own (`reach.py`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from codegen.expression import LOGIC, c_expression
 from codegen.names import SOLVED_ON_PAGE, CNames
-from codegen.proofs.symbolic import Fact, World
+from codegen.proofs.cut import Visit
+from codegen.proofs.fact import Fact
+from codegen.proofs.invariant import invariant, is_never, known_at
+from codegen.proofs.reach import Reach
+from codegen.proofs.symbolic import World
 from codegen.proofs.terms import Range
 from codegen.statement import going_on, opposite
 from codegen.usage import locals_of
@@ -72,15 +76,32 @@ def never(
     `ranges` are those of variables between two steps, as far as they stay in them.
     """
     world = World(program)
-    facts = _invariant(world, ranges)
-    world.step()
-    found: dict[int, bool] = {}
-    for number in wanted:
-        visits = world.visits.get(number, [])
+    facts = invariant(world, ranges)
+    reach = Reach(world, facts)
+    found = {number: _outcome(world, facts, reach, number) for number in wanted}
+    return {number: outcome for number, outcome in found.items() if outcome is not None}
+
+
+def _outcome(world: World, facts: Collection[Fact], reach: Reach, number: int) -> bool | None:
+    """Return the outcome that a condition never has: what facts exclude is seen sooner."""
+    visits = world.visits.get(number, [])
+    for excluded in (partial(_is_excluded, world, facts), reach.never) if visits else ():
         for outcome in (True, False):
-            if visits and all(world.excludes(visit, outcome, facts) for visit in visits):
-                found[number] = outcome
-    return found
+            if excluded(visits, outcome):
+                return outcome
+    return None
+
+
+def _is_excluded(
+    world: World, facts: Collection[Fact], visits: Sequence[Visit], outcome: bool
+) -> bool:
+    """Tell whether facts alone exclude an outcome at all visits of a condition."""
+    for visit in visits:
+        term = visit.condition if outcome else world.z3.Not(visit.condition)
+        known = known_at(world, visit.begin, facts)
+        if not is_never(world, [term, *visit.given, *known]):
+            return False
+    return True
 
 
 def _inside(op: Op) -> Iterator[Expr]:
@@ -101,15 +122,3 @@ def _conditions(expr: Expr) -> Iterator[Expr]:
             yield from _conditions(operand)
         case _:
             yield expr
-
-
-def _invariant(world: World, ranges: Mapping[str, Range]) -> list[Fact]:
-    """Return what holds before every step: the largest part of what is proposed that stays."""
-    values = world.step()
-    first = world.after_init()
-    facts = [fact for fact in world.proposed(ranges) if world.holds(first, fact)]
-    while True:
-        stays = [fact for fact in facts if world.holds(values, fact, facts)]
-        if stays == facts:
-            return facts
-        facts = stays

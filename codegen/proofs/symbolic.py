@@ -1,16 +1,17 @@
-"""Symbolic: one step of a sampled Program over values that are not known, for z3.
+"""Symbolic: the ways of a sampled Program from cut to cut over values that are not known, for z3.
 
-What loops leave is left open, as is what operations give (`terms.py`): more than happens, so what
-is never true of it never is.
+What loops inside branches leave is left open, as is what operations give (`terms.py`): more than
+happens, so what is never true of it never is.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 from typing import Any
 
-from codegen.proofs.terms import Limits, Range, Terms
+from codegen.proofs.cut import At, Cut, Visit, Way, blocks_of, loop_cut, step_cut
+from codegen.proofs.terms import Terms
+from codegen.statement import going_on
 from language.operation import (
     Assign,
     Binary,
@@ -32,25 +33,15 @@ from language.operation import (
     Unary,
     Value,
 )
-from language.program import MODE, Program
-from language.run import MODE as RUN_MODE
-from language.traversal import block_writes, reached, walk
-
-EFFORT = 20_000_000
-"""Units of z3's own count for one question: some seconds, and the same answer on every machine."""
-Fact = tuple[str, Limits]
-
-
-@dataclass(frozen=True)
-class Visit:
-    """A condition where a step comes by it, and what holds there."""
-
-    condition: Any
-    path: Any
+from language.program import Program
+from language.traversal import block_writes
 
 
 class World:
-    """Values of a Program, and one step of it from `start`; `visits` are by `id` of a condition."""
+    """The `ways` of a Program from cut to cut; `visits` are by `id` of a condition.
+
+    Each of the `cuts` has the numbers and truth values with which its loop begins.
+    """
 
     def __init__(self, program: Program) -> None:
         self.program = program
@@ -60,56 +51,37 @@ class World:
         self.kinds |= {c.name: c.type for c in program.constants}
         fixed = (c for c in program.constants if c.kind == "fixed")
         self.fixed = {c.name: self.terms.value(c.value) for c in fixed}
-        self.start: Mapping[str, Any] = {}
+        self.tables = {c.name: c.items for c in program.constants if c.kind == "fixed" and c.items}
+        self.always = self.terms.value(True)
+        self.cuts: dict[Cut, dict[str, int]] = {}
+        self.ways: list[Way] = []
         self.visits: dict[int, list[Visit]] = {}
+        self.begin: At | None = None
+        self.given: tuple[Any, ...] = ()
+        self._go()
 
-    def proposed(self, ranges: Mapping[str, Range]) -> Iterator[Fact]:
-        """Yield what may hold of variables between two steps."""
-        yield from ranges.items()
-        for name, infos in ((MODE, self.program.modes), (RUN_MODE, self.program.run_modes)):
-            if name in self.kinds and infos:
-                yield name, frozenset(info.number for info in infos)
-        for block in self.program.blocks.values():
-            for op in walk(block):
-                if isinstance(op, Count):
-                    yield op.timer, frozenset(range(op.limit))
-                    yield op.timer, frozenset(range(op.limit + 1))
+    def _go(self) -> None:
+        """Go all ways: to the first step, and from one to the next."""
+        cut = step_cut(self.program)
+        self.cuts[cut] = {}
+        self._end(cut, self._after_init())
+        self.visits = {}
+        self.begin = At(cut, {name: self._any(name) for name in self.kinds} | self.fixed)
+        values = dict(self.begin.values)
+        self.given = self._page(values)
+        self._block(self.program.blocks["step"], values, self.always)
+        self._end(cut, values)
 
-    def after_init(self) -> dict[str, Any]:
+    def _after_init(self) -> dict[str, Any]:
         """Return what variables are before the first step: 0 or false, and what `init` sets."""
         zero = {"real": 0.0, "truth": False}
         values = {name: self.terms.value(zero.get(kind, 0)) for name, kind in self.kinds.items()}
-        values |= self.fixed
-        self._block(self.program.blocks["init"], values, self.terms.value(True))
+        values |= {c.name: self._any(c.name) for c in self.program.constants} | self.fixed
+        self._block(self.program.blocks["init"], values, self.always)
         return values
 
-    def step(self) -> dict[str, Any]:
-        """Return what variables are after one step from anywhere; its conditions are noted."""
-        self.visits = {}
-        values = {name: self._any(name) for name in self.kinds} | self.fixed
-        self.start = dict(values)
-        self._block(self.program.blocks["step"], values, self.terms.value(True))
-        return values
-
-    def holds(self, values: Mapping[str, Any], fact: Fact, before: Collection[Fact] = ()) -> bool:
-        """Prove a fact of some values, where others held before the step."""
-        name, limits = fact
-        wrong = self.z3.Not(self.terms.within(values[name], limits))
-        return self._is_never([wrong, *self._all(before)])
-
-    def excludes(self, visit: Visit, outcome: bool, before: Collection[Fact]) -> bool:
-        """Prove that a condition never has an outcome where it is come by."""
-        condition = visit.condition if outcome else self.z3.Not(visit.condition)
-        return self._is_never([condition, visit.path, *self._all(before)])
-
-    def _all(self, facts: Collection[Fact]) -> list[Any]:
-        return [self.terms.within(self.start[name], limits) for name, limits in facts]
-
-    def _is_never(self, facts: list[Any]) -> bool:
-        solver = self.z3.Solver()
-        solver.set("rlimit", EFFORT)
-        solver.add(*facts)
-        return bool(solver.check() == self.z3.unsat)
+    def _end(self, cut: Cut, values: Mapping[str, Any]) -> None:
+        self.ways.append(Way(self.begin, self.given, At(cut, dict(values))))
 
     def _any(self, name: str) -> Any:
         return self.terms.new(self.kinds.get(name, "real"), name)
@@ -135,8 +107,10 @@ class World:
                 which = values[selector]
                 for number, case in cases:
                     self._merge(which == number, case, (), values, path)
+            case Loop() if path is self.always:
+                self._cut(op, values)
             case Loop(_, index, body):
-                self._loop(index, body, values, path)
+                self._left_open(index, body, values, path)
             case Count():
                 self._count(op, values, path)
             case FaultBit():
@@ -162,18 +136,60 @@ class World:
             if a is None or b is None:
                 values[name] = self._any(name)
             elif a is not b:
-                values[name] = z3.If(test, a, b)
+                values[name] = self.terms.choose(test, a, b)
 
-    def _loop(self, index: str, body: Block, values: dict[str, Any], path: Any) -> None:
+    def _cut(self, loop: Loop, values: dict[str, Any]) -> None:
+        """A loop that every step comes by: ways lead into it, through a turn of it, and on."""
+        index, limit, going = loop.index, loop.count, going_on(loop.index, loop.body)[0]
+        self.kinds[index] = "whole"
+        cut = loop_cut(self.program, loop, len(self.cuts))
+        values[index] = self.z3.IntVal(0)
+        for name in cut.names:
+            values.setdefault(name, self._any(name))
+        known = {name: self.terms.number_of(values[name]) for name in cut.names}
+        self.cuts[cut] = {name: number for name, number in known.items() if number is not None}
+        self._end(cut, values)
+        turn = self._begun(cut, values)
+        self._visited(id(loop), turn[index] < limit, self.always)
+        self.given += (turn[index] < limit,)
+        goes = self.always if going is None else self._unseen(going, values)
+        after = dict(values)
+        self._block(loop.body, after, self.always)
+        after[index] = turn[index] + 1
+        self.given += (goes,)
+        self._end(cut, after)
+        turn = self._begun(cut, values)
+        goes = self.always if going is None else self._unseen(going, values)
+        self.given += (self.z3.Not(self.z3.And(turn[index] < limit, goes)),)
+
+    def _begun(self, cut: Cut, values: dict[str, Any]) -> Mapping[str, Any]:
+        """Begin at a cut: nothing is known of values but what its facts say."""
+        for name in values:
+            if name not in self.fixed:
+                values[name] = self._any(name)
+        self.begin, self.given = At(cut, dict(values)), self._page(values)
+        return self.begin.values
+
+    def _page(self, values: Mapping[str, Any]) -> tuple[Any, ...]:
+        """Return that what a page holds is within its ranges."""
+        tunable = [c for c in self.program.constants if c.kind == "tunable" and not c.items]
+        return tuple(self.terms.within(values[c.name], c.range) for c in tunable if c.range)
+
+    def _unseen(self, condition: Expr, values: Mapping[str, Any]) -> Any:
+        """Return a condition that is not come by here."""
+        visits, self.visits = self.visits, {}
+        found = self._expr(condition, dict(values), self.always)
+        self.visits = visits
+        return found
+
+    def _left_open(self, index: str, body: Block, values: dict[str, Any], path: Any) -> None:
         """Any turn of a loop begins with any values of what the loop sets, and so ends all."""
-        names = {index, *block_writes(body)}
-        for op in walk(body):
-            if isinstance(op, Run):
-                for run in reached(op.block, self.program.blocks):
-                    names |= set(block_writes(self.program.blocks[run]))
+        names = {index}
+        for block in blocks_of(self.program, body):
+            names |= set(block_writes(block))
         for name in sorted(names):
             values[name] = self.terms.new("whole", name) if name == index else self._any(name)
-        self._block(body, dict(values), path)
+        self._block(body, dict(values), self.z3.And(path, self.always))
         for name in sorted(names):
             values[name] = self._any(name)
 
@@ -196,7 +212,8 @@ class World:
         return self._visited(id(condition), self._expr(condition, values, path), path)
 
     def _visited(self, number: int, condition: Any, path: Any) -> Any:
-        self.visits.setdefault(number, []).append(Visit(condition, path))
+        given = (*self.given, path)
+        self.visits.setdefault(number, []).append(Visit(self.begin, given, condition))
         return condition
 
     def _expr(self, expr: Expr, values: dict[str, Any], path: Any) -> Any:
@@ -224,6 +241,10 @@ class World:
             case Select(condition, then, other):
                 test = self._decided(condition, values, path)
                 one = self._expr(then, values, z3.And(path, test))
-                return z3.If(test, one, self._expr(other, values, z3.And(path, z3.Not(test))))
+                two = self._expr(other, values, z3.And(path, z3.Not(test)))
+                return terms.choose(test, one, two)
+            case Call("lookup", (_, Value(int(size)), Ref(name), x)) if name in self.tables:
+                points = self.tables[name][:size]
+                return terms.looked_up(points, self._expr(x, values, path))
             case Call(function, arguments):
                 return terms.call(function, [self._expr(a, values, path) for a in arguments])

@@ -1,18 +1,35 @@
 """Terms: numbers and operations of a Program as z3 has them.
 
-Reals are floating-point numbers: comparisons, signs, abs, min, max and clip are IEEE 754's, NaN
-included. What + - * / and functions give is left open: any function of the same operands.
+A real is a number of the number line and whether it is a NaN: comparisons, signs, abs, min, max and
+clip depend on the order of numbers alone, and infinities are two numbers beyond all others. What
++ - * / and functions give is left open: the same for the same operands, and of a product that it is
+no larger than a factor where the other one is at most 1.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import pairwise
+from math import isfinite
 from typing import Any
 
-from language.number import NumberType
+from language.number import LARGEST, NumberType, rounded
 
+BEFORE_ONE = {"float64": 1.0 - 2.0**-53, "float32": 1.0 - 2.0**-24}
+"""The number before 1."""
 Range = tuple[float, float]
 Limits = Range | frozenset[int]
 """Ends of a real, or the values of a whole number."""
+
+
+@dataclass(frozen=True)
+class Real:
+    """A real: its place among the numbers, and whether it is none."""
+
+    value: Any
+    nan: Any
 
 
 class Terms:
@@ -22,75 +39,158 @@ class Terms:
         import z3
 
         self.z3 = z3
-        self.real = z3.FPSort(*((11, 53) if number == "float64" else (8, 24)))
+        self.number = number
         self.count = 0
+        self.bounds: dict[int, list[Any]] = {}
+        self.known: dict[tuple[object, ...], tuple[Any, object]] = {}
 
     def value(self, value: float | int | bool) -> Any:
         """Return a literal."""
+        z3 = self.z3
         if isinstance(value, bool):
-            return self.z3.BoolVal(value)
-        return (
-            self.z3.FPVal(value, self.real) if isinstance(value, float) else self.z3.IntVal(value)
-        )
+            return z3.BoolVal(value)
+        if not isinstance(value, float):
+            return z3.IntVal(value)
+        number = rounded(value, self.number)
+        if not isfinite(number):
+            return self.new("real", "literal")
+        return Real(z3.RealVal(str(Fraction(number))), z3.BoolVal(False))
+
+    def number_of(self, value: Any) -> int | None:
+        """Return the whole number or, as 0 and 1, the truth value that a literal is."""
+        z3 = self.z3
+        if isinstance(value, Real):
+            return None
+        if z3.is_int_value(value):
+            return int(value.as_long())
+        return 1 if z3.is_true(value) else 0 if z3.is_false(value) else None
 
     def new(self, kind: str, name: str) -> Any:
         """Return what may be any value of its kind: real, truth or whole."""
+        z3 = self.z3
         self.count += 1
         text = f"{name}!{self.count}"
         if kind == "truth":
-            return self.z3.Bool(text)
-        return self.z3.Const(text, self.real) if kind == "real" else self.z3.Int(text)
+            return z3.Bool(text)
+        return Real(z3.Real(text), z3.Bool(f"{text} is NaN")) if kind == "real" else z3.Int(text)
+
+    def choose(self, test: Any, then: Any, other: Any) -> Any:
+        """Return one of two values of a kind."""
+        if isinstance(then, Real):
+            values = self.z3.If(test, then.value, other.value)
+            return Real(values, self.z3.If(test, then.nan, other.nan))
+        return self.z3.If(test, then, other)
 
     def within(self, value: Any, limits: Limits) -> Any:
         """Return whether a value is within limits."""
         z3 = self.z3
+        if isinstance(limits, frozenset) and z3.is_bool(value):
+            return z3.Or(*(value if number else z3.Not(value) for number in sorted(limits)))
         if isinstance(limits, frozenset):
             return z3.Or(*(value == number for number in sorted(limits)))
+        if not isinstance(value, Real):
+            return z3.And(value >= int(limits[0]), value <= int(limits[1]))
         low, high = (self.value(float(end)) for end in limits)
-        return z3.And(z3.fpLEQ(low, value), z3.fpLEQ(value, high))
+        return z3.And(z3.Not(value.nan), low.value <= value.value, value.value <= high.value)
 
     def minus(self, value: Any) -> Any:
         """Return -x."""
-        return self.z3.fpNeg(value) if self.z3.is_fp(value) else -value
+        return Real(-value.value, value.nan) if isinstance(value, Real) else -value
 
     def sum(self, operator: str, left: Any, right: Any) -> Any:
         """Return what + - * / give."""
-        if self.z3.is_fp(left):
-            return self.z3.Function(f"real {operator}", self.real, self.real, self.real)(
-                left, right
-            )
+        if isinstance(left, Real):
+            made = self._left_open(operator, (left, right), "real")
+            if operator == "*":
+                self._bound(made, left, right)
+                self._bound(made, right, left)
+            return made
         if operator == "/":
             return self.new("whole", "quotient")
         return {"+": left + right, "-": left - right, "*": left * right}[operator]
 
+    def _bound(self, product: Real, factor: Real, other: Real) -> None:
+        """A product with a factor of at most 1 is no larger than the other one, rounded or not."""
+        z3 = self.z3
+        small = z3.And(self._is_finite(factor), factor.value <= 1, factor.value >= -1)
+        size = self._size(other).value
+        is_bound = z3.And(z3.Not(product.nan), product.value <= size, product.value >= -size)
+        bound = z3.Implies(z3.And(small, self._is_finite(other)), is_bound)
+        self.bounds.setdefault(product.value.get_id(), []).append(bound)
+
+    def lemmas(self, facts: Sequence[Any]) -> list[Any]:
+        """Return what is known of the products in some facts."""
+        found: list[Any] = []
+        seen, stack = set[int](), list(facts)
+        while stack:
+            part = stack.pop()
+            number = part.get_id()
+            if number not in seen:
+                seen.add(number)
+                bounds = self.bounds.get(number, [])
+                found += bounds
+                stack += [*part.children(), *bounds]
+        return found
+
+    def _is_finite(self, x: Real) -> Any:
+        largest = self.value(LARGEST[self.number]).value
+        return self.z3.And(self.z3.Not(x.nan), -largest <= x.value, x.value <= largest)
+
     def compare(self, operator: str, left: Any, right: Any) -> Any:
         """Return a relation; with a NaN it is false, except `!=`."""
         z3 = self.z3
-        if operator in ("==", "!="):
-            equal = z3.fpEQ(left, right) if z3.is_fp(left) else left == right
-            return equal if operator == "==" else z3.Not(equal)
-        if z3.is_fp(left):
-            of = {"<": z3.fpLT, "<=": z3.fpLEQ, ">": z3.fpGT, ">=": z3.fpGEQ}
-            return of[operator](left, right)
-        whole = {"<": left < right, "<=": left <= right, ">": left > right, ">=": left >= right}
-        return whole[operator]
+        if operator == "!=":
+            return z3.Not(self.compare("==", left, right))
+        a, b = (one.value if isinstance(one, Real) else one for one in (left, right))
+        found = {"==": a == b, "<": a < b, "<=": a <= b, ">": a > b, ">=": a >= b}[operator]
+        if isinstance(left, Real):
+            return z3.And(z3.Not(left.nan), z3.Not(right.nan), found)
+        return found
 
     def call(self, function: str, given: list[Any]) -> Any:
         """Return what an elementary operation or a function gives."""
-        z3, first = self.z3, given[0]
-        if function == "whole" or not z3.is_fp(first):
+        first = given[0]
+        if function == "whole" or not isinstance(first, Real):
             return self.new("real" if function == "real" else "whole", function)
         match function, given:
             case "abs", _:
-                return z3.fpAbs(first)
+                return self._size(first)
             case "min", [a, b]:
-                return z3.If(z3.fpLT(b, a), b, a)
+                return self.choose(self.compare("<", b, a), b, a)
             case "max", [a, b]:
-                return z3.If(z3.fpGT(b, a), b, a)
+                return self.choose(self.compare(">", b, a), b, a)
             case "clip", [x, low, high]:
-                return z3.If(z3.fpGT(x, low), z3.If(z3.fpLT(x, high), x, high), low)
+                inside = self.choose(self.compare("<", x, high), x, high)
+                return self.choose(self.compare(">", x, low), inside, low)
             case "within", [x, low, high]:
-                return z3.And(z3.fpLEQ(low, x), z3.fpLEQ(x, high))
+                return self.z3.And(self.compare("<=", low, x), self.compare("<=", x, high))
             case _:
-                sorts = [one.sort() for one in given]
-                return z3.Function(function, *sorts, self.real)(*given)
+                return self._left_open(function, given, "real")
+
+    def looked_up(self, points: Sequence[float], x: Real) -> Real:
+        """Return a value of a table: rounding keeps order, so it lies between those at the ends of
+        its cells, and those just before the ends.
+        """
+        z3, whole = self.z3, self.new("real", "lookup")
+        ends = list(points)
+        for a, b in pairwise(points):
+            apart = rounded(b - a, self.number)
+            step = rounded(BEFORE_ONE[self.number] * apart, self.number)
+            ends.append(rounded(a + step, self.number))
+        low, high = self.value(min(ends)).value, self.value(max(ends)).value
+        found = Real(whole.value, whole.nan)
+        within = z3.And(z3.Not(found.nan), low <= found.value, found.value <= high)
+        bound = z3.Implies(z3.Not(x.nan), within)
+        self.bounds.setdefault(found.value.get_id(), []).append(bound)
+        return found
+
+    def _size(self, x: Real) -> Real:
+        return Real(self.z3.If(x.value < 0, -x.value, x.value), x.nan)
+
+    def _left_open(self, name: str, given: Sequence[Any], kind: str) -> Any:
+        """Return what may be anything, but the same for the same operands."""
+        parts = [p for g in given for p in ((g.value, g.nan) if isinstance(g, Real) else (g,))]
+        key = (name, *(part.get_id() for part in parts))
+        if key not in self.known:
+            self.known[key] = self.new(kind, name), parts  # parts keep their numbers
+        return self.known[key][0]

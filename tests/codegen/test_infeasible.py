@@ -62,14 +62,21 @@ def test_what_cannot_be_is_proven_and_nothing_else(number: str) -> None:
     assert found.pop("self->timer.shut_open < 4U") == "T"
     assert found.pop(f"(self->state.level > 5.0{suffix}) || (!in->go)") == "F."
     assert found.pop(f"self->latched.u > 100.0{suffix}") == "F"
+    assert found.pop(f"fabs{suffix.lower()}(self->latched.u) < cal->top") == "F"  # no way there
     assert all(marks == "T" and "_level, 0" in text for text, marks in found.items()), found
 
 
 def test_a_range_that_does_not_stay_proves_nothing() -> None:
-    made = program(VALVE.format(number="float64"))
+    free = VALVE.format(number="float64").replace("clip(level + u, 0, 4)", "level + u")
+    made = program(free.replace(", range: [0, 5]", ""))
     for wrong in ({"state.level": (0.0, 3.0)}, {"state.level": (1.0, 5.0)}, {}):
         assert proven(made, wrong)["self->latched.u > 100.0"] == "F"  # it is held when it is read
         assert not any(text.startswith("(self->state.level > 5.0)") for text in proven(made, wrong))
+
+
+def test_what_stays_within_a_range_needs_none_declared() -> None:
+    made = program(VALVE.format(number="float64"))
+    assert proven(made, {})["(self->state.level > 5.0) || (!in->go)"] == "F."
 
 
 def test_a_nan_is_in_no_range() -> None:

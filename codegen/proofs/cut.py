@@ -1,0 +1,79 @@
+"""Cut: where the ways of a Program are cut, and what may be known there.
+
+A step is cut where it begins and ends, and each loop that every step comes by where a turn of it
+begins: between two cuts there is no way back.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from language.operation import Block, Loop, Run
+from language.program import Program
+from language.traversal import block_reads, reached, walk
+
+PASSING = ("input", "is_new", "work", "calibration", "derived")
+"""Groups of what each step brings or finds anew."""
+
+
+@dataclass(frozen=True, eq=False)
+class Cut:
+    """A place with the variables that are known there; `loop` if it is where a turn begins."""
+
+    name: str
+    names: tuple[str, ...]
+    loop: Loop | None = None
+
+
+@dataclass(frozen=True)
+class At:
+    """A cut, and the values that variables have there."""
+
+    cut: Cut
+    values: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Way:
+    """What leads from one cut, or from nowhere, to the next one: all that is `given`."""
+
+    begin: At | None
+    given: tuple[Any, ...]
+    end: At
+
+
+@dataclass(frozen=True)
+class Visit:
+    """A condition where a way comes by it, and what holds there."""
+
+    begin: At | None
+    given: tuple[Any, ...]
+    condition: Any
+
+
+def step_cut(program: Program) -> Cut:
+    """Return the cut between two steps."""
+    read = {name for block in program.blocks.values() for name in block_reads(block)}
+    whole = (v.name for v in program.variables if not v.size and v.name in read)
+    return Cut("step", tuple(name for name in whole if name.partition(".")[0] not in PASSING))
+
+
+def loop_cut(program: Program, loop: Loop, number: int) -> Cut:
+    """Return the cut where a turn of a loop begins: all that is read anywhere is known."""
+    read = {name for block in program.blocks.values() for name in block_reads(block)}
+    fixed = {c.name for c in program.constants if c.kind == "fixed" or c.items}
+    things = {v.name for v in (*program.variables, *program.inputs) if not v.size}
+    things |= {c.name for c in program.constants}
+    whole = (things & read) - fixed
+    return Cut(f"loop {number}", (*sorted(whole - {loop.index}), loop.index), loop)
+
+
+def blocks_of(program: Program, block: Block) -> Iterator[Block]:
+    """Yield a block, and all that it runs."""
+    runs = {
+        r for op in walk(block) if isinstance(op, Run) for r in reached(op.block, program.blocks)
+    }
+    yield block
+    yield from (program.blocks[run] for run in sorted(runs))

@@ -1,0 +1,71 @@
+"""Holding: whether a fact holds - of terms, for z3, and of numbers."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable, Mapping
+from fractions import Fraction
+from typing import Any
+
+from codegen.proofs.cut import At
+from codegen.proofs.fact import AtMost, Fact, Literal, Same, Within
+from codegen.proofs.symbolic import World
+from codegen.proofs.terms import Limits
+
+Number = Fraction | float | int | None
+"""A number, or a truth value as 0 or 1; None for a NaN."""
+RELATIONS: Mapping[str, Callable[[Any, Any], bool]] = {
+    "<": operator.lt,
+    "<=": operator.le,
+    ">": operator.gt,
+    ">=": operator.ge,
+    "==": operator.eq,
+    "!=": operator.ne,
+}
+
+
+def holds(fact: Fact, of: Callable[[str], Any]) -> bool:
+    """Tell whether a fact holds of numbers, `of` variables by name."""
+    match fact:
+        case Within(_, name, limits, where):
+            return not _all(where, of) or _is_within(of(name), limits)
+        case AtMost(_, name, others, factor, more, going):
+            more += 0 if not going or of(going) else 1
+            return bool(of(name) <= factor * sum(map(of, others)) + more)
+        case Same(_, name, relation, number, truth, where):
+            found, wanted = of(name), of(truth) if isinstance(truth, str) else truth
+            is_so = relation == "!=" if found is None else RELATIONS[relation](found, number)
+            return not _all(where, of) or is_so == bool(wanted)
+
+
+def _all(where: tuple[Literal, ...], of: Callable[[str], Any]) -> bool:
+    return all(of(name) == number for name, number in where)
+
+
+def _is_within(value: Any, limits: Limits) -> bool:
+    if isinstance(limits, frozenset):
+        return value in limits
+    return value is not None and limits[0] <= value <= limits[1]
+
+
+def term(world: World, at: At, fact: Fact) -> Any:
+    """Return a fact of the values at a cut, for z3."""
+    z3, terms, values = world.z3, world.terms, at.values
+    match fact:
+        case Within(_, name, limits, where):
+            return _where(world, at, where, terms.within(values[name], limits))
+        case AtMost(_, name, others, factor, more, going):
+            most = factor * sum(values[other] for other in others) + more
+            return values[name] <= (most + z3.If(values[going], 0, 1) if going else most)
+        case Same(_, name, relation, number, truth, where):
+            found = terms.compare(relation, values[name], terms.value(number))
+            wanted = values[truth] if isinstance(truth, str) else z3.BoolVal(truth)
+            return _where(world, at, where, found == wanted)
+
+
+def _where(world: World, at: At, where: tuple[Literal, ...], found: Any) -> Any:
+    z3, terms = world.z3, world.terms
+    if not where:
+        return found
+    known = [terms.within(at.values[name], frozenset({number})) for name, number in where]
+    return z3.Or(*(z3.Not(one) for one in known), found)

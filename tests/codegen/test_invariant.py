@@ -1,0 +1,65 @@
+"""Invariant: what is said to hold between two steps does, in runs of random charts and specs."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+from codegen.proofs.fact import AtMost, Within
+from codegen.proofs.holding import Number, holds
+from codegen.proofs.invariant import invariant
+from codegen.proofs.symbolic import World
+from codegen.source import c_program
+from engine.interpreter import Interpreter
+from language.program import Program
+from modewright.api import program as program_named
+from tests.lockstep.chance.kinds import chance
+from tests.lockstep.chance.running import taped
+from tests.lockstep.chance.spec import Spec, program as program_of
+from tests.verify.random_charts import programs
+
+CHARTS, SEEDS, TICKS = (3, 4), (14, 19), 300
+"""A chart without regions, one with two."""
+
+
+@pytest.mark.parametrize("number", CHARTS)
+def test_facts_hold_in_runs_of_a_random_chart(number: int, tmp_path: Path) -> None:
+    ((spec, made),) = programs(range(number, number + 1), tmp_path)
+    checked(spec, made)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_facts_hold_in_runs_of_a_random_spec(seed: int, tmp_path: Path) -> None:
+    spec = chance(seed)
+    checked(spec, program_of(spec, "float64", tmp_path))
+
+
+def checked(spec: Spec, made: Program) -> None:
+    """Run the Program that C is printed of, and look at every fact after each tick."""
+    used = c_program(made)
+    facts = [fact for fact in invariant(World(used), {}, most_where=1) if fact.cut.loop is None]
+    assert facts
+
+    def look(run: Interpreter) -> None:
+        def number(name: str) -> Number:
+            value = run.get(name)
+            return None if isinstance(value, float) and math.isnan(value) else value
+
+        wrong = [fact for fact in facts if not holds(fact, number)]
+        assert not wrong, wrong[:3]
+
+    taped(spec, made, TICKS, run=used, look=look)
+
+
+def test_of_a_chart_much_is_known() -> None:
+    """Micro-steps, their log, histories, and which regions are left in which mode."""
+    world = World(c_program(program_named("supervisor")))
+    facts = invariant(world, {}, most_where=1)
+    said = {(f.cut.name, f.name, f.where): f.limits for f in facts if isinstance(f, Within)}
+    drive = (("memory.mode", 3),)
+    assert said["step", "memory.mode_operation_drive_torque", drive] == frozenset({0, 1, 2})
+    assert said["step", "timer.operation_fault", ()] == (0, 3)
+    counts = {fact.name for fact in facts if isinstance(fact, AtMost)}
+    assert {"memory.count_of_log", "work.tail", "work.turn"} <= counts
