@@ -32,11 +32,14 @@ class Reach:
             self.clauses.rule(self._closed(self._at(way.end), body))
 
     def never(self, visits: Sequence[Visit], outcome: bool) -> bool:
-        """Prove that a condition has an outcome at none of its visits."""
+        """Prove that a condition has an outcome at none of its visits; False where z3 gives up."""
         z3 = self.z3
         terms = [v.condition if outcome else z3.Not(v.condition) for v in visits]
         asked = [self._all(v.begin, (*v.given, t)) for v, t in zip(visits, terms, strict=True)]
-        return bool(self.clauses.query(z3.Or(*map(self._open, asked))) == z3.unsat)
+        try:
+            return bool(self.clauses.query(z3.Or(*map(self._open, asked))) == z3.unsat)
+        except z3.Z3Exception:  # the effort is spent
+            return False
 
     def _predicate(self, cut: Cut) -> Any:
         values = {name: self.world.terms.new(self.world.kinds[name], name) for name in cut.names}

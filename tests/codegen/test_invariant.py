@@ -7,8 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from codegen.proofs import reach
 from codegen.proofs.fact import AtMost, Within
 from codegen.proofs.holding import Number, holds
+from codegen.proofs.infeasible import places_of
 from codegen.proofs.invariant import invariant
 from codegen.proofs.symbolic import World
 from codegen.source import c_program
@@ -63,3 +65,14 @@ def test_of_a_chart_much_is_known() -> None:
     assert said["step", "timer.operation_fault", ()] == (0, 3)
     counts = {fact.name for fact in facts if isinstance(fact, AtMost)}
     assert {"memory.count_of_log", "work.tail", "work.turn"} <= counts
+
+
+def test_a_question_that_takes_too_long_proves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(reach, "EFFORT", 100_000)
+    made = c_program(program_named("supervisor"))
+    world = World(made)
+    asked = reach.Reach(world, ())
+    numbers = [
+        n for place in places_of(made) if place.text == "work->is_over" for n in place.conditions
+    ]
+    assert numbers and not any(asked.never(world.visits[n], True) for n in numbers)
