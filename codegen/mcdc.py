@@ -94,15 +94,20 @@ def with_proofs(found: Covered, program: Program, ranges: Mapping[str, Range]) -
     places = _by_block(places_of(made))
     decisions = _by_block(found.decisions)
     missed = [block for block, of in decisions.items() if any(not all(d.shown) for d in of)]
-    wanted = [n for block in missed for place in places.get(block, ()) for n in place.conditions]
-    proven = never(made, ranges, wanted)
-    claimed = {
-        id(decision): _claimed(at, proven, decision)
-        for block in missed
-        for decision, at in _placed(decisions[block], places.get(block, []))
-    }
+    placed = [p for block in missed for p in _placed(decisions[block], places.get(block, []))]
+    proven = never(made, ranges, list(dict.fromkeys(_hidden(placed))))
+    claimed = {id(decision): _claimed(at, proven, decision) for decision, at in placed}
     replaced = (replace(d, never=claimed.get(id(d)) or d.never) for d in found.decisions)
     return replace(found, decisions=tuple(replaced))
+
+
+def _hidden(placed: Iterable[tuple[Decision, list[Place]]]) -> Iterator[int]:
+    """Yield the numbers of the conditions that were not shown, at all places where they may be."""
+    for decision, places in placed:
+        for place in places:
+            if len(place.conditions) == len(decision.shown):
+                pairs = zip(place.conditions, decision.shown, strict=True)
+                yield from (number for number, shown in pairs if not shown)
 
 
 def _by_block(things: Iterable[T]) -> dict[str, list[T]]:
