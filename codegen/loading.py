@@ -16,11 +16,6 @@ def loaded(path: Path) -> Any:
         *(pointer, pointer, pointer, pointer, pointer, pointer),
     ]
     library.modewright_differences.restype = None
-    library.modewright_gains.argtypes = [
-        *(pointer, pointer, pointer, pointer, pointer),
-        *(whole, whole, ctypes.c_double, pointer, pointer),
-    ]
-    library.modewright_gains.restype = whole
     library.modewright_predict.argtypes = [
         *(pointer, pointer, pointer, pointer, whole, pointer),
         *(whole, whole, ctypes.c_int, pointer, pointer, pointer, pointer, pointer),

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from codegen.build import compile_program, compiler, compiler_version, optimised
 from codegen.cache import key_of, stored
 from codegen.harness import tunable
+from codegen.kalman_gains import MOST_SAMPLES, kalman_gains
 from codegen.lean import lean
 from codegen.loading import loaded
 from codegen.names import c_member, c_type
@@ -26,10 +27,6 @@ from codegen.tracks import tracks
 from language.program import Program, short
 
 Reals = NDArray[np.float64]
-MOST_SAMPLES = 5000
-"""Samples after which a gain that still changes is taken for the steady one."""
-CLOSE = 1e-6
-"""A gain that changes by less from sample to sample, of its largest entry, is steady."""
 LIBRARY_FLAGS = (
     *optimised("Og"),
     *("-fno-semantic-interposition", "-shared", "-fPIC", "-w", "-Dvolatile="),
@@ -113,22 +110,8 @@ class Predictor:
         first: int,
         most: int = MOST_SAMPLES,
     ) -> tuple[Reals, Reals, Reals] | None:
-        """Return the Kalman gains of the `first` samples (first, states, seen), the one that stays,
-        and the covariance then.
-
-        Of x(k+1) = phi x(k) + w, y = c x + v with covariance `q` of w, variances `r` (seen,) of v,
-        from a covariance `start`. One that still changes after `most` samples is taken as it is
-        then. None where they grow beyond all bounds.
-        """
-        shape = (len(self.states), len(self.seen))
-        firsts, steady = np.empty((first, *shape)), np.empty(shape)
-        covariance = np.ascontiguousarray(start, dtype=np.float64).copy()
-        given = [np.ascontiguousarray(a, dtype=np.float64) for a in (phi, c, q, r)]
-        done = self._library.modewright_gains(
-            *(_at(a) for a in given), _at(covariance), first, most, CLOSE,
-            _at(firsts), _at(steady),
-        )  # fmt: skip
-        return (firsts, steady, covariance) if done >= 0 else None
+        """Return the gains of a linear model of its states and signals (see `kalman_gains`)."""
+        return kalman_gains(phi, c, q, r, start, first, most)
 
     def predict(
         self,
