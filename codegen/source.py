@@ -213,12 +213,9 @@ def _blocks(
     modes, run_modes = ([m.name for m in of] for of in (program.modes, program.run_modes))
     found = []
     for name in _callees_first(program):
-        keyword = _keyword(name, own)
-        block = _block(
-            program, name, local[name], turned[name], used, kinds, page, scratch, keyword
-        )
-        about = purpose(name, modes, run_modes)
-        found.append({**block, "purpose": about, "keyword": keyword})
+        word = _keyword(name, own)
+        block = _block(program, name, local[name], turned[name], used, kinds, page, scratch, word)
+        found.append({**block, "purpose": purpose(name, modes, run_modes), "keyword": word})
     return found
 
 

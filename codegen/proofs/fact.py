@@ -11,7 +11,7 @@ from codegen.proofs.cut import Cut, blocks_of
 from codegen.proofs.terms import Limits, Range
 from language.charting import NOT_YET
 from language.number import rounded
-from language.operation import Assign, Binary, Block, Compare, Count, Expr, Ref, Unary, Value
+from language.operation import Assign, Binary, Compare, Count, Expr, Ref, Unary, Value
 from language.program import MODE, Program, mode_variable
 from language.run import MODE as RUN_MODE
 from language.substitution import own_expressions, subexpressions
@@ -24,7 +24,9 @@ KEPT = "memory."
 LARGEST_LIMIT = 64
 """Of whole numbers with which counters of a loop are compared."""
 MOST_FACTOR = 8
+"""Most times another counter that a counter is tried to be."""
 MOST_COUNTED = 5
+"""Numbers, from 0 on, that are tried as the most of a counter in a mode."""
 Literal = tuple[str, int]
 """A variable, and a number or, as 0 and 1, a truth value that it has."""
 
@@ -86,12 +88,13 @@ def proposed(
         limits = _limits(program, cut, first)
         for name, some in limits.items():
             yield from (Within(cut, name, one) for one in some)
+        asked = list(_asked(program, cut))
         for where in _wheres(program, cut, first):
             known = {name for name, _ in where}
             for name, some in limits.items():
                 if name not in known:
                     yield from (Within(cut, name, one, where) for one in some)
-            for name, operator, end in _asked(program, cut) if len(where) > 1 else ():
+            for name, operator, end in asked if len(where) > 1 else ():
                 yield from (Same(cut, name, operator, end, t, where) for t in (True, False))
         yield from _histories(program, cut)
         if cut.loop:
@@ -126,11 +129,15 @@ def _limits(program: Program, cut: Cut, first: Mapping[str, int]) -> dict[str, l
 def _wheres(program: Program, cut: Cut, first: Mapping[str, int]) -> Iterator[tuple[Literal, ...]]:
     """Yield the conditions under which something is tried: a mode, how a loop goes on, both."""
     modes = [(name, n) for name, of in modes_of(program).items() for n in of if name in cut.names]
-    kinds = {v.name: v.type for v in program.variables}
-    truths = [name for name in first if kinds.get(name) == "truth"]
-    going = [(name, value) for name in truths for value in (0, 1)]
+    going = [(name, value) for name in _truths(program, first) for value in (0, 1)]
     yield from ((one,) for one in (*modes, *going))
     yield from ((mode, one) for mode in modes for one in going)
+
+
+def _truths(program: Program, first: Mapping[str, int]) -> list[str]:
+    """Return the truth values with which a loop begins."""
+    kinds = {v.name: v.type for v in program.variables}
+    return [name for name in first if kinds.get(name) == "truth"]
 
 
 def modes_of(program: Program) -> dict[str, list[int]]:
@@ -229,8 +236,7 @@ def _counts(program: Program, cut: Cut, first: Mapping[str, int]) -> Iterator[Fa
     """Yield how counters of a loop hang together."""
     assert cut.loop
     counters, index = _counters(program, cut), cut.loop.index
-    kinds = {v.name: v.type for v in program.variables}
-    truths = [name for name in first if kinds.get(name) == "truth"]
+    truths = _truths(program, first)
     for name, operator, number in _compared(program, cut):
         yield from (Same(cut, name, operator, number, truth) for truth in truths)
     for one in counters:
@@ -260,8 +266,7 @@ def _counts_up(op: Assign) -> bool:
 
 def _expressions(program: Program, cut: Cut) -> Iterator[Expr]:
     assert cut.loop
-    blocks: Sequence[Block] = list(blocks_of(program, cut.loop.body))
-    for block in blocks:
+    for block in blocks_of(program, cut.loop.body):
         for op in walk(block):
             for expr in own_expressions(op):
                 yield from subexpressions(expr)

@@ -2,8 +2,8 @@
 
 A real is a number of the number line and whether it is a NaN: comparisons, signs, abs, min, max and
 clip depend on the order of numbers alone, and infinities are two numbers beyond all others. What
-+ - * / and functions give is left open: the same for the same operands, and of a product that it is
-no larger than a factor where the other one is at most 1.
++ - * / and functions give is left open: the same for the same operands. Of a product is known that
+it is no larger than a factor where the other one is at most 1, of a table its least and largest.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise
-from math import isfinite
+from math import copysign, isfinite
 from typing import Any
 
 from language.number import LARGEST, NumberType, rounded
@@ -45,7 +45,7 @@ class Terms:
         self.known: dict[tuple[object, ...], tuple[Any, object]] = {}
 
     def value(self, value: float | int | bool) -> Any:
-        """Return a literal."""
+        """Return a literal; -0 is another term than 0, for 1 / -0 is another number."""
         z3 = self.z3
         if isinstance(value, bool):
             return z3.BoolVal(value)
@@ -54,7 +54,8 @@ class Terms:
         number = rounded(value, self.number)
         if not isfinite(number):
             return self.new("real", "literal")
-        return Real(z3.RealVal(str(Fraction(number))), z3.BoolVal(False))
+        found = Real(z3.RealVal(str(Fraction(abs(number)))), z3.BoolVal(False))
+        return self.minus(found) if copysign(1.0, number) < 0.0 else found
 
     def number_of(self, value: Any) -> int | None:
         """Return the whole number or, as 0 and 1, the truth value that a literal is."""
@@ -119,7 +120,7 @@ class Terms:
         self.bounds.setdefault(product.value.get_id(), []).append(bound)
 
     def lemmas(self, facts: Sequence[Any]) -> list[Any]:
-        """Return what is known of the products in some facts."""
+        """Return what is known of the products and tables in some facts."""
         found: list[Any] = []
         seen, stack = set[int](), list(facts)
         while stack:
@@ -171,18 +172,17 @@ class Terms:
         """Return a value of a table: rounding keeps order, so it lies between those at the ends of
         its cells, and those just before the ends.
         """
-        z3, whole = self.z3, self.new("real", "lookup")
+        z3, found = self.z3, self.new("real", "lookup")
         ends = list(points)
         for a, b in pairwise(points):
             apart = rounded(b - a, self.number)
             step = rounded(BEFORE_ONE[self.number] * apart, self.number)
             ends.append(rounded(a + step, self.number))
         low, high = self.value(min(ends)).value, self.value(max(ends)).value
-        found = Real(whole.value, whole.nan)
         within = z3.And(z3.Not(found.nan), low <= found.value, found.value <= high)
         bound = z3.Implies(z3.Not(x.nan), within)
         self.bounds.setdefault(found.value.get_id(), []).append(bound)
-        return found
+        return Real(found.value, found.nan)
 
     def _size(self, x: Real) -> Real:
         return Real(self.z3.If(x.value < 0, -x.value, x.value), x.nan)

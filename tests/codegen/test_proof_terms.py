@@ -93,6 +93,13 @@ def test_a_product_with_a_part_is_no_larger(number: NumberType) -> None:
         assert solver.check() == terms.z3.sat
 
 
+def test_the_two_zeros_are_no_same_operands() -> None:
+    terms = Terms("float64")
+    one, plus, minus = (terms.value(value) for value in (1.0, 0.0, -0.0))
+    assert truth(terms, terms.compare("==", plus, minus))
+    assert terms.sum("/", one, plus) is not terms.sum("/", one, minus)
+
+
 def test_the_same_operands_give_the_same() -> None:
     terms = Terms("float64")
     x, y = terms.new("real", "x"), terms.new("real", "y")
