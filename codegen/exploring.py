@@ -6,13 +6,14 @@ many, and the word of each input (`words`). MC/DC counts what they show (`mcdc.p
 
 from __future__ import annotations
 
+import struct
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from codegen.build import FLAGS, BuildError
-from codegen.fuzzing import ABSOLUTE, FUZZER, SPREAD, STUCK, Range, table_text, words
+from codegen.fuzzing import ABSOLUTE, FUZZER, SPREAD, STUCK, Range, fed_by, table_text, words
 from codegen.harness import Main, fed, write_harness
 from codegen.names import SOLVED_ON_PAGE, CNames, c_type
 from codegen.sanitizers import APP, ran
@@ -50,6 +51,20 @@ def explored(
         if done.found:
             raise BuildError(done.found[0])
         return tuple(path.read_bytes() for path in sorted((folder / CORPUS).iterdir()))
+
+
+def records(
+    program: Program, ranges: Mapping[str, Range], ways: Sequence[bytes]
+) -> Iterator[list[bytes]]:
+    """Yield the records of ways that are gone with the page of the spec, as a `Tape` has them."""
+    table, size = words(program, ranges), 1 + len(fed(program))
+    record, first = struct.Struct(f"<{size}d"), 3 * CHANGES if page_of(program) else 0
+    for way in ways:
+        groups = [way[at : at + size] for at in range(first, len(way) - size + 1, size)]
+        inputs = fed_by(program, table, b"".join(group[1:] for group in groups))
+        held = [HOLDS[group[0] % len(HOLDS)] for group in groups]
+        pairs = zip(held, inputs, strict=True)
+        yield [one for ticks, values in pairs for one in [record.pack(*values, 0.0)] * ticks]
 
 
 def longest(program: Program) -> int:

@@ -72,10 +72,15 @@ def words(program: Program, ranges: Mapping[str, Range]) -> list[Words]:
 
 def values_of(program: Program, table: list[Words], sequence: bytes) -> Iterator[Words]:
     """Yield the inputs of each tick of a sequence, as the C reads them."""
+    yield from fed_by(program, table, sequence[: LONGEST * len(table)])
+
+
+def fed_by(program: Program, table: list[Words], chosen: bytes) -> Iterator[Words]:
+    """Yield the inputs that bytes choose, one for each, in turn: values, or changes of the last."""
     real = [variable.type == "real" for variable in fed(program)]
     last = [own[SPREAD // 2] for own in table]
-    for at in range(0, min(len(sequence) // len(table), LONGEST) * len(table), len(table)):
-        for k, byte in enumerate(sequence[at : at + len(table)]):
+    for at in range(0, len(chosen) - len(table) + 1, len(table)):
+        for k, byte in enumerate(chosen[at : at + len(table)]):
             is_change = real[k] and byte >= ABSOLUTE
             last[k] = last[k] + table[k][byte] if is_change else table[k][byte]
         yield tuple(last)

@@ -83,6 +83,14 @@ class CompiledStepper:
         """Run a block."""
         self._run(self._address, self._blocks[block])
 
+    def snapshot(self) -> bytes:
+        """Return all values as they are now, for `restore`."""
+        return self._room.raw
+
+    def restore(self, kept: bytes) -> None:
+        """Make all values what they were at a `snapshot`."""
+        ctypes.memmove(self._address, kept, len(kept))
+
     def reader(self, names: tuple[str, ...]) -> Callable[[], tuple[Any, ...]]:
         """Return a function that returns the values of some variables."""
         values = [self._values[name] for name in names]

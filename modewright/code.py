@@ -7,9 +7,10 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from codegen.asam import a2l as asam
+from codegen.border import at_borders
 from codegen.can_database import FIRST, dbc as dbc_of
 from codegen.cmake import cmake_file
-from codegen.exploring import explored
+from codegen.exploring import explored, records
 from codegen.fmi.archive import fmu as fmu_of
 from codegen.fmi.variable import Version
 from codegen.instructions import Instructions, instructions as counted
@@ -154,19 +155,23 @@ def mcdc(
     is_proven: bool = True,
 ) -> Covered:
     """Tell which conditions of the C of an automaton are shown to matter by the tests of the
-    project, and by what libFuzzer finds in `runs`; and, if that `is_proven`, which cannot be.
+    project, by what libFuzzer finds in `runs`, and at the borders of both; and, if that
+    `is_proven`, which cannot be.
 
     Raises SpecError; ValueError where there is nothing to run it on; ToolMissing, BuildError.
     """
     automaton, program = _made(reference, values, root, calibrations, numbers)
-    sequences = [tape.inputs for tape in _tested(program, root, numbers)]
+    sequences, ranges = [tape.inputs for tape in _tested(program, root, numbers)], _ranges(automaton)
     if runs and not automaton.is_sampled:
         raise ValueError(f"{automaton.name} is continuous: sequences are those of sampled automata")
-    ways = explored(program, _ranges(automaton), runs, SEED) if runs else ()
+    ways = explored(program, ranges, runs, SEED) if runs else ()
     if not sequences and not ways:
         hint = ": give it `--runs`" if automaton.is_sampled else ""
         raise ValueError(f"no test of the project runs {automaton.name} as it is{hint}")
-    found = covered(program, sequences, ways, _ranges(automaton))
+    if automaton.is_sampled:
+        gone = (*sequences, *sorted(records(program, ranges, ways), key=len))
+        sequences.extend(at_borders(program, gone, ranges))
+    found = covered(program, sequences, ways, ranges)
     if not (is_proven and automaton.is_sampled):
         return found
     return with_proofs(found, program, _held(automaton, program))

@@ -57,14 +57,14 @@ class AtMost:
 
 @dataclass(frozen=True)
 class Same:
-    """A comparison of a variable with a number is a truth value, or has one where others have some
-    values.
+    """A comparison of a variable with a number, or with another one, is a truth value, or has one
+    where others have some values.
     """
 
     cut: Cut
     name: str
     operator: str
-    number: float | int
+    number: float | int | str
     truth: str | bool
     where: tuple[Literal, ...] = ()
 
@@ -129,12 +129,12 @@ def _limits(program: Program, cut: Cut, first: Mapping[str, int]) -> dict[str, l
 def _wheres(program: Program, cut: Cut, first: Mapping[str, int]) -> Iterator[tuple[Literal, ...]]:
     """Yield the conditions under which something is tried: a mode, how a loop goes on, both."""
     modes = [(name, n) for name, of in modes_of(program).items() for n in of if name in cut.names]
-    going = [(name, value) for name in _truths(program, first) for value in (0, 1)]
+    going = [(name, value) for name in truths_of(program, first) for value in (0, 1)]
     yield from ((one,) for one in (*modes, *going))
     yield from ((mode, one) for mode in modes for one in going)
 
 
-def _truths(program: Program, first: Mapping[str, int]) -> list[str]:
+def truths_of(program: Program, first: Mapping[str, int]) -> list[str]:
     """Return the truth values with which a loop begins."""
     kinds = {v.name: v.type for v in program.variables}
     return [name for name in first if kinds.get(name) == "truth"]
@@ -236,7 +236,7 @@ def _counts(program: Program, cut: Cut, first: Mapping[str, int]) -> Iterator[Fa
     """Yield how counters of a loop hang together."""
     assert cut.loop
     counters, index = _counters(program, cut), cut.loop.index
-    truths = _truths(program, first)
+    truths = truths_of(program, first)
     for name, operator, number in _compared(program, cut):
         yield from (Same(cut, name, operator, number, truth) for truth in truths)
     for one in counters:

@@ -34,7 +34,9 @@ def holds(fact: Fact, of: Callable[[str], Any]) -> bool:
             return bool(of(name) <= factor * sum(map(of, others)) + more)
         case Same(_, name, relation, number, truth, where):
             found, wanted = of(name), of(truth) if isinstance(truth, str) else truth
-            is_so = relation == "!=" if found is None else RELATIONS[relation](found, number)
+            other = of(number) if isinstance(number, str) else number
+            is_nan = found is None or other is None
+            is_so = relation == "!=" if is_nan else RELATIONS[relation](found, other)
             return not _all(where, of) or is_so == bool(wanted)
 
 
@@ -58,7 +60,8 @@ def term(world: World, at: At, fact: Fact) -> Any:
             most = factor * sum(values[other] for other in others) + more
             return values[name] <= (most + z3.If(values[going], 0, 1) if going else most)
         case Same(_, name, relation, number, truth, where):
-            found = terms.compare(relation, values[name], terms.value(number))
+            other = values[number] if isinstance(number, str) else terms.value(number)
+            found = terms.compare(relation, values[name], other)
             wanted = values[truth] if isinstance(truth, str) else z3.BoolVal(truth)
             return _where(world, at, where, found == wanted)
 

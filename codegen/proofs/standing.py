@@ -1,0 +1,101 @@
+"""Standing: what may stand while a loop goes on - counters and edges beside the guards they follow.
+
+A mode that counts how long its guard is true has done so once a turn has passed: where its counter
+is 0, or its edge is not there, the guard is false until the loop ends.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from codegen.proofs.cut import Cut, blocks_of
+from codegen.proofs.fact import KEPT, Fact, Literal, Same, Within, modes_of, truths_of
+from language.number import rounded
+from language.operation import Assign, Block, Choose, Compare, Count, Expr, Op, Ref, Unary, Value
+from language.program import Program
+from language.substitution import own_expressions, subexpressions
+from language.traversal import walk
+
+Atom = tuple[str, str, float | int | str]
+"""A variable, a relation, and a number or another variable."""
+
+
+def standing(program: Program, cut: Cut, first: Mapping[str, int]) -> Iterator[Fact]:
+    """Yield what may hold of what modes count and compare, while a loop goes on."""
+    if cut.loop is None:
+        return
+    going = [(name, value) for name in truths_of(program, first) for value in (0, 1)]
+    for mode, ops in _followed(program, cut):
+        atoms, truths = _asked(program, cut, ops)
+        for latch in _latches(cut, ops):
+            for one in going:
+                where = (mode, one, latch)
+                for name, relation, other in atoms:
+                    yield from (Same(cut, name, relation, other, t, where) for t in (False, True))
+                for name in truths:
+                    yield from (Within(cut, name, frozenset({t}), where) for t in (0, 1))
+
+
+def _followed(program: Program, cut: Cut) -> Iterator[tuple[Literal, list[Op]]]:
+    """Yield modes with all that a loop does in them, of loops that choose by mode."""
+    assert cut.loop
+    modes = modes_of(program)
+    for block in blocks_of(program, cut.loop.body):
+        for op in walk(block):
+            match op:
+                case Choose(selector, cases) if selector in modes and selector in cut.names:
+                    for number, case in cases:
+                        yield (selector, number), _all(program, case)
+
+
+def _all(program: Program, case: Block) -> list[Op]:
+    return [op for block in blocks_of(program, case) for op in walk(block)]
+
+
+def _latches(cut: Cut, ops: list[Op]) -> list[Literal]:
+    """Return what counters and kept truth values may be: 0, and true or false."""
+    found: dict[Literal, None] = {}
+    for op in ops:
+        match op:
+            case Count(timer):
+                found[timer, 0] = None
+            case Assign(name, Unary("not", Ref())) if name.startswith(KEPT):
+                found |= {(name, 0): None, (name, 1): None}
+    return [latch for latch in found if latch[0] in cut.names]
+
+
+def _asked(program: Program, cut: Cut, ops: list[Op]) -> tuple[list[Atom], list[str]]:
+    """Return what guards of a mode compare, and the truth values that they read."""
+    atoms: dict[Atom, None] = {}
+    truths: dict[str, None] = {}
+    kinds = {v.name: v.type for v in program.variables}
+    for expr in _guards(ops):
+        match expr:
+            case Compare(relation, Ref(name), other) if name in cut.names:
+                what = _other(program, cut, other)
+                if what is not None:
+                    atoms[name, relation, what] = None
+            case Ref(name) if kinds.get(name) == "truth" and name in cut.names:
+                truths[name] = None
+    return list(atoms), list(truths)
+
+
+def _guards(ops: list[Op]) -> Iterator[Expr]:
+    """Yield what is asked by counters, and what becomes a level."""
+    for op in ops:
+        if isinstance(op, Count) or (isinstance(op, Assign) and isinstance(op.value, Compare)):
+            for expr in own_expressions(op):
+                yield from subexpressions(expr)
+
+
+def _other(program: Program, cut: Cut, expr: Expr) -> float | int | str | None:
+    match expr:
+        case Value(int(number)):
+            return number
+        case Value(float(number)):
+            return rounded(number, program.number)
+        case Unary("-", Value(float(number))):
+            return -rounded(number, program.number)
+        case Ref(name) if name in cut.names:
+            return name
+    return None
