@@ -6,15 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from diagnosis.estimation import (
-    FIRST_DAMPING,
-    Estimate,
-    improved,
-    innovations_at,
-    looked_at,
-    seen_at,
-    with_normal,
-)
+from diagnosis.estimate import Estimate, innovations_at, looked_at, seen_at, with_normal
+from diagnosis.estimation import FIRST_DAMPING, improved
 from diagnosis.point import Point
 from diagnosis.series import Series
 

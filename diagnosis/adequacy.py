@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.bench import Bench
-from diagnosis.estimation import Estimate, looked_like
+from diagnosis.estimate import Estimate, looked_like
 from diagnosis.evidence import inflation, inflations
 from diagnosis.layers import DRIFT, Layer, walks
 from diagnosis.level import units_of

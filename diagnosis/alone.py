@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnosis.bench import Bench
-from diagnosis.estimation import Estimate, estimated
+from diagnosis.estimate import Estimate
+from diagnosis.estimation import estimated
 from diagnosis.series import Series, paced
 from diagnosis.threshold import Thresholds
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 
 from diagnosis.candidate import Candidate, candidate
-from diagnosis.estimation import Estimate
+from diagnosis.estimate import Estimate
 from diagnosis.layers import Layer, drift, fitting
 from diagnosis.series import Series
 from diagnosis.shelf import NOWHERE, Shelf

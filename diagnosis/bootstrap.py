@@ -20,7 +20,7 @@ import numpy as np
 from codegen.cache import cache_fault, cache_folder
 from diagnosis.bench import Bench
 from diagnosis.candidate import candidate
-from diagnosis.estimation import Estimate
+from diagnosis.estimate import Estimate
 from diagnosis.level import settled
 from diagnosis.prediction import noises_of
 from diagnosis.recipe import node_text, recipe_key, write_whole

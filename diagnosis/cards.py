@@ -41,7 +41,7 @@ def _where(dossier: Dossier) -> Card:
     verdict = dossier.verdict
     named = verdict.effects or verdict.ambiguous_with
     lines = [wording.effect_at(one) for one in named]
-    if not lines and verdict.verdict == "unknown":
+    if verdict.verdict == "unknown":
         lines = [f"most at {one.path}" for one in verdict.location[:1] if one.gain > 0.0]
     if not lines:
         return Card("Where", ("nowhere: no place asks for more than the model has",))

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from diagnosis.bench import Bench
-from diagnosis.estimation import Estimate, looked_at
+from diagnosis.estimate import Estimate, looked_at
 from diagnosis.evidence import Evidence, evidence
 from diagnosis.excess import Excess, excess_at
 from diagnosis.formula import Formula, formula_of

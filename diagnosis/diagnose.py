@@ -19,7 +19,7 @@ from diagnosis.adaptation import adapted
 from diagnosis.bench import Bench
 from diagnosis.case import Case, case_bench, read_series
 from diagnosis.description import Description
-from diagnosis.estimation import Estimate
+from diagnosis.estimate import Estimate
 from diagnosis.judgement import judged
 from diagnosis.layers import Layer
 from diagnosis.location import led_by, likely
@@ -27,7 +27,8 @@ from diagnosis.locus import Locus
 from diagnosis.naming import named, place_path, quantities_of, verdict_id
 from diagnosis.place_sentence import place_sentence
 from diagnosis.plan import Plan, planned
-from diagnosis.search import Tell
+from diagnosis.rival import nearest
+from diagnosis.search import Tell, Tried
 from diagnosis.selection import Selection
 from diagnosis.series import Series, compared, paced
 from diagnosis.shuffle import Shuffle, shuffle_of
@@ -84,10 +85,8 @@ def diagnose(case: Case, tell: Tell = lambda text: None) -> Diagnosis:
         tell(plan.sentence())
     loci = led_by(loci, [place_path(tried.layer) for tried in selection.accepted], bench)
     if found.says == "unknown":
-        least = found.thresholds.usual
-        rounds = selection.first_round
-        near = [one for one in rounds if one.evidence and one.evidence.train > least]
-        near.sort(key=lambda one: -one.score)
+        near = _near(selection, found.thresholds.usual)
+        selection = dataclasses.replace(selection, rivals=nearest(near))
         loci = likely(loci, [place_path(one.layer) for one in near], bench)
     fit = {"train": misfits(found.base, selection.model, bench.series)}
     verdict = _verdict(found.says, selection, loci, automaton, fit)
@@ -135,6 +134,13 @@ def _shuffles(selection: Selection, bench: Bench) -> tuple[Shuffle, ...]:
     return tuple(one for one in found if one is not None) if found[0] is not None else ()
 
 
+def _near(selection: Selection, least: float) -> list[Tried]:
+    """Return the candidates that gain more than the `least` [nats], best first."""
+    rounds = selection.first_round
+    near = [one for one in rounds if one.evidence and one.evidence.train > least]
+    return sorted(near, key=lambda one: -one.score)
+
+
 def _told_apart(selection: Selection, automaton: Automaton) -> list[tuple[str, Estimate]]:
     """Return the first accepted effect and its rivals, by name."""
     some = (*selection.accepted[:1], *selection.rivals)
@@ -161,7 +167,7 @@ def _verdict(
         effects if says == "effect" else (),
         _ranked(selection, automaton),
         selection.probabilities()["other"],
-        rivals if says == "effect" else (*effects, *rivals) if says == "ambiguous" else (),
+        (*effects, *rivals) if says == "ambiguous" else rivals,
         tuple(loci),
         fit,
         base,

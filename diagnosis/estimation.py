@@ -9,26 +9,23 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 
 import numpy as np
 
 from diagnosis.candidate import Candidate
-from diagnosis.gains import gains_of
-from diagnosis.likeness import seen_like
-from diagnosis.normal import Normal, foreseen, normal_of, stepped
-from diagnosis.point import Point, all_values_at, point_of, values_at
-from diagnosis.prediction import (
-    Gains,
-    Innovations,
-    Noises,
-    Outcome,
-    foreseen_at,
-    noises_at,
-    predicted,
+from diagnosis.estimate import (
+    Estimate,
+    gains_there,
+    looked_at,
+    looked_like,
+    run_at,
+    with_normal,
 )
+from diagnosis.normal import foreseen, stepped
+from diagnosis.point import Point, point_of
+from diagnosis.prediction import Noises, noises_at
 from diagnosis.series import Series
-from diagnosis.slopes import Columns, carried, columns_of
+from diagnosis.slopes import Columns, carried
 
 MOST_ROUNDS = 15
 ENOUGH = 0.3
@@ -39,8 +36,6 @@ WORTH_ANEW = 1.0
 """Steps that gain more [nats] once slopes were looked for anew have them looked for again."""
 COMPLETIONS = 12
 """How often they are at most: a tyre's mode had not come to rest after three."""
-LEVEL_STEP = 0.05
-"""Change of the logarithm of a level for a difference."""
 NOTHING = 0.05
 """A step that is foreseen to gain less than this [nats] is not tried."""
 LITTLE = 1.0
@@ -54,119 +49,6 @@ LATE_PART = 0.1
 """What is much: part of all that was gained."""
 WORTH_A_ROUND = 3.0
 """A round of screening that gains less [nats] is the last."""
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """A candidate at a point: cost [nats] with priors, and how it foresees the recordings.
-
-    `normal` are the normal equations of the last round, None before the first, and `columns` what
-    they were made from.
-    """
-
-    candidate: Candidate
-    point: Point
-    cost: float
-    outcome: Outcome = field(repr=False)
-    gains: Gains = field(repr=False)
-    noises: Noises = field(repr=False)
-    normal: Normal | None = field(default=None, repr=False)
-    columns: Columns = field(default_factory=dict, repr=False)
-
-    @property
-    def likelihood(self) -> float:
-        """The cost without priors [nats]."""
-        return self.outcome.cost()
-
-    def values(self, recording: int) -> dict[str, float]:
-        """Return the parameters [SI] of a recording."""
-        return values_at(self.candidate, self.point, recording)
-
-
-def looked_at(
-    candidate: Candidate,
-    series: Sequence[Series],
-    noises: Noises,
-    point: Point,
-    near: Outcome | None = None,
-) -> Estimate:
-    """Return a candidate at a point, with gains made where its modes were seen.
-
-    `near` is where they were seen at a point near it, if that is known.
-    """
-    values = values_at(candidate, point, 0)
-    gains = gains_of(candidate, series, values, noises, near)
-    outcome = _run(candidate, series, point, gains, noises)
-    if near is None and outcome.is_whole:
-        gains = gains_of(candidate, series, values, noises, outcome)
-        outcome = _run(candidate, series, point, gains, noises)
-    cost = outcome.cost() + point.prior(candidate)
-    return Estimate(candidate, point, cost, outcome, gains, noises)
-
-
-def looked_like(
-    candidate: Candidate,
-    series: Sequence[Series],
-    noises: Noises,
-    point: Point,
-    like: Estimate | None,
-) -> Estimate:
-    """Return a candidate at a point, with gains made where its modes were seen: where it had them
-    itself, or where a model `like` it had them, whichever foresees better.
-    """
-    if like is None:
-        return looked_at(candidate, series, noises, point)
-    gains = gains_of(candidate, series, values_at(candidate, point, 0), noises)
-    own = _run(candidate, series, point, gains, noises)
-    if not own.is_whole:
-        return Estimate(candidate, point, np.inf, own, gains, noises)
-    near = seen_like(candidate, own, like.candidate, like.outcome)
-    first = looked_at(candidate, series, noises, point, own)
-    if near is own:
-        return first
-    return min(first, looked_at(candidate, series, noises, point, near), key=lambda one: one.cost)
-
-
-def with_normal(
-    estimate: Estimate, series: Sequence[Series], known: Columns | None = None
-) -> Estimate:
-    """Return an estimate with the normal equations at its point.
-
-    `known` are columns of a model near it, which are not looked for again.
-    """
-
-    def run(points: Sequence[Point]) -> list[Innovations]:
-        return innovations_at(estimate, series, points)
-
-    candidate, outcome = estimate.candidate, estimate.outcome
-    known = known or {}
-    fresh = [one.name for one in candidate.recipe.uncertain if one.name not in known]
-    columns = {**known, **columns_of(candidate, estimate.point, outcome, run, fresh)}
-    columns |= _of_levels(
-        estimate, series, [o.name for o in candidate.levels if o.name not in known]
-    )
-    normal = normal_of(candidate, outcome, columns)
-    return dataclasses.replace(estimate, normal=normal, columns=columns)
-
-
-def _of_levels(now: Estimate, series: Sequence[Series], names: Sequence[str]) -> Columns:
-    """Return how innovations change with levels: with the gains that are made with these."""
-    candidate, found = now.candidate, {}
-    for name in names:
-        k = candidate.names.index(name)
-        there = now.point.moved(candidate, k, LEVEL_STEP / candidate.uncertain[k].sd)
-        outcome = _run(candidate, series, now.point, _gains(now, series, there), now.noises)
-        changes = (outcome.joined - now.outcome.joined) / (there.shared[k] - now.point.shared[k])
-        found[name] = np.where(np.isfinite(changes), changes, 0.0)
-    return found
-
-
-def _gains(now: Estimate, series: Sequence[Series], point: Point) -> Gains:
-    """Return the gains of an estimate with the levels that its candidate has at a point."""
-    if not now.candidate.levels:
-        return now.gains
-    noises, values = noises_at(now.candidate, point, now.noises), now.values(0)
-    return gains_of(now.candidate, series, values, noises, now.outcome)
 
 
 def estimated(
@@ -293,8 +175,8 @@ def improved(
         if foreseen(now.candidate, now.point, now.normal, point) < least:
             damping *= 10.0
             continue
-        gains = _gains(now, series, point)
-        outcome = _run(now.candidate, series, point, gains, now.noises)
+        gains = gains_there(now, series, point)
+        outcome = run_at(now.candidate, series, point, gains, now.noises)
         cost = outcome.cost() + point.prior(now.candidate)
         if cost < now.cost:
             noises = noises_at(now.candidate, point, now.noises)
@@ -303,33 +185,3 @@ def improved(
             return better, max(damping / 10.0, 1e-9)
         damping *= 10.0
     return None, damping
-
-
-def _run(
-    candidate: Candidate, series: Sequence[Series], point: Point, gains: Gains, noises: Noises
-) -> Outcome:
-    values = all_values_at(candidate, point)[: len(series)]
-    return predicted(candidate, series, values, gains, noises.limits)
-
-
-def outcome_at(estimate: Estimate, series: Sequence[Series], point: Point) -> Outcome:
-    """Return how a model foresees some recordings at a point, with the gains of the estimate."""
-    return _run(estimate.candidate, series, point, estimate.gains, estimate.noises)
-
-
-def innovations_at(
-    estimate: Estimate, series: Sequence[Series], points: Sequence[Point]
-) -> list[Innovations]:
-    """Return what a model does not foresee at some points, with the gains of the estimate."""
-    candidate, gains = estimate.candidate, estimate.gains
-    values = [all_values_at(candidate, point)[: len(series)] for point in points]
-    return foreseen_at(candidate, series, values, gains, estimate.noises.limits) if points else []
-
-
-def seen_at(estimate: Estimate, series: Sequence[Series], point: Point) -> Estimate:
-    """Return an estimate at a point for some recordings, with the gains that it has."""
-    outcome = outcome_at(estimate, series, point)
-    cost = outcome.cost() + point.prior(estimate.candidate)
-    return dataclasses.replace(
-        estimate, point=point, cost=cost, outcome=outcome, normal=None, columns={}
-    )

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.estimation import Estimate, outcome_at
+from diagnosis.estimate import Estimate, outcome_at
 from diagnosis.normal import stepped
 from diagnosis.point import Point
 from diagnosis.prediction import FOLDS, Outcome

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from codegen.runs import Prediction
 from diagnosis.bench import Bench
 from diagnosis.companion import turning
-from diagnosis.estimation import Estimate, with_normal
+from diagnosis.estimate import Estimate, with_normal
 from diagnosis.evidence import inflation
 from diagnosis.probe import Probe, probe_of
 from diagnosis.regression import Columns, Problem, problem_of

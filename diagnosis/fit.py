@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 
 from diagnosis.case import Case, case_bench, read_series
 from diagnosis.dossier import hashes
-from diagnosis.estimation import Estimate, looked_at
+from diagnosis.estimate import Estimate, looked_at
 from diagnosis.naming import correlations_of, quantities_of
 from diagnosis.point import point_of
 from diagnosis.search import Tell

@@ -8,7 +8,8 @@ from functools import partial
 
 from diagnosis.bench import Bench
 from diagnosis.candidate import Candidate
-from diagnosis.estimation import Estimate, followed, looked_at, looked_like
+from diagnosis.estimate import Estimate, looked_at, looked_like
+from diagnosis.estimation import followed
 from diagnosis.layers import DRIFT, Layer
 from diagnosis.level import FIRST_LEVELS, units_of
 from diagnosis.point import extended, point_of

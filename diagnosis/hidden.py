@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from diagnosis.adequacy import remembers
 from diagnosis.bench import Bench
-from diagnosis.estimation import Estimate, followed, looked_at, with_normal
+from diagnosis.estimate import Estimate, looked_at, with_normal
+from diagnosis.estimation import followed
 from diagnosis.evidence import Evidence, evidence, inflation
 from diagnosis.freedom import ALL_LEVELS, SMALL_LEVEL, freed, scanned, with_levels
 from diagnosis.layers import Layer, fitting

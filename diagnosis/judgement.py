@@ -26,7 +26,7 @@ from diagnosis.doubt import (
     left_over,
     selected_formula,
 )
-from diagnosis.estimation import Estimate
+from diagnosis.estimate import Estimate
 from diagnosis.hidden import with_hidden
 from diagnosis.layers import has_parameters
 from diagnosis.level import units_of

@@ -12,7 +12,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from diagnosis.candidate import Candidate
-from diagnosis.estimation import Estimate, followed, looked_at
+from diagnosis.estimate import Estimate, looked_at
+from diagnosis.estimation import followed
 from diagnosis.gains import near, points_of
 from diagnosis.point import Point
 from diagnosis.prediction import Noises, noises_of

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from diagnosis.bench import Bench
 from diagnosis.companion import along
-from diagnosis.estimation import Estimate
+from diagnosis.estimate import Estimate
 from diagnosis.joined import burnt
 from diagnosis.layers import DRIFT, Layer
 from diagnosis.scale import scale_of

@@ -17,7 +17,7 @@ import numpy as np
 from codegen.build import BuildError
 from diagnosis.bench import Bench, balance_drifts
 from diagnosis.candidate import Candidate
-from diagnosis.estimation import Estimate, looked_at
+from diagnosis.estimate import Estimate, looked_at
 from diagnosis.finding import Finding
 from diagnosis.level import units_of
 from diagnosis.point import point_of

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.estimation import Estimate
+from diagnosis.estimate import Estimate
 from diagnosis.layers import Layer
 from diagnosis.normal import solution
 from diagnosis.verdict import Named, Quantity

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from diagnosis.bench import Bench
-from diagnosis.estimation import Estimate
+from diagnosis.estimate import Estimate
 from diagnosis.evidence import Evidence, evidence, less
 from diagnosis.level import settled
 from diagnosis.naming import place_path

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 
 from diagnosis.bench import Bench
-from diagnosis.estimation import Estimate
+from diagnosis.estimate import Estimate
 from diagnosis.evidence import evidence, inflation
 from diagnosis.layers import Layer
 from diagnosis.level import settled

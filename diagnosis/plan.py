@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.bench import Bench
-from diagnosis.estimation import Estimate
+from diagnosis.estimate import Estimate
 from diagnosis.evidence import inflation
 from diagnosis.manoeuvre import Manoeuvre, manoeuvres_of
 from diagnosis.point import Point, point_of

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from codegen.runs import Prediction
 from diagnosis.bench import Bench
 from diagnosis.candidate import Candidate, candidate
-from diagnosis.estimation import Estimate
+from diagnosis.estimate import Estimate
 from diagnosis.joined import burnt
 from diagnosis.layers import DRIFT, Layer, drift
 from diagnosis.scale import KINDS

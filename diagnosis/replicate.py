@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.candidate import Candidate
-from diagnosis.estimation import Estimate
+from diagnosis.estimate import Estimate
 from diagnosis.noise import QUIET, STRETCH, quantum_of
 from diagnosis.prediction import Noises
 from diagnosis.series import PACE, Series

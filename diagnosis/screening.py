@@ -13,15 +13,8 @@ import numpy as np
 from diagnosis.adaptation import turned
 from diagnosis.bench import Bench
 from diagnosis.candidate import Candidate
-from diagnosis.estimation import (
-    SCREENED_ROUNDS,
-    Estimate,
-    looked_at,
-    looked_like,
-    reached,
-    regained,
-    seen_at,
-)
+from diagnosis.estimate import Estimate, looked_at, looked_like, seen_at
+from diagnosis.estimation import SCREENED_ROUNDS, reached, regained
 from diagnosis.layers import Layer
 from diagnosis.point import Point, extended
 from diagnosis.prediction import Outcome

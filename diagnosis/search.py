@@ -10,7 +10,7 @@ import numpy as np
 
 from diagnosis.bench import Bench
 from diagnosis.candidate import Candidate
-from diagnosis.estimation import Estimate
+from diagnosis.estimate import Estimate
 from diagnosis.evidence import Evidence, evidence, inflation
 from diagnosis.layers import Layer
 from diagnosis.level import fitted

@@ -10,13 +10,14 @@ from functools import partial
 import numpy as np
 
 from diagnosis.bench import Bench
-from diagnosis.estimation import Estimate
+from diagnosis.estimate import Estimate
 from diagnosis.evidence import Evidence, evidence
 from diagnosis.layers import Layer
 from diagnosis.level import settled
 from diagnosis.needed import Needed, renewed, still_needed
 from diagnosis.plainer import plainest
 from diagnosis.point import extended
+from diagnosis.rival import rivals
 from diagnosis.search import Tell, Tried, searched
 from diagnosis.swap import swapped
 from diagnosis.threshold import EVERYWHERE, USUAL, Thresholds
@@ -44,8 +45,6 @@ ALONE = 3.0
 BETTER = 10.0
 """Nats by which a model must fit better for its candidates to be looked at again."""
 MOST_EFFECTS = 3
-CLOSE = 20.0
-"""Candidates whose scores differ by less [nats] cannot be told apart by these recordings."""
 OTHER = 5.0
 """Nats by which "none of these" trails the threshold in the probabilities."""
 
@@ -54,7 +53,7 @@ OTHER = 5.0
 class Selection:
     """What was accepted: `model` over `base`, the candidates of the first round, best first.
 
-    `rivals` are those that cannot be told from the first accepted one. `other` is the evidence
+    `rivals` may be it as well as the first accepted one. `other` is the evidence
     [nats] for none of the candidates: that of a formula where one explains more.
     """
 
@@ -116,7 +115,7 @@ def selected(
     found = Needed(base, model, tuple(accepted))
     found = still_needed(bench, found, units, thresholds, tell)
     first = tuple(renewed(rounds[0], accepted, found.kept)) if rounds else ()
-    return Selection(base, found.model, found.kept, first, _rivals(first, found.kept))
+    return Selection(base, found.model, found.kept, first, rivals(first, found.kept))
 
 
 def _enough(
@@ -224,15 +223,3 @@ def _compared(bench: Bench, model: Estimate, tried: Sequence[Tried]) -> list[Tri
 
 def _most(tried: Sequence[Tried]) -> float:
     return max((t.evidence.train for t in tried if t.evidence), default=0.0)
-
-
-def _rivals(first: tuple[Tried, ...], kept: tuple[Tried, ...]) -> tuple[Tried, ...]:
-    if not kept or kept[0].evidence is None:
-        return ()
-    best = kept[0].score
-    ids = {tried.layer.id for tried in kept}
-    return tuple(
-        tried
-        for tried in first
-        if tried.evidence and tried.layer.id not in ids and tried.score > best - CLOSE
-    )

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from diagnosis.candidate import Candidate
-from diagnosis.estimation import Estimate, outcome_at
+from diagnosis.estimate import Estimate, outcome_at
 from diagnosis.normal import Normal
 from diagnosis.point import Point
 from diagnosis.prediction import Gains, Noises

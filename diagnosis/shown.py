@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from diagnosis.adaptation import adapted
 from diagnosis.dossier import Dossier
-from diagnosis.estimation import Estimate
+from diagnosis.estimate import Estimate
 from diagnosis.series import Series
 from diagnosis.whiteness import Whiteness, whiteness_of
 from diagnosis.worst_window import FreeRuns, WorstWindow, free_runs, worst_window

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.estimation import Estimate
+from diagnosis.estimate import Estimate
 from diagnosis.prediction import predicted
 from diagnosis.series import Series
 

@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.estimation import Estimate, looked_at
+from diagnosis.estimate import Estimate, looked_at
 from diagnosis.freedom import ALL_LEVELS, SMALL_LEVEL, scanned, with_levels
 from diagnosis.joined import burnt
 from diagnosis.level import FIRST_LEVELS, settled, units_of

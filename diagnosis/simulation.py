@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.estimation import Estimate
+from diagnosis.estimate import Estimate
 from diagnosis.joined import burnt
 from diagnosis.prediction import predicted
 from diagnosis.series import Series

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.estimation import Estimate
+from diagnosis.estimate import Estimate
 from diagnosis.gains import Local, locals_of
 from diagnosis.series import Series
 

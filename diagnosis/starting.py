@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.estimation import Estimate, outcome_at
+from diagnosis.estimate import Estimate, outcome_at
 from diagnosis.point import Point
 from diagnosis.series import Series
 
@@ -34,11 +34,14 @@ def settled_at_start(series: Series) -> Series:
 
 
 def started(model: Estimate, series: Sequence[Series]) -> tuple[Series, ...]:
-    """Return recordings with the first inputs with which a model foresees them best."""
+    """Return recordings with the first inputs with which a base foresees them best.
+
+    They need not be those that it was fitted to: a base has no parameters of single recordings.
+    """
     variances = model.outcome.variances
+    alone = Point(model.point.shared, model.point.shared[np.newaxis])
     found = []
-    for r, one in enumerate(series):
-        alone = Point(model.point.shared, model.point.own[r : r + 1])
+    for one in series:
         costs = []
         trials = [one, *_others(one, model.noises.inputs)]
         for trial in trials:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from diagnosis.bench import Bench
-from diagnosis.estimation import Estimate
+from diagnosis.estimate import Estimate
 from diagnosis.evidence import evidence
 from diagnosis.level import fitted
 from diagnosis.plainer import may_be_plainer

@@ -12,7 +12,8 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from diagnosis.candidate import Candidate
-from diagnosis.estimation import Estimate, completed, looked_at
+from diagnosis.estimate import Estimate, looked_at
+from diagnosis.estimation import completed
 from diagnosis.point import Point
 from diagnosis.prediction import DRIFTS, INPUTS, SIGNAL, Noises, noises_at, noises_of
 from diagnosis.series import Series

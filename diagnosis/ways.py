@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from functools import partial
 
 from diagnosis.bench import Bench
-from diagnosis.estimation import Estimate
+from diagnosis.estimate import Estimate
 from diagnosis.level import first_fit, recalibrated, settled, units_of
 from diagnosis.point import extended
 from diagnosis.search import Tell, Tried

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_toeplitz
 from scipy.stats import chi2
 
-from diagnosis.estimation import Estimate
+from diagnosis.estimate import Estimate
 
 Reals = NDArray[np.float64]
 LONGEST = 0.25

@@ -10,8 +10,9 @@ from diagnosis.finding import told
 from diagnosis.layers import Layer
 from diagnosis.naming import place_path, verdict_id
 from diagnosis.place_sentence import PLACES, place_sentence
+from diagnosis.rival import CLOSE, is_close
 from diagnosis.search import FULL_FITS, HOPELESS, WORTH, Tried
-from diagnosis.selection import CLOSE, Selection
+from diagnosis.selection import Selection
 from diagnosis.threshold import Thresholds
 from diagnosis.verdict import Misfit as FitMisfit, Named, Quantity
 
@@ -36,7 +37,7 @@ def headline(dossier: Dossier) -> str:
             f"it is: {'; '.join(names)}."
         )
     if verdict.verdict == "unknown":
-        like = _formula(dossier)
+        like = _formula(dossier) or _nearest(dossier)
         return f"`{dossier.name}` lacks something that none of the effects tried explains{like}."
     return (
         f"`{dossier.name}` lacks nothing that these recordings show: with its parameters "
@@ -50,6 +51,12 @@ def _formula(dossier: Dossier) -> str:
     if found is None:
         return ""
     return f"; it is like `{found.text}` {PLACES[found.locus.section]} {found.locus.place}"
+
+
+def _nearest(dossier: Dossier) -> str:
+    """Return the effects that come nearest to what is unknown, as the end of a sentence."""
+    names = [effect_at(one) for one in dossier.verdict.ambiguous_with]
+    return f"; the nearest is {' or '.join(names[:MOST_NAMED])}" if names else ""
 
 
 def effect_at(one: Named) -> str:
@@ -141,7 +148,11 @@ def reason(tried: Tried, place: int, selection: Selection, thresholds: Threshold
     if tried.layer.id in ids:
         return "accepted"
     if tried.layer.id in {one.layer.id for one in selection.rivals}:
-        return f"cannot be told from the accepted one: within {CLOSE:g} nats of it"
+        if not selection.accepted:
+            return "the nearest, but not what is missing"
+        if is_close(tried, selection.accepted[0]):
+            return f"cannot be told from the accepted one: within {CLOSE:g} nats of it"
+        return "may be it as well: gains nearly as much as the best"
     known = tried.evidence
     if known is None:
         if tried.promised < WORTH:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.estimation import Estimate
+from diagnosis.estimate import Estimate
 from diagnosis.series import Series
 from diagnosis.simulation import FREE, OBSERVED, free, is_free
 

@@ -14,7 +14,7 @@ from diagnosis.candidate import Candidate
 from diagnosis.case import Case
 from diagnosis.diagnose import Diagnosis
 from diagnosis.dossier import Dossier
-from diagnosis.estimation import Estimate
+from diagnosis.estimate import Estimate
 from diagnosis.evidence import Evidence
 from diagnosis.layers import Layer, automaton, fitting
 from diagnosis.library import described, library

@@ -7,7 +7,7 @@ import pytest
 
 from diagnosis.adaptation import adapted, turned
 from diagnosis.bench import Bench
-from diagnosis.estimation import looked_at
+from diagnosis.estimate import looked_at
 from diagnosis.layers import fitting, shipped_effects
 from diagnosis.point import point_of
 from diagnosis.prediction import noises_of

@@ -19,7 +19,8 @@ from diagnosis.adequacy import (
     strain,
 )
 from diagnosis.bench import Bench
-from diagnosis.estimation import Estimate, estimated
+from diagnosis.estimate import Estimate
+from diagnosis.estimation import estimated
 from diagnosis.evidence import evidence, inflations
 from diagnosis.joined import burnt
 from diagnosis.layers import effects_in, fitting

@@ -24,7 +24,7 @@ from diagnosis.bootstrap import (
     threshold_key,
     thresholds_of,
 )
-from diagnosis.estimation import Estimate
+from diagnosis.estimate import Estimate
 from diagnosis.layers import Layer, drift, fitting, shipped_effects
 from diagnosis.level import settled
 from diagnosis.prediction import noises_of

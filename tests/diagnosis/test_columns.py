@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from diagnosis.bench import Bench
-from diagnosis.estimation import estimated, innovations_at, looked_at, outcome_at
+from diagnosis.estimate import innovations_at, looked_at, outcome_at
+from diagnosis.estimation import estimated
 from diagnosis.layers import fitting, shipped_effects
 from diagnosis.normal import Normal, stepped
 from diagnosis.point import Point, point_of

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from diagnosis.bench import Bench
-from diagnosis.estimation import Estimate, looked_at, looked_like
+from diagnosis.estimate import Estimate, looked_at, looked_like
 from diagnosis.likeness import seen_like
 from diagnosis.point import extended
 from diagnosis.series import Series

@@ -7,7 +7,7 @@ import dataclasses
 import pytest
 
 from diagnosis.bench import Bench
-from diagnosis.estimation import Estimate
+from diagnosis.estimate import Estimate
 from diagnosis.evidence import inflation
 from diagnosis.freedom import freed
 from diagnosis.joined import BURN_IN

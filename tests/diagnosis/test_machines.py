@@ -27,9 +27,6 @@ def test_friction_and_offset_of_the_servo_axis_are_named_with_their_published_va
 
 
 @pytest.mark.recordings
-@pytest.mark.xfail(
-    strict=True, raises=IndexError, reason="more recordings held out than given: docs/open.md"
-)
 def test_either_drive_of_the_leaf_shows_the_same_gap(recordings: Path) -> None:
     drives: list[Figure] = [
         leaf(recordings, "drive_eco", "drive_2"),

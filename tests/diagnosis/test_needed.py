@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from diagnosis.bench import Bench
-from diagnosis.estimation import Estimate
+from diagnosis.estimate import Estimate
 from diagnosis.evidence import Evidence, evidence, less
 from diagnosis.layers import Layer, fitting, shipped_effects
 from diagnosis.level import settled, units_of

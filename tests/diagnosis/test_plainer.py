@@ -7,7 +7,7 @@ import dataclasses
 import pytest
 
 from diagnosis.bench import Bench
-from diagnosis.estimation import Estimate
+from diagnosis.estimate import Estimate
 from diagnosis.evidence import evidence
 from diagnosis.layers import fitting, shipped_effects
 from diagnosis.level import settled, units_of

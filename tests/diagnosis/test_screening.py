@@ -10,7 +10,7 @@ import pytest
 from diagnosis import screening
 from diagnosis.bench import Bench
 from diagnosis.candidate import Candidate
-from diagnosis.estimation import Estimate, looked_at
+from diagnosis.estimate import Estimate, looked_at
 from diagnosis.layers import fitting, shipped_effects
 from diagnosis.level import first_fit, units_of
 from diagnosis.point import Point, extended

@@ -10,7 +10,7 @@ import pytest
 
 from diagnosis import level
 from diagnosis.bench import Bench, balance_drifts
-from diagnosis.estimation import Estimate
+from diagnosis.estimate import Estimate
 from diagnosis.evidence import evidence
 from diagnosis.layers import fitting, shipped_effects
 from diagnosis.level import first_fit, recalibrated, units_of

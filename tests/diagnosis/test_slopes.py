@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from diagnosis.bench import Bench
-from diagnosis.estimation import looked_at, outcome_at, with_normal
+from diagnosis.estimate import looked_at, outcome_at, with_normal
 from diagnosis.layers import automaton, fewest_steps, fitting, shipped_effects
 from diagnosis.normal import foreseen
 from diagnosis.point import Point, point_of

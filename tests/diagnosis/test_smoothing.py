@@ -8,7 +8,7 @@ import numpy as np
 from filterpy.kalman import KalmanFilter, rts_smoother
 
 from diagnosis.bench import Bench
-from diagnosis.estimation import looked_at
+from diagnosis.estimate import looked_at
 from diagnosis.joined import burnt
 from diagnosis.level import units_of
 from diagnosis.point import point_of

@@ -9,7 +9,8 @@ import pytest
 
 from diagnosis.bench import Bench
 from diagnosis.candidate import Candidate
-from diagnosis.estimation import Estimate, followed, looked_at
+from diagnosis.estimate import Estimate, looked_at
+from diagnosis.estimation import followed
 from diagnosis.level import settled, units_of
 from diagnosis.point import Point
 from diagnosis.prediction import DRIFTS, INPUTS, SIGNAL, Noises, noises_at, noises_of

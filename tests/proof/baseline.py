@@ -16,7 +16,7 @@ from scipy.signal import savgol_filter
 
 from diagnosis.bench import Bench
 from diagnosis.diagnose import Diagnosis
-from diagnosis.estimation import Estimate
+from diagnosis.estimate import Estimate
 from diagnosis.joined import burnt
 from diagnosis.naming import verdict_id
 from diagnosis.simulation import nrmse

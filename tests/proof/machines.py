@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 import modewright as mw
 from diagnosis.case import read_series
 from diagnosis.dossier import Dossier
-from diagnosis.estimation import looked_at
+from diagnosis.estimate import looked_at
 from diagnosis.freedom import ALL_LEVELS, scanned
 from diagnosis.layers import DRIFT
 from diagnosis.level import units_of
