@@ -99,7 +99,9 @@ class _Walk:
         for tick, values in enumerate(inputs):
             after = self._through(now, [values])
             past, now, begun = now, self._stepper.snapshot(), past
-            changes = {(k, *c) for k, c in enumerate(zip(before, after, strict=True)) if c[0] != c[1]}
+            changes = {
+                (k, *c) for k, c in enumerate(zip(before, after, strict=True)) if c[0] != c[1]
+            }
             if changes:
                 yield from self._near(inputs, tick, tick, past, changes)
                 if tick:
@@ -138,8 +140,11 @@ class _Walk:
         if not math.isfinite(near):
             return None
         here = modes(near)
-        far = next((end for end in map(cast, ends) if modes(end) != here), None)
-        for _ in range(HALVINGS if far is not None else 0):
+        others = [end for end in map(cast, ends) if modes(end) != here]
+        if not others:
+            return None
+        far = others[0]
+        for _ in range(HALVINGS):
             middle = cast(near + 0.5 * (far - near))
             if middle in (near, far):
                 return near, far

@@ -161,7 +161,8 @@ def mcdc(
     Raises SpecError; ValueError where there is nothing to run it on; ToolMissing, BuildError.
     """
     automaton, program = _made(reference, values, root, calibrations, numbers)
-    sequences, ranges = [tape.inputs for tape in _tested(program, root, numbers)], _ranges(automaton)
+    sequences = [tape.inputs for tape in _tested(program, root, numbers)]
+    ranges = _ranges(automaton)
     if runs and not automaton.is_sampled:
         raise ValueError(f"{automaton.name} is continuous: sequences are those of sampled automata")
     ways = explored(program, ranges, runs, SEED) if runs else ()

@@ -88,7 +88,7 @@ def proposed(
         limits = _limits(program, cut, first)
         for name, some in limits.items():
             yield from (Within(cut, name, one) for one in some)
-        asked = list(_asked(program, cut))
+        asked = list(asked_of(program, cut))
         for where in _wheres(program, cut, first):
             known = {name for name, _ in where}
             for name, some in limits.items():
@@ -121,7 +121,7 @@ def _limits(program: Program, cut: Cut, first: Mapping[str, int]) -> dict[str, l
             found[name] = [(0, most) for most in range(MOST_COUNTED)]
     if cut.loop:
         found[cut.loop.index] = [(0, 0), (1, cut.loop.count), (0, cut.loop.count)]
-        for name, number in _ends(program, cut):
+        for name, number in ends_of(program, cut):
             found.setdefault(name, []).append((0, number))
     return {name: limits for name, limits in found.items() if name in cut.names}
 
@@ -185,7 +185,7 @@ def _timers(program: Program) -> Iterator[tuple[str, int]]:
         yield from ((op.timer, op.limit) for op in walk(block) if isinstance(op, Count))
 
 
-def _ends(program: Program, cut: Cut) -> Iterator[tuple[str, int]]:
+def ends_of(program: Program, cut: Cut) -> Iterator[tuple[str, int]]:
     """Yield the numbers with which a loop compares what it counts."""
     counters = set(_counters(program, cut))
     for expr in _expressions(program, cut):
@@ -196,7 +196,7 @@ def _ends(program: Program, cut: Cut) -> Iterator[tuple[str, int]]:
                 yield name, most
 
 
-def _compared(program: Program, cut: Cut) -> Iterator[tuple[str, str, int]]:
+def compared_in(program: Program, cut: Cut) -> Iterator[tuple[str, str, int]]:
     """Yield comparisons of whole numbers that become truth values."""
     wholes = {v.name for v in program.variables if v.type == "whole"} & set(cut.names)
     found = set()
@@ -208,7 +208,7 @@ def _compared(program: Program, cut: Cut) -> Iterator[tuple[str, str, int]]:
     yield from sorted(found)
 
 
-def _asked(program: Program, cut: Cut) -> Iterator[tuple[str, str, float | int]]:
+def asked_of(program: Program, cut: Cut) -> Iterator[tuple[str, str, float | int]]:
     """Yield what a loop compares with a number, and does not change."""
     if cut.loop is None:
         return
@@ -237,7 +237,7 @@ def _counts(program: Program, cut: Cut, first: Mapping[str, int]) -> Iterator[Fa
     assert cut.loop
     counters, index = _counters(program, cut), cut.loop.index
     truths = truths_of(program, first)
-    for name, operator, number in _compared(program, cut):
+    for name, operator, number in compared_in(program, cut):
         yield from (Same(cut, name, operator, number, truth) for truth in truths)
     for one in counters:
         for other in (name for name in counters if name != one):

@@ -14,13 +14,13 @@ from typing import Any
 from codegen.proofs.cut import At, Cut, Way
 from codegen.proofs.fact import AtMost, Fact, Within, proposed
 from codegen.proofs.holding import Number, holds, term
-from codegen.proofs.standing import standing
+from codegen.proofs.standing import counted, standing
 from codegen.proofs.symbolic import World
 from codegen.proofs.terms import Range, Real
 
 EFFORT = 20_000_000
 """Units of z3's own count for one question: some seconds, and the same answer on every machine."""
-MOST_WHERE, MOST_TRIED = 3, 12_000
+MOST_WHERE, MOST_TRIED = 2, 12_000
 """Most conditions of a fact, and most facts that are tried together: a minute."""
 
 
@@ -33,21 +33,24 @@ def invariant(
     What is said of few variables is looked for first: it is known when the rest is asked, which is
     left out where it is too much.
     """
-    facts = list(dict.fromkeys(_proposed(world, ranges)))
+    facts = list(dict.fromkeys(proposed(world.program, world.cuts, ranges)))
+    last = list(dict.fromkeys(_last(world)))
     known: list[Fact] = []
-    for most in range(most_where + 1):
+    for most in range(most_where + 2):
         some = [f for f in facts if isinstance(f, AtMost) or len(f.where) <= most]
-        fresh = list(_beside(some, known))
+        fresh = list(_beside(some if most <= most_where else last, known))
         if len(fresh) > MOST_TRIED:
             break
         known = list(_strongest([*known, *_staying(world, fresh, known)]))
     return known
 
 
-def _proposed(world: World, ranges: Mapping[str, Range]) -> Iterator[Fact]:
-    yield from proposed(world.program, world.cuts, ranges)
+def _last(world: World) -> Iterator[Fact]:
+    """Yield what is proposed at last, of loops."""
     for cut, first in world.cuts.items():
-        yield from standing(world.program, cut, first)
+        if cut.loop:
+            yield from standing(world.program, cut, first)
+            yield from counted(world.program, cut)
 
 
 def _staying(world: World, tried: Collection[Fact], known: Collection[Fact]) -> list[Fact]:

@@ -1,15 +1,28 @@
 """Standing: what may stand while a loop goes on - counters and edges beside the guards they follow.
 
 A mode that counts how long its guard is true has done so once a turn has passed: where its counter
-is 0, or its edge is not there, the guard is false until the loop ends.
+is 0, or its edge is not there, the guard is false until the loop ends. And how many turns have come
+by tells what led to a mode: how two modes go with a count, and what guards say then.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from itertools import combinations
 
 from codegen.proofs.cut import Cut, blocks_of
-from codegen.proofs.fact import KEPT, Fact, Literal, Same, Within, modes_of, truths_of
+from codegen.proofs.fact import (
+    KEPT,
+    Fact,
+    Literal,
+    Same,
+    Within,
+    asked_of,
+    compared_in,
+    ends_of,
+    modes_of,
+    truths_of,
+)
 from language.number import rounded
 from language.operation import Assign, Block, Choose, Compare, Count, Expr, Op, Ref, Unary, Value
 from language.program import Program
@@ -34,6 +47,30 @@ def standing(program: Program, cut: Cut, first: Mapping[str, int]) -> Iterator[F
                     yield from (Same(cut, name, relation, other, t, where) for t in (False, True))
                 for name in truths:
                     yield from (Within(cut, name, frozenset({t}), where) for t in (0, 1))
+
+
+def counted(program: Program, cut: Cut) -> Iterator[Fact]:
+    """Yield what may hold of modes where a loop has counted so far."""
+    last = {name for name, _, _ in compared_in(program, cut)}
+    counts = {name: most for name, most in ends_of(program, cut) if name in last}
+    modes = [(name, n) for name, of in modes_of(program).items() for n in of if name in cut.names]
+    for counter, most in counts.items():
+        for one, other in combinations(modes, 2):
+            if one[0] != other[0]:
+                yield from (Within(cut, counter, (0, k), (one, other)) for k in range(most))
+        for k in range(1, most + 1):
+            for name, relation, number in asked_of(program, cut):
+                for mode in modes:
+                    where = (mode, (counter, k))
+                    yield from (Same(cut, name, relation, number, t, where) for t in (True, False))
+            for mode, ops in _followed(program, cut):
+                for timer, _ in (latch for latch in _latches(cut, ops) if latch[0] in _timers(ops)):
+                    where = (mode, (counter, k))
+                    yield from (Within(cut, timer, (0, end), where) for end in (0, 1))
+
+
+def _timers(ops: list[Op]) -> set[str]:
+    return {op.timer for op in ops if isinstance(op, Count)}
 
 
 def _followed(program: Program, cut: Cut) -> Iterator[tuple[Literal, list[Op]]]:

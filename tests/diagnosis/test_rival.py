@@ -11,7 +11,7 @@ from diagnosis.evidence import Evidence
 from diagnosis.rival import CLOSE, NEARLY, is_close, nearest, rivals
 from diagnosis.search import Tried
 from language.project import Project
-from tests.diagnosis.accepting import accepted, acceptable
+from tests.diagnosis.accepting import acceptable, accepted
 
 LEFT_OUT = 50.0
 """Gain on what was left out, the same for all: what was fitted decides."""
@@ -21,6 +21,7 @@ def tried(*gains: float | None) -> list[Tried]:
     """Return candidates with so much gained where they were fitted [nats]; None: not fitted."""
     project = Project(Path())
     dossier = accepted(project, acceptable(project)[: len(gains)])
+    assert dossier.diagnosis
     found = dossier.diagnosis.selection.first_round
     made = [None if gain is None else Evidence(gain, LEFT_OUT, (LEFT_OUT,)) for gain in gains]
     return [dataclasses.replace(t, evidence=e) for t, e in zip(found, made, strict=True)]
