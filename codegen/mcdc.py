@@ -20,7 +20,7 @@ from codegen.build import FLAGS, run_executable
 from codegen.exploring import write_explorer
 from codegen.harness import write_harness
 from codegen.machine import HOST
-from codegen.proofs.infeasible import Place, never, places_of
+from codegen.proofs.infeasible import Place, never, places_of, unshared
 from codegen.proofs.terms import Range
 from codegen.source import STATIC, c_program
 from codegen.tool import output_of
@@ -90,7 +90,7 @@ def with_proofs(found: Covered, program: Program, ranges: Mapping[str, Range]) -
 
     `ranges` are those of its variables between two steps, as far as they stay in them.
     """
-    made = c_program(program)
+    made = unshared(c_program(program))
     places = _by_block(places_of(made))
     decisions = _by_block(found.decisions)
     missed = [block for block, of in decisions.items() if any(not all(d.shown) for d in of)]

@@ -18,6 +18,10 @@ PASSING = ("input", "is_new", "work", "calibration", "derived")
 """Groups of what each step brings or finds anew."""
 
 
+MOST_ITEMS = 8
+"""Most items of an array of whole numbers that are each a variable of their own."""
+
+
 @dataclass(frozen=True, eq=False)
 class Cut:
     """A place with the variables that are known there; `loop` if it is where a turn begins."""
@@ -66,8 +70,15 @@ def loop_cut(program: Program, loop: Loop, number: int) -> Cut:
     fixed = {c.name for c in program.constants if c.kind == "fixed" or c.items}
     things = {v.name for v in (*program.variables, *program.inputs) if not v.size}
     things |= {c.name for c in program.constants}
-    whole = (things & read) - fixed
+    whole = (things & read) - fixed | {name for of in items_of(program).values() for name in of}
     return Cut(f"loop {number}", (*sorted(whole - {loop.index}), loop.index), loop)
+
+
+def items_of(program: Program) -> dict[str, tuple[str, ...]]:
+    """Return the names of the items of small arrays that are written and read within a step."""
+    small = (v for v in program.variables if v.type == "whole" and 0 < v.size <= MOST_ITEMS)
+    passing = (v for v in small if v.name.partition(".")[0] in PASSING)
+    return {v.name: tuple(f"{v.name}[{k}]" for k in range(v.size)) for v in passing}
 
 
 def blocks_of(program: Program, block: Block) -> Iterator[Block]:

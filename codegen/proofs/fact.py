@@ -187,7 +187,7 @@ def _timers(program: Program) -> Iterator[tuple[str, int]]:
 
 def ends_of(program: Program, cut: Cut) -> Iterator[tuple[str, int]]:
     """Yield the numbers with which a loop compares what it counts."""
-    counters = set(_counters(program, cut))
+    counters = set(counters_of(program, cut))
     for expr in _expressions(program, cut):
         match expr:
             case Compare(_, Ref(name), Value(int(most))) if (
@@ -235,7 +235,7 @@ def _histories(program: Program, cut: Cut) -> Iterator[Fact]:
 def _counts(program: Program, cut: Cut, first: Mapping[str, int]) -> Iterator[Fact]:
     """Yield how counters of a loop hang together."""
     assert cut.loop
-    counters, index = _counters(program, cut), cut.loop.index
+    counters, index = counters_of(program, cut), cut.loop.index
     truths = truths_of(program, first)
     for name, operator, number in compared_in(program, cut):
         yield from (Same(cut, name, operator, number, truth) for truth in truths)
@@ -248,7 +248,7 @@ def _counts(program: Program, cut: Cut, first: Mapping[str, int]) -> Iterator[Fa
         yield from (AtMost(cut, index, (one,), going=going) for going in truths)
 
 
-def _counters(program: Program, cut: Cut) -> list[str]:
+def counters_of(program: Program, cut: Cut) -> list[str]:
     """Return the whole numbers that a loop counts up."""
     assert cut.loop
     ops = [op for block in blocks_of(program, cut.loop.body) for op in walk(block)]

@@ -8,8 +8,9 @@ do not exclude is asked of z3's Spacer, which looks for facts of its own (`reach
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import partial
+from typing import Any
 
 from codegen.expression import LOGIC, c_expression
 from codegen.names import SOLVED_ON_PAGE, CNames
@@ -44,6 +45,21 @@ class Place:
     block: str
     text: str
     conditions: tuple[int, ...]
+
+
+def unshared(program: Program) -> Program:
+    """Return a Program in which each expression is an object of its own: conditions are told apart
+    by their `id`.
+    """
+    return replace(program, blocks={name: _own(block) for name, block in program.blocks.items()})
+
+
+def _own(thing: Any) -> Any:
+    if isinstance(thing, tuple):
+        return tuple(map(_own, thing))
+    if is_dataclass(thing) and not isinstance(thing, type):
+        return replace(thing, **{f.name: _own(getattr(thing, f.name)) for f in fields(thing)})
+    return thing
 
 
 def places_of(program: Program) -> Iterator[Place]:

@@ -14,7 +14,7 @@ from typing import Any
 from codegen.proofs.cut import At, Cut, Way
 from codegen.proofs.fact import AtMost, Fact, Within, proposed
 from codegen.proofs.holding import Number, holds, term
-from codegen.proofs.standing import counted, standing
+from codegen.proofs.standing import commanded, counted, queued, standing
 from codegen.proofs.symbolic import World
 from codegen.proofs.terms import Range, Real
 
@@ -46,11 +46,15 @@ def invariant(
 
 
 def _last(world: World) -> Iterator[Fact]:
-    """Yield what is proposed at last, of loops."""
+    """Yield what is proposed at last, together: what a loop counts hangs on what modes command."""
+    if not any(cut.loop for cut in world.cuts):
+        return
     for cut, first in world.cuts.items():
+        yield from commanded(world.program, cut, first)
         if cut.loop:
             yield from standing(world.program, cut, first)
             yield from counted(world.program, cut)
+            yield from queued(world.program, cut, first)
 
 
 def _staying(world: World, tried: Collection[Fact], known: Collection[Fact]) -> list[Fact]:

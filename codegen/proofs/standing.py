@@ -7,24 +7,38 @@ by tells what led to a mode: how two modes go with a count, and what guards say 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from itertools import combinations
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from itertools import combinations, permutations
 
-from codegen.proofs.cut import Cut, blocks_of
+from codegen.proofs.cut import Cut, blocks_of, items_of
 from codegen.proofs.fact import (
     KEPT,
+    AtMost,
     Fact,
     Literal,
     Same,
     Within,
     asked_of,
     compared_in,
+    counters_of,
     ends_of,
     modes_of,
     truths_of,
 )
 from language.number import rounded
-from language.operation import Assign, Block, Choose, Compare, Count, Expr, Op, Ref, Unary, Value
+from language.operation import (
+    Assign,
+    Choose,
+    Compare,
+    Count,
+    Expr,
+    Item,
+    Op,
+    Ref,
+    Store,
+    Unary,
+    Value,
+)
 from language.program import Program
 from language.substitution import own_expressions, subexpressions
 from language.traversal import walk
@@ -51,22 +65,118 @@ def standing(program: Program, cut: Cut, first: Mapping[str, int]) -> Iterator[F
 
 def counted(program: Program, cut: Cut) -> Iterator[Fact]:
     """Yield what may hold of modes where a loop has counted so far."""
-    last = {name for name, _, _ in compared_in(program, cut)}
-    counts = {name: most for name, most in ends_of(program, cut) if name in last}
+    counts = _counted(program, cut)
     modes = [(name, n) for name, of in modes_of(program).items() for n in of if name in cut.names]
     for counter, most in counts.items():
         for one, other in combinations(modes, 2):
             if one[0] != other[0]:
                 yield from (Within(cut, counter, (0, k), (one, other)) for k in range(most))
+                yield from _said(program, cut, (one, other), int)
         for k in range(1, most + 1):
-            for name, relation, number in asked_of(program, cut):
-                for mode in modes:
-                    where = (mode, (counter, k))
-                    yield from (Same(cut, name, relation, number, t, where) for t in (True, False))
+            for mode in modes:
+                yield from _said(program, cut, (mode, (counter, k)))
             for mode, ops in _followed(program, cut):
                 for timer, _ in (latch for latch in _latches(cut, ops) if latch[0] in _timers(ops)):
                     where = (mode, (counter, k))
                     yield from (Within(cut, timer, (0, end), where) for end in (0, 1))
+
+
+def _counted(program: Program, cut: Cut) -> dict[str, int]:
+    """Return what a loop counts until it says so, and the most of it."""
+    last = {name for name, _, _ in compared_in(program, cut)}
+    return {name: most for name, most in ends_of(program, cut) if name in last}
+
+
+def commanded(program: Program, cut: Cut, first: Mapping[str, int]) -> Iterator[Fact]:
+    """Yield what equations and discrete truth values may be in a mode, and while a loop goes on."""
+    groups = ("equation.", "discrete.")
+    truths = [v.name for v in program.variables if v.type == "truth" and v.name in cut.names]
+    modes = [(name, n) for name, of in modes_of(program).items() for n in of if name in cut.names]
+    going = [(name, value) for name in truths_of(program, first) for value in (0, 1)]
+    for name in (name for name in truths if name.startswith(groups)):
+        for mode in modes:
+            for where in ((mode,), *((mode, one) for one in going)):
+                yield from (Within(cut, name, frozenset({t}), where) for t in (0, 1))
+
+
+def queued(program: Program, cut: Cut, first: Mapping[str, int]) -> Iterator[Fact]:
+    """Yield what may be in a small array while a loop goes on, and in what is read from it."""
+    arrays = items_of(program)
+    ops = _all(program, (op for block in program.blocks.values() for op in block))
+    ops = [op for op in ops if not isinstance(op, Assign) or op.target in cut.names]
+    stored: dict[str, set[int]] = {name: set() for name in arrays}
+    for op in ops:
+        match op:
+            case Store(name, _, Value(int(number))) if name in stored:
+                stored[name].add(number)
+    ends = [name for name in counters_of(program, cut) if name not in first]
+    going = [(name, value) for name in truths_of(program, first) for value in (0, 1)]
+    pairs = [(one, other) for one, other in combinations(going, 2) if one[0] != other[0]]
+    for target, name in _read(ops, arrays):
+        for some in _parts(stored[name]):
+            yield from (Within(cut, target, some | {0}, pair) for pair in pairs)
+    heard = ((target, n) for target, name in _read(ops, arrays) for n in sorted(stored[name]))
+    for where in ((one,) for one in heard):
+        yield from _waiting(program, cut, where)
+    for name, items in arrays.items():
+        for end, head in permutations(ends, 2):
+            yield AtMost(cut, end, (head,), more=1)
+            for n in range(1, len(items) + 1):
+                where = ((end, n), (head, n - 1))
+                yield from _waiting(program, cut, where)
+                yield from (Within(cut, one, frozenset({0}), where) for one in truths_of(program, first))
+                yield from (Within(cut, one, frozenset({0}), where) for one, _ in _read(ops, arrays))
+        yield from (Within(cut, end, (0, len(items))) for end in ends)
+        for k, item in enumerate(items):
+            for some in _parts(stored[name]):
+                for where in _places(ends, k, len(items)):
+                    yield Within(cut, item, some, where)
+
+
+def _read(ops: list[Op], arrays: Container[str]) -> list[tuple[str, str]]:
+    """Return what is read from small arrays: the variable and the array."""
+    found = {}
+    for op in ops:
+        match op:
+            case Assign(target, Item(name)) if name in arrays:
+                found[target, name] = None
+    return list(found)
+
+
+def _waiting(program: Program, cut: Cut, where: tuple[Literal, ...]) -> Iterator[Fact]:
+    """Yield what may hold while something is in a queue: modes, counts, what guards say."""
+    for name, numbers in modes_of(program).items():
+        if name in cut.names:
+            yield from (Within(cut, name, frozenset({n}), where) for n in numbers)
+    for name, most in _counted(program, cut).items():
+        yield from (Within(cut, name, (0, k), where) for k in range(most))
+    yield from _said(program, cut, where)
+
+
+def _said(
+    program: Program, cut: Cut, where: tuple[Literal, ...], kind: type = object
+) -> Iterator[Fact]:
+    """Yield what guards may say of what a loop does not change, of numbers of a kind."""
+    for name, relation, number in asked_of(program, cut):
+        if isinstance(number, kind):
+            yield from (Same(cut, name, relation, number, t, where) for t in (True, False))
+
+
+def _places(ends: Sequence[str], item: int, size: int) -> Iterator[tuple[Literal, ...]]:
+    """Yield where counters stand while an item is in a queue: its end, and its head as well."""
+    for end in ends:
+        for n in range(item + 1, size + 1):
+            yield ((end, n),)
+            for head in (one for one in ends if one != end):
+                yield from (((end, n), (head, at)) for at in range(item + 1))
+
+
+def _parts(numbers: set[int]) -> Iterator[frozenset[int]]:
+    """Yield some numbers, each one alone, and all but each."""
+    yield frozenset(numbers)
+    if len(numbers) > 1:
+        yield from (frozenset({n}) for n in numbers)
+        yield from (frozenset(numbers - {n}) for n in numbers if len(numbers) > 2)
 
 
 def _timers(ops: list[Op]) -> set[str]:
@@ -85,8 +195,8 @@ def _followed(program: Program, cut: Cut) -> Iterator[tuple[Literal, list[Op]]]:
                         yield (selector, number), _all(program, case)
 
 
-def _all(program: Program, case: Block) -> list[Op]:
-    return [op for block in blocks_of(program, case) for op in walk(block)]
+def _all(program: Program, case: Iterable[Op]) -> list[Op]:
+    return [op for block in blocks_of(program, tuple(case)) for op in walk(block)]
 
 
 def _latches(cut: Cut, ops: list[Op]) -> list[Literal]:

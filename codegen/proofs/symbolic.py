@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from codegen.proofs.cut import At, Cut, Visit, Way, blocks_of, loop_cut, step_cut
+from codegen.proofs.cut import At, Cut, Visit, Way, blocks_of, items_of, loop_cut, step_cut
 from codegen.proofs.terms import Terms
 from codegen.statement import going_on
 from language.operation import (
@@ -37,6 +37,10 @@ from language.program import Program
 from language.traversal import block_writes
 
 
+KINDS = ("real", "whole")
+"""Of an item of an array, which is a whole number or not."""
+
+
 class World:
     """The `ways` of a Program from cut to cut; `visits` are by `id` of a condition.
 
@@ -49,6 +53,8 @@ class World:
         self.z3 = self.terms.z3
         self.kinds = {v.name: v.type for v in (*program.variables, *program.inputs)}
         self.kinds |= {c.name: c.type for c in program.constants}
+        self.items = items_of(program)
+        self.kinds |= {name: "whole" for of in self.items.values() for name in of}
         fixed = (c for c in program.constants if c.kind == "fixed")
         self.fixed = {c.name: self.terms.value(c.value) for c in fixed}
         self.tables = {c.name: c.items for c in program.constants if c.kind == "fixed" and c.items}
@@ -97,9 +103,10 @@ class World:
             case Assign(target, value, _):
                 values[target] = self._expr(value, values, path)
             case Store(array, index, value):
-                self._expr(index, values, path)
-                self._expr(value, values, path)
+                where, stored = (self._expr(one, values, path) for one in (index, value))
                 values[array] = self._any(array)
+                for k, item in enumerate(self.items.get(array, ())):
+                    values[item] = self.z3.If(where == k, stored, values[item])
             case Branch(condition, then, other):
                 test = self._decided(condition, values, path)
                 self._merge(test, then, other, values, path)
@@ -187,6 +194,7 @@ class World:
         names = {index}
         for block in blocks_of(self.program, body):
             names |= set(block_writes(block))
+        names |= {item for array in names & set(self.items) for item in self.items[array]}
         for name in sorted(names):
             values[name] = self.terms.new("whole", name) if name == index else self._any(name)
         self._block(body, dict(values), self.z3.And(path, self.always))
@@ -225,8 +233,11 @@ class World:
                 if name not in values:
                     values[name] = self._any(name)
                 return values[name]
-            case Item(_, _, whole):
-                return terms.new("whole" if whole else "real", "item")
+            case Item(name, index, whole):
+                where, found = self._expr(index, values, path), terms.new(KINDS[whole], "item")
+                for k, item in enumerate(self.items.get(name, ())):
+                    found = z3.If(where == k, values[item], found)
+                return found
             case Binary("and" | "or") | Unary("not", Binary()):
                 return self._decided(expr, values, path)
             case Unary(operator, operand):
