@@ -44,7 +44,7 @@ class Within:
 @dataclass(frozen=True)
 class AtMost:
     """A counter is no larger than `factor` times the sum of others, and `more`; one more where a
-    truth value that keeps the loop `going` is false.
+    truth value that keeps the loop `going` is false. It is so where others have some values.
     """
 
     cut: Cut
@@ -53,6 +53,7 @@ class AtMost:
     factor: int = 1
     more: int = 0
     going: str = ""
+    where: tuple[Literal, ...] = ()
 
 
 @dataclass(frozen=True)

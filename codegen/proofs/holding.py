@@ -29,9 +29,10 @@ def holds(fact: Fact, of: Callable[[str], Any]) -> bool:
     match fact:
         case Within(_, name, limits, where):
             return not _all(where, of) or _is_within(of(name), limits)
-        case AtMost(_, name, others, factor, more, going):
+        case AtMost(_, name, others, factor, more, going, where):
             more += 0 if not going or of(going) else 1
-            return bool(of(name) <= factor * sum(map(of, others)) + more)
+            most = factor * sum(map(of, others)) + more
+            return not _all(where, of) or bool(of(name) <= most)
         case Same(_, name, relation, number, truth, where):
             found, wanted = of(name), of(truth) if isinstance(truth, str) else truth
             other = of(number) if isinstance(number, str) else number
@@ -56,9 +57,10 @@ def term(world: World, at: At, fact: Fact) -> Any:
     match fact:
         case Within(_, name, limits, where):
             return _where(world, at, where, terms.within(values[name], limits))
-        case AtMost(_, name, others, factor, more, going):
+        case AtMost(_, name, others, factor, more, going, where):
             most = factor * sum(values[other] for other in others) + more
-            return values[name] <= (most + z3.If(values[going], 0, 1) if going else most)
+            found = values[name] <= (most + z3.If(values[going], 0, 1) if going else most)
+            return _where(world, at, where, found)
         case Same(_, name, relation, number, truth, where):
             other = values[number] if isinstance(number, str) else terms.value(number)
             found = terms.compare(relation, values[name], other)

@@ -12,9 +12,10 @@ from functools import cache
 from typing import Any
 
 from codegen.proofs.cut import At, Cut, Way
-from codegen.proofs.fact import AtMost, Fact, Within, proposed
+from codegen.proofs.fact import Fact, Within, proposed
 from codegen.proofs.holding import Number, holds, term
-from codegen.proofs.standing import commanded, counted, queued, standing
+from codegen.proofs.queue import queued
+from codegen.proofs.standing import commanded, counted, lasting, standing
 from codegen.proofs.symbolic import World
 from codegen.proofs.terms import Range, Real
 
@@ -37,7 +38,7 @@ def invariant(
     last = list(dict.fromkeys(_last(world)))
     known: list[Fact] = []
     for most in range(most_where + 2):
-        some = [f for f in facts if isinstance(f, AtMost) or len(f.where) <= most]
+        some = [f for f in facts if len(f.where) <= most]
         fresh = list(_beside(some if most <= most_where else last, known))
         if len(fresh) > MOST_TRIED:
             break
@@ -51,6 +52,7 @@ def _last(world: World) -> Iterator[Fact]:
         return
     for cut, first in world.cuts.items():
         yield from commanded(world.program, cut, first)
+        yield from lasting(world.program, cut, first, world.cuts)
         if cut.loop:
             yield from standing(world.program, cut, first)
             yield from counted(world.program, cut)

@@ -7,10 +7,10 @@ by tells what led to a mode: how two modes go with a count, and what guards say 
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
-from itertools import combinations, permutations
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import combinations
 
-from codegen.proofs.cut import Cut, blocks_of, items_of
+from codegen.proofs.cut import Cut, blocks_of
 from codegen.proofs.fact import (
     KEPT,
     AtMost,
@@ -20,7 +20,6 @@ from codegen.proofs.fact import (
     Within,
     asked_of,
     compared_in,
-    counters_of,
     ends_of,
     modes_of,
     truths_of,
@@ -32,10 +31,8 @@ from language.operation import (
     Compare,
     Count,
     Expr,
-    Item,
     Op,
     Ref,
-    Store,
     Unary,
     Value,
 )
@@ -43,6 +40,7 @@ from language.program import Program
 from language.substitution import own_expressions, subexpressions
 from language.traversal import walk
 
+TIMER = "timer."
 Atom = tuple[str, str, float | int | str]
 """A variable, a relation, and a number or another variable."""
 
@@ -65,23 +63,51 @@ def standing(program: Program, cut: Cut, first: Mapping[str, int]) -> Iterator[F
 
 def counted(program: Program, cut: Cut) -> Iterator[Fact]:
     """Yield what may hold of modes where a loop has counted so far."""
-    counts = _counted(program, cut)
+    counts = counts_of(program, cut)
     modes = [(name, n) for name, of in modes_of(program).items() for n in of if name in cut.names]
     for counter, most in counts.items():
         for one, other in combinations(modes, 2):
             if one[0] != other[0]:
                 yield from (Within(cut, counter, (0, k), (one, other)) for k in range(most))
-                yield from _said(program, cut, (one, other), int)
+                yield from said(program, cut, (one, other), int)
         for k in range(1, most + 1):
             for mode in modes:
-                yield from _said(program, cut, (mode, (counter, k)))
+                yield from said(program, cut, (mode, (counter, k)))
             for mode, ops in _followed(program, cut):
-                for timer, _ in (latch for latch in _latches(cut, ops) if latch[0] in _timers(ops)):
-                    where = (mode, (counter, k))
+                where = (mode, (counter, k))
+                for timer in _timers(ops):
                     yield from (Within(cut, timer, (0, end), where) for end in (0, 1))
 
 
-def _counted(program: Program, cut: Cut) -> dict[str, int]:
+def lasting(
+    program: Program, cut: Cut, first: Mapping[str, int], cuts: Iterable[Cut]
+) -> Iterator[Fact]:
+    """Yield how the time in a mode goes with what a mode beside it counts."""
+    going = [(name, value) for name in truths_of(program, first) for value in (0, 1)]
+    followed = [(m, ops) for one in cuts if one.loop for m, ops in _followed(program, one)]
+    for mode, ops in followed:
+        for time in sorted(_times(ops) & set(cut.names)):
+            for beside, others in followed:
+                for timer in _timers(others) if beside[0] != mode[0] else ():
+                    for where in ((mode, beside), *((mode, beside, one) for one in going)):
+                        ahead = (-1, 0, 1)
+                        yield from (AtMost(cut, time, (timer,), 1, k, "", where) for k in ahead)
+
+
+def _times(ops: list[Op]) -> set[str]:
+    """Return the times in a mode that guards compare."""
+    counted = _timers(ops)
+    read = {
+        expr.left.name
+        for op in ops
+        for whole in own_expressions(op)
+        for expr in subexpressions(whole)
+        if isinstance(expr, Compare) and isinstance(expr.left, Ref)
+    }
+    return {name for name in read - set(counted) if name.startswith(TIMER)}
+
+
+def counts_of(program: Program, cut: Cut) -> dict[str, int]:
     """Return what a loop counts until it says so, and the most of it."""
     last = {name for name, _, _ in compared_in(program, cut)}
     return {name: most for name, most in ends_of(program, cut) if name in last}
@@ -99,61 +125,7 @@ def commanded(program: Program, cut: Cut, first: Mapping[str, int]) -> Iterator[
                 yield from (Within(cut, name, frozenset({t}), where) for t in (0, 1))
 
 
-def queued(program: Program, cut: Cut, first: Mapping[str, int]) -> Iterator[Fact]:
-    """Yield what may be in a small array while a loop goes on, and in what is read from it."""
-    arrays = items_of(program)
-    ops = _all(program, (op for block in program.blocks.values() for op in block))
-    ops = [op for op in ops if not isinstance(op, Assign) or op.target in cut.names]
-    stored: dict[str, set[int]] = {name: set() for name in arrays}
-    for op in ops:
-        match op:
-            case Store(name, _, Value(int(number))) if name in stored:
-                stored[name].add(number)
-    ends = [name for name in counters_of(program, cut) if name not in first]
-    going = [(name, value) for name in truths_of(program, first) for value in (0, 1)]
-    pairs = [(one, other) for one, other in combinations(going, 2) if one[0] != other[0]]
-    for target, name in _read(ops, arrays):
-        for some in _parts(stored[name]):
-            yield from (Within(cut, target, some | {0}, pair) for pair in pairs)
-    heard = ((target, n) for target, name in _read(ops, arrays) for n in sorted(stored[name]))
-    for where in ((one,) for one in heard):
-        yield from _waiting(program, cut, where)
-    for name, items in arrays.items():
-        for end, head in permutations(ends, 2):
-            yield AtMost(cut, end, (head,), more=1)
-            for n in range(1, len(items) + 1):
-                where = ((end, n), (head, n - 1))
-                yield from _waiting(program, cut, where)
-                yield from (Within(cut, one, frozenset({0}), where) for one in truths_of(program, first))
-                yield from (Within(cut, one, frozenset({0}), where) for one, _ in _read(ops, arrays))
-        yield from (Within(cut, end, (0, len(items))) for end in ends)
-        for k, item in enumerate(items):
-            for some in _parts(stored[name]):
-                for where in _places(ends, k, len(items)):
-                    yield Within(cut, item, some, where)
-
-
-def _read(ops: list[Op], arrays: Container[str]) -> list[tuple[str, str]]:
-    """Return what is read from small arrays: the variable and the array."""
-    found = {}
-    for op in ops:
-        match op:
-            case Assign(target, Item(name)) if name in arrays:
-                found[target, name] = None
-    return list(found)
-
-
-def _waiting(program: Program, cut: Cut, where: tuple[Literal, ...]) -> Iterator[Fact]:
-    """Yield what may hold while something is in a queue: modes, counts, what guards say."""
-    for name, numbers in modes_of(program).items():
-        if name in cut.names:
-            yield from (Within(cut, name, frozenset({n}), where) for n in numbers)
-    for name, most in _counted(program, cut).items():
-        yield from (Within(cut, name, (0, k), where) for k in range(most))
-    yield from _said(program, cut, where)
-
-
-def _said(
+def said(
     program: Program, cut: Cut, where: tuple[Literal, ...], kind: type = object
 ) -> Iterator[Fact]:
     """Yield what guards may say of what a loop does not change, of numbers of a kind."""
@@ -162,25 +134,8 @@ def _said(
             yield from (Same(cut, name, relation, number, t, where) for t in (True, False))
 
 
-def _places(ends: Sequence[str], item: int, size: int) -> Iterator[tuple[Literal, ...]]:
-    """Yield where counters stand while an item is in a queue: its end, and its head as well."""
-    for end in ends:
-        for n in range(item + 1, size + 1):
-            yield ((end, n),)
-            for head in (one for one in ends if one != end):
-                yield from (((end, n), (head, at)) for at in range(item + 1))
-
-
-def _parts(numbers: set[int]) -> Iterator[frozenset[int]]:
-    """Yield some numbers, each one alone, and all but each."""
-    yield frozenset(numbers)
-    if len(numbers) > 1:
-        yield from (frozenset({n}) for n in numbers)
-        yield from (frozenset(numbers - {n}) for n in numbers if len(numbers) > 2)
-
-
-def _timers(ops: list[Op]) -> set[str]:
-    return {op.timer for op in ops if isinstance(op, Count)}
+def _timers(ops: list[Op]) -> list[str]:
+    return sorted({op.timer for op in ops if isinstance(op, Count)})
 
 
 def _followed(program: Program, cut: Cut) -> Iterator[tuple[Literal, list[Op]]]:
@@ -192,11 +147,12 @@ def _followed(program: Program, cut: Cut) -> Iterator[tuple[Literal, list[Op]]]:
             match op:
                 case Choose(selector, cases) if selector in modes and selector in cut.names:
                     for number, case in cases:
-                        yield (selector, number), _all(program, case)
+                        yield (selector, number), all_of(program, case)
 
 
-def _all(program: Program, case: Iterable[Op]) -> list[Op]:
-    return [op for block in blocks_of(program, tuple(case)) for op in walk(block)]
+def all_of(program: Program, ops: Iterable[Op]) -> list[Op]:
+    """Return some operations, and all that they run."""
+    return [op for block in blocks_of(program, tuple(ops)) for op in walk(block)]
 
 
 def _latches(cut: Cut, ops: list[Op]) -> list[Literal]:

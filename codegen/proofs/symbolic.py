@@ -36,7 +36,6 @@ from language.operation import (
 from language.program import Program
 from language.traversal import block_writes
 
-
 KINDS = ("real", "whole")
 """Of an item of an array, which is a whole number or not."""
 
