@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from codegen.mcdc import EXPORTER, mcdc, with_proofs
-from codegen.proofs.infeasible import never, places_of
+from codegen.proofs.infeasible import never, places_of, unshared
 from codegen.source import c_program
 from language.program import Program
 from modewright import code
@@ -40,6 +40,20 @@ modes:
   spilled: {{transitions: {{shut: {{when: abs(u) < top}}}}}}
 outputs: [level, mode]
 """
+PRESS = """language: 1
+automaton: press
+period: 10 ms
+numbers: float64
+micro_steps: 3
+inputs: {held: {type: bool}}
+events: {go: {from: input}, done: {}}
+initial: still
+modes:
+  still: {transitions: {down: {event: go, raise: done}}}
+  down: {transitions: {up: {event: done}}}
+  up: {transitions: {still: {when: not held, wait: 20 ms}}}
+outputs: [mode]
+"""
 SEEDS = (14, 19)
 """Of small specs."""
 HELD = {"latched.u": (-8.0, 8.0), "state.level": (0.0, 5.0)}
@@ -47,7 +61,7 @@ HELD = {"latched.u": (-8.0, 8.0), "state.level": (0.0, 5.0)}
 
 def proven(made: Program, ranges: dict[str, tuple[float, float]] = HELD) -> dict[str, str]:
     """Return of each decision of which something is proven its text and `T`, `F` or `.`."""
-    used = c_program(made)
+    used = unshared(c_program(made))
     places = list(places_of(used))
     found = never(used, ranges, [number for place in places for number in place.conditions])
     marks = {None: ".", True: "F", False: "T"}
@@ -124,3 +138,19 @@ def test_of_the_simple_estimator_twenty_conditions_never_turn() -> None:
     found = never(made, held, [number for place in places for number in place.conditions])
     assert len(found) == 20 and not any(found.values())
     assert sum(len(place.conditions) for place in places) == 57
+
+
+def test_what_waits_in_a_queue_bounds_the_micro_steps() -> None:
+    """`go` is heard at the beginning of a tick alone and `done` once: of three none are left."""
+    used = unshared(c_program(program(PRESS)))
+    asked = [p for p in places_of(used) if p.text == "work->is_over"]
+    assert len(asked) >= 3
+    found = never(used, {}, [number for place in asked for number in place.conditions])
+    assert all(found.get(number) is True for place in asked for number in place.conditions)
+
+
+def test_each_condition_is_an_object_of_its_own() -> None:
+    used = c_program(program(PRESS))
+    for made, is_told_apart in ((used, False), (unshared(used), True)):
+        found = [n for p in places_of(made) if p.text == "work->is_over" for n in p.conditions]
+        assert (len(set(found)) == len(found)) is is_told_apart
