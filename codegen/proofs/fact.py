@@ -129,10 +129,21 @@ def _limits(program: Program, cut: Cut, first: Mapping[str, int]) -> dict[str, l
 
 def _wheres(program: Program, cut: Cut, first: Mapping[str, int]) -> Iterator[tuple[Literal, ...]]:
     """Yield the conditions under which something is tried: a mode, how a loop goes on, both."""
-    modes = [(name, n) for name, of in modes_of(program).items() for n in of if name in cut.names]
-    going = [(name, value) for name in truths_of(program, first) for value in (0, 1)]
+    modes = modes_at(program, cut)
+    going = going_values(program, first)
     yield from ((one,) for one in (*modes, *going))
     yield from ((mode, one) for mode in modes for one in going)
+
+
+def modes_at(program: Program, cut: Cut) -> list[Literal]:
+    """Return each mode of each region that is known at a cut."""
+    modes = modes_of(program).items()
+    return [(name, number) for name, of in modes for number in of if name in cut.names]
+
+
+def going_values(program: Program, first: Mapping[str, int]) -> list[Literal]:
+    """Return both values of each truth value with which a loop begins."""
+    return [(name, value) for name in truths_of(program, first) for value in (0, 1)]
 
 
 def truths_of(program: Program, first: Mapping[str, int]) -> list[str]:

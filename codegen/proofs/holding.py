@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import operator
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from fractions import Fraction
 from typing import Any
 
@@ -11,17 +10,10 @@ from codegen.proofs.cut import At
 from codegen.proofs.fact import AtMost, Fact, Literal, Same, Within
 from codegen.proofs.symbolic import World
 from codegen.proofs.terms import Limits
+from language.operators import RELATIONS
 
 Number = Fraction | float | int | None
 """A number, or a truth value as 0 or 1; None for a NaN."""
-RELATIONS: Mapping[str, Callable[[Any, Any], bool]] = {
-    "<": operator.lt,
-    "<=": operator.le,
-    ">": operator.gt,
-    ">=": operator.ge,
-    "==": operator.eq,
-    "!=": operator.ne,
-}
 
 
 def holds(fact: Fact, of: Callable[[str], Any]) -> bool:

@@ -6,7 +6,16 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations, permutations
 
 from codegen.proofs.cut import Cut, items_of
-from codegen.proofs.fact import AtMost, Fact, Literal, Within, counters_of, modes_of, truths_of
+from codegen.proofs.fact import (
+    AtMost,
+    Fact,
+    Literal,
+    Within,
+    counters_of,
+    going_values,
+    modes_of,
+    truths_of,
+)
 from codegen.proofs.standing import all_of, counts_of, said
 from language.operation import Assign, Item, Op, Store, Value
 from language.program import Program
@@ -22,7 +31,7 @@ def queued(program: Program, cut: Cut, first: Mapping[str, int]) -> Iterator[Fac
     truths = truths_of(program, first)
     ends = [name for name in counters_of(program, cut) if name not in first]
     read = [(target, name) for target, name in _read(ops, stored) if target in cut.names]
-    yield from _heard(program, cut, truths, read, stored)
+    yield from _heard(program, cut, going_values(program, first), read, stored)
     for name, items in arrays.items():
         yield from (Within(cut, end, (0, len(items))) for end in ends)
         for end, head in permutations(ends, 2):
@@ -64,12 +73,11 @@ def _read(ops: Sequence[Op], stored: Numbers) -> list[tuple[str, str]]:
 def _heard(
     program: Program,
     cut: Cut,
-    truths: Sequence[str],
+    going: Sequence[Literal],
     read: Sequence[tuple[str, str]],
     stored: Numbers,
 ) -> Iterator[Fact]:
     """Yield what may have been read, and what holds while it is there."""
-    going = [(name, value) for name in truths for value in (0, 1)]
     pairs = [(one, other) for one, other in combinations(going, 2) if one[0] != other[0]]
     for target, name in read:
         for some in _parts(stored[name]):

@@ -21,8 +21,9 @@ from codegen.proofs.fact import (
     asked_of,
     compared_in,
     ends_of,
+    going_values,
+    modes_at,
     modes_of,
-    truths_of,
 )
 from language.number import rounded
 from language.operation import (
@@ -40,7 +41,6 @@ from language.program import Program
 from language.substitution import own_expressions, subexpressions
 from language.traversal import walk
 
-TIMER = "timer."
 Atom = tuple[str, str, float | int | str]
 """A variable, a relation, and a number or another variable."""
 
@@ -49,7 +49,7 @@ def standing(program: Program, cut: Cut, first: Mapping[str, int]) -> Iterator[F
     """Yield what may hold of what modes count and compare, while a loop goes on."""
     if cut.loop is None:
         return
-    going = [(name, value) for name in truths_of(program, first) for value in (0, 1)]
+    going = going_values(program, first)
     for mode, ops in _followed(program, cut):
         atoms, truths = _asked(program, cut, ops)
         for latch in _latches(cut, ops):
@@ -64,7 +64,7 @@ def standing(program: Program, cut: Cut, first: Mapping[str, int]) -> Iterator[F
 def counted(program: Program, cut: Cut) -> Iterator[Fact]:
     """Yield what may hold of modes where a loop has counted so far."""
     counts = counts_of(program, cut)
-    modes = [(name, n) for name, of in modes_of(program).items() for n in of if name in cut.names]
+    modes = modes_at(program, cut)
     for counter, most in counts.items():
         for one, other in combinations(modes, 2):
             if one[0] != other[0]:
@@ -83,7 +83,7 @@ def lasting(
     program: Program, cut: Cut, first: Mapping[str, int], cuts: Iterable[Cut]
 ) -> Iterator[Fact]:
     """Yield how the time in a mode goes with what a mode beside it counts."""
-    going = [(name, value) for name in truths_of(program, first) for value in (0, 1)]
+    going = going_values(program, first)
     followed = [(m, ops) for one in cuts if one.loop for m, ops in _followed(program, one)]
     for mode, ops in followed:
         for time in sorted(_times(ops) & set(cut.names)):
@@ -104,7 +104,7 @@ def _times(ops: list[Op]) -> set[str]:
         for expr in subexpressions(whole)
         if isinstance(expr, Compare) and isinstance(expr.left, Ref)
     }
-    return {name for name in read - set(counted) if name.startswith(TIMER)}
+    return {name for name in read - set(counted) if name.startswith("timer.")}
 
 
 def counts_of(program: Program, cut: Cut) -> dict[str, int]:
@@ -117,8 +117,8 @@ def commanded(program: Program, cut: Cut, first: Mapping[str, int]) -> Iterator[
     """Yield what equations and discrete truth values may be in a mode, and while a loop goes on."""
     groups = ("equation.", "discrete.")
     truths = [v.name for v in program.variables if v.type == "truth" and v.name in cut.names]
-    modes = [(name, n) for name, of in modes_of(program).items() for n in of if name in cut.names]
-    going = [(name, value) for name in truths_of(program, first) for value in (0, 1)]
+    modes = modes_at(program, cut)
+    going = going_values(program, first)
     for name in (name for name in truths if name.startswith(groups)):
         for mode in modes:
             for where in ((mode,), *((mode, one) for one in going)):

@@ -23,7 +23,8 @@ def mcdc(
     calibrations: Calibrations = None,
     as_json: Json = False,
 ) -> None:
-    """Measure MC/DC of the C of an automaton on the tests of the project, by clang.
+    """Measure MC/DC of the C of an automaton on the tests of the project and at their borders,
+    by clang.
 
     \b
     modewright mcdc supervisor
