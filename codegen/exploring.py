@@ -32,11 +32,12 @@ CORPUS, WORDS = "corpus", "words.h"
 
 
 def explored(
-    program: Program, ranges: Mapping[str, Range], runs: int, seed: int
+    program: Program, ranges: Mapping[str, Range], runs: int, seeds: Sequence[int]
 ) -> tuple[bytes, ...]:
-    """Return ways that together show all that libFuzzer found in so many runs.
+    """Return ways that together show all that libFuzzer found in so many runs from each seed.
 
-    `ranges` are those of inputs by name. Raises ToolMissing, BuildError.
+    Later seeds go on from what earlier ones found. `ranges` are those of inputs by name. Raises
+    ToolMissing, BuildError.
     """
     with tempfile.TemporaryDirectory(prefix="modewright-") as name:
         folder = Path(name)
@@ -46,10 +47,11 @@ def explored(
         output_of([*command, "-o", APP, "-lm"], folder)
         (folder / CORPUS).mkdir()
         limits = [f"-runs={runs}", f"-max_len={longest(program)}", "-len_control=0"]
-        rest = [f"-seed={seed}", f"-timeout={STUCK}", "-use_value_profile=1", CORPUS]
-        done = ran(folder / APP, [*limits, *rest])
-        if done.found:
-            raise BuildError(done.found[0])
+        rest = [f"-timeout={STUCK}", "-use_value_profile=1", CORPUS]
+        for seed in seeds:
+            done = ran(folder / APP, [*limits, f"-seed={seed}", *rest])
+            if done.found:
+                raise BuildError(done.found[0])
         return tuple(path.read_bytes() for path in sorted((folder / CORPUS).iterdir()))
 
 

@@ -36,6 +36,8 @@ from modewright.documents import Values, calibrated_document, scalars
 from modewright.tests import load_tests, tests_of
 
 HELD = ("latched.", "state.", "discrete.")
+SEEDS = (SEED, SEED + 1)
+"""Where libFuzzer starts: what one seed misses, another one may find."""
 
 
 def generate(
@@ -165,7 +167,7 @@ def mcdc(
     ranges = _ranges(automaton)
     if runs and not automaton.is_sampled:
         raise ValueError(f"{automaton.name} is continuous: sequences are those of sampled automata")
-    ways = explored(program, ranges, runs, SEED) if runs else ()
+    ways = explored(program, ranges, runs, SEEDS) if runs else ()
     if not sequences and not ways:
         hint = ": give it `--runs`" if automaton.is_sampled else ""
         raise ValueError(f"no test of the project runs {automaton.name} as it is{hint}")

@@ -49,8 +49,8 @@ def test_solved_numbers_of_a_page_may_be_any() -> None:
 
 def test_a_wait_of_many_ticks_and_another_page_are_found() -> None:
     """`least > 6` is false with the page of the spec, and true with one where it is 7."""
-    ways = explored(slow(), RANGES, 20_000, 1)
-    assert ways == explored(slow(), RANGES, 20_000, 1)
+    ways = explored(slow(), RANGES, 20_000, (1,))
+    assert ways == explored(slow(), RANGES, 20_000, (1,))
     found = mcdc(slow(), [], ways, RANGES)
     assert found.sequences == len(ways) and found.steps > 400
     shown = {decision.text: decision.shown for decision in found.decisions}
