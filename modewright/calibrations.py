@@ -9,6 +9,7 @@ from pathlib import Path
 from codegen.exchange.characteristic import PageFile
 from codegen.exchange.desk import Remark
 from codegen.exchange.formats import FORMATS, read_page
+from codegen.exchange.owned import Owned
 from codegen.exchange.page import page_constants, page_name, page_of
 from codegen.exchange.taking import Taken, taken
 from language.document import Document, Node, Scalar
@@ -154,9 +155,11 @@ def _imported(
     own_only: bool = False,
 ) -> ImportedPage:
     problems = Problems()
-    read: PageFile = read_page(file, problems, form)
     automaton = automaton_of(document, project, scalars)
-    found: Taken = taken(read, automaton, program_of(automaton), problems, own_only)
+    program = program_of(automaton)
+    owned = Owned(program.name if own_only else "")
+    read: PageFile = read_page(file, problems, form, owned)
+    found: Taken = taken(read, automaton, program, problems, owned)
     page = _page(document, project, {**scalars, **found.values})
     values = {name: one_line(node) for name, node in found.values.items()}
     return ImportedPage(

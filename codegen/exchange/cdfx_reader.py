@@ -16,6 +16,7 @@ from codegen.exchange.characteristic import (
     stop_if_many,
     turned,
 )
+from codegen.exchange.owned import Owned
 from codegen.exchange.xml_tree import Element, xml_tree
 from language.problem import Problems, Source
 
@@ -23,8 +24,8 @@ VALUES = ("VALUE", "DEPENDENT_VALUE", "BOOLEAN", "ASCII", "VAL_BLK", "CURVE", "M
 SHARED = ("COM_AXIS", "RES_AXIS", "CURVE_AXIS")
 
 
-def read_cdfx(source: Source, data: bytes, problems: Problems) -> PageFile:
-    """Read a CDFX file; problems are reported, at last with SpecError."""
+def read_cdfx(source: Source, data: bytes, problems: Problems, owned: Owned) -> PageFile:
+    """Read what is `owned` of a CDFX file; problems are reported, at last with SpecError."""
     root = xml_tree(source, data)
     if root.tag != "MSRSW":
         label = f"this is no CDFX file: it begins with `{root.tag}`, not with `MSRSW`"
@@ -32,6 +33,9 @@ def read_cdfx(source: Source, data: bytes, problems: Problems) -> PageFile:
     problems.stop_if_any()
     found = []
     for instance in root.below("SW-INSTANCE"):
+        name = instance.first("SHORT-NAME")
+        if name and not owned.has(Cell(name.text, name.span)):
+            continue
         one = _characteristic(instance, problems)
         if one:
             found.append(one)

@@ -15,6 +15,7 @@ from codegen.exchange.characteristic import (
     PageFile,
     stop_if_many,
 )
+from codegen.exchange.owned import Owned
 from language.problem import Problems, Source, Span, nearest
 
 COLUMNS = ("name", "value", "unit", "x", "x_unit", "y", "y_unit")
@@ -28,6 +29,7 @@ Row = Mapping[str, Cell]
 class _Reading:
     source: Source
     problems: Problems
+    owned: Owned
 
 
 def csv_text(title: str, heading: Sequence[str], page: Sequence[Characteristic]) -> str:
@@ -51,9 +53,9 @@ def _rows(one: Characteristic) -> Iterator[tuple[str, ...]]:
         yield row + ("",) * (len(COLUMNS) - len(row))
 
 
-def read_csv(source: Source, text: str, problems: Problems) -> PageFile:
-    """Read a page in CSV; problems are reported, at last with SpecError."""
-    reading = _Reading(source, problems)
+def read_csv(source: Source, text: str, problems: Problems, owned: Owned) -> PageFile:
+    """Read what is `owned` of a page in CSV; problems are reported, at last with SpecError."""
+    reading = _Reading(source, problems, owned)
     groups: dict[str, list[Row]] = {}
     last = ""
     for row in _read_rows(reading, text):
@@ -84,7 +86,7 @@ def _read_rows(reading: _Reading, text: str) -> Iterator[Row]:
                 columns = [cell.strip().lower() for cell in cells]
                 _require_columns(columns, span, reading.problems)
             elif any(cell.strip() for cell in cells):
-                yield from _row(columns, cells, span, reading.problems)
+                yield from _row(columns, cells, span, reading)
     except csv.Error as error:
         span = Span(reading.source, max(1, lines.line_num), 1)
         reading.problems.error("form", span, f"this is not CSV: {error}")
@@ -105,14 +107,17 @@ def _require_columns(columns: Sequence[str], span: Span, problems: Problems) -> 
 
 
 def _row(
-    columns: Sequence[str], cells: Sequence[str], span: Span, problems: Problems
+    columns: Sequence[str], cells: Sequence[str], span: Span, reading: _Reading
 ) -> Iterator[Row]:
-    """Yield the one row of a line, or none with the problem reported."""
-    texts = [cell.strip() for cell in cells]
+    """Yield the one row of a line, or none with the problem reported; none of another's."""
+    texts, problems = [cell.strip() for cell in cells], reading.problems
+    name = "".join(texts[columns.index("name") :][:1])
+    if name and not reading.owned.has(Cell(name, span)):
+        return
     if len(texts) != len(columns):
         label = f"this line has {len(texts)} cells, the first one has {len(columns)}"
         problems.error("row", span, label)
-    elif not texts[columns.index("name")]:
+    elif not name:
         problems.error("missing", span, "this line has no name")
     else:
         at = span.source.lines[span.line - 1] if span.line <= len(span.source.lines) else ""

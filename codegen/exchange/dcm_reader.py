@@ -7,6 +7,7 @@ DISPLAYNAME, VAR ...) is passed over, and so are points that several maps share
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -19,6 +20,7 @@ from codegen.exchange.characteristic import (
     stop_if_many,
 )
 from codegen.exchange.dcm_block import SHARED, SIZES, Block, characteristic_of, is_count
+from codegen.exchange.owned import Owned
 from language.problem import Problems, Source, Span, nearest
 
 COMMENTS = ("*", "!", ".")
@@ -44,9 +46,9 @@ class _Reading:
     passed: set[str] = field(default_factory=set)
 
 
-def read_dcm(source: Source, problems: Problems) -> PageFile:
-    """Read a DCM file; problems are reported, at last with SpecError."""
-    reading = _Reading(source, problems)
+def read_dcm(source: Source, problems: Problems, owned: Owned) -> PageFile:
+    """Read what is `owned` of a DCM file; problems are reported, at last with SpecError."""
+    reading = _Reading(_without_others(source, owned), problems)
     lines = _lines(reading)
     found: list[Characteristic] = []
     _require_format(next(lines, []), reading)
@@ -68,6 +70,21 @@ def read_dcm(source: Source, problems: Problems) -> PageFile:
         stop_if_many(problems)
     problems.stop_if_any()
     return PageFile(source, tuple(found))
+
+
+def _without_others(source: Source, owned: Owned) -> Source:
+    """Return a file in which the lines of blocks that are not `owned` are blank: up to their END,
+    or to the next head where one has none.
+    """
+    kept, is_inside = [], False
+    for number, line in enumerate(source.lines, start=1):
+        head, name, *_ = (*WORD.findall(line), "", "")
+        if head in HEADS:
+            place = Span(source, number, line.find(name) + 1, len(name))
+            is_inside = head in SIZES and bool(name) and not owned.has(Cell(name, place))
+        kept.append("" if is_inside else line)
+        is_inside = is_inside and head != "END"
+    return dataclasses.replace(source, lines=tuple(kept))
 
 
 def _require_format(words: Words, reading: _Reading) -> None:

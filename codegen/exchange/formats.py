@@ -12,11 +12,12 @@ from codegen.exchange.characteristic import Characteristic, PageFile, report_twi
 from codegen.exchange.csv_page import csv_text, read_csv
 from codegen.exchange.dcm import dcm_text
 from codegen.exchange.dcm_reader import read_dcm
+from codegen.exchange.owned import Owned
 from codegen.exchange.page_text import page_bytes, page_text
 from language.finding import shown
 from language.problem import Problems, Source, Span, SpecError
 
-Reader = Callable[[str, bytes, Problems], PageFile]
+Reader = Callable[[str, bytes, Problems, Owned], PageFile]
 
 
 @dataclass(frozen=True)
@@ -27,21 +28,21 @@ class Format:
     read: Reader
 
 
-def _dcm(name: str, data: bytes, problems: Problems) -> PageFile:
+def _dcm(name: str, data: bytes, problems: Problems, owned: Owned) -> PageFile:
     """DCM says nothing of its encoding: UTF-8, else what Windows writes in the West."""
     source, _ = page_text(data, name, "latin-1")
-    return read_dcm(source, problems)
+    return read_dcm(source, problems, owned)
 
 
-def _cdfx(name: str, data: bytes, problems: Problems) -> PageFile:
+def _cdfx(name: str, data: bytes, problems: Problems, owned: Owned) -> PageFile:
     """XML says its encoding itself; its lines are shown where they are UTF-8."""
     lines = tuple(data.decode("utf-8", errors="replace").splitlines())
-    return read_cdfx(Source(name, lines), data, problems)
+    return read_cdfx(Source(name, lines), data, problems, owned)
 
 
-def _csv(name: str, data: bytes, problems: Problems) -> PageFile:
+def _csv(name: str, data: bytes, problems: Problems, owned: Owned) -> PageFile:
     source, text = page_text(data, name)
-    return read_csv(source, text, problems)
+    return read_csv(source, text, problems, owned)
 
 
 FORMATS: Mapping[str, Format] = {
@@ -57,8 +58,13 @@ def format_name(path: Path, named: str | None = None) -> str | None:
     return name if name in FORMATS else None
 
 
-def read_page(path: Path, problems: Problems, named: str | None = None) -> PageFile:
-    """Read a file of calibration data. Raises SpecError with its problems."""
+def read_page(
+    path: Path, problems: Problems, named: str | None = None, owned: Owned | None = None
+) -> PageFile:
+    """Read a file of calibration data, of its names those that are `owned`.
+
+    Raises SpecError with its problems.
+    """
     name = shown(path)
     data = page_bytes(path, name)
     form = format_name(path, named)
@@ -66,7 +72,7 @@ def read_page(path: Path, problems: Problems, named: str | None = None) -> PageF
         label = f"a page of a calibration ends with {', '.join(f'.{each}' for each in FORMATS)}"
         problems.error("form", Span(Source(name), 1, 1), label, "or name its format: `--format`")
         raise SpecError(problems.found)
-    found = FORMATS[form].read(name, data, problems)
+    found = FORMATS[form].read(name, data, problems, owned or Owned())
     report_twice(found.characteristics, problems)
     problems.stop_if_any()
     return found

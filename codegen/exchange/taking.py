@@ -6,7 +6,6 @@ its points are. Solved numbers are never taken.
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import re
 from collections.abc import Mapping
@@ -21,6 +20,7 @@ from codegen.exchange.characteristic import (
 )
 from codegen.exchange.desk import Desk, Remark, in_type, real_of, unit_beside
 from codegen.exchange.exact import exact
+from codegen.exchange.owned import Owned
 from codegen.exchange.page import page_constants, page_name
 from codegen.exchange.table import table_of
 from language.declaration import Parameter
@@ -56,17 +56,19 @@ def taken(
     automaton: Automaton,
     program: Program,
     problems: Problems,
-    own_only: bool = False,
+    owned: Owned | None = None,
 ) -> Taken:
     """Return what a file says of an automaton's page. Raises SpecError with all problems.
 
-    With `own_only` names that do not begin with the automaton's are passed over: they are of other
-    functions of the ECU.
+    What was passed over, since it is not `owned`, is told.
     """
     known = {page_name(program, constant): constant for constant in page_constants(program)}
     desk = Desk(automaton, program.number, problems)
-    if own_only:
-        file = _own(file, program.name, desk)
+    for other in owned.passed.values() if owned else ():
+        desk.remark("passed over", other, "is of another function")
+    if owned and owned.passed and not file.characteristics:
+        label = f"no name of this file begins with `{program.name}.`"
+        problems.error("name", next(iter(owned.passed.values())).span, label)
     given = _known(file, known, program.name, problems)
     values: dict[str, Node] = {}
     solved: dict[str, float] = {}
@@ -82,18 +84,6 @@ def taken(
                 values[short(constant.name)] = node
     problems.stop_if_any()
     return Taken(values, solved, tuple(desk.remarks))
-
-
-def _own(file: PageFile, owner: str, desk: Desk) -> PageFile:
-    """Return what is the automaton's of a file that other functions of the ECU have values in."""
-    own = tuple(one for one in file.characteristics if one.name.text.startswith(f"{owner}."))
-    for one in file.characteristics:
-        if not one.name.text.startswith(f"{owner}."):
-            desk.remark("passed over", one.name, "is of another function")
-    if file.characteristics and not own:
-        label = f"no name of this file begins with `{owner}.`"
-        desk.problems.error("name", file.characteristics[0].name.span, label)
-    return dataclasses.replace(file, characteristics=own)
 
 
 def _known(

@@ -147,6 +147,44 @@ def test_names_of_other_functions_are_passed_over_if_that_is_wanted() -> None:
         import_calibration(wrong, "kinds_float64", own_only=True)
 
 
+DCM = """KONSERVIERUNG_FORMAT 2.0
+FUNKTIONEN
+  FKT boost "" ""
+END
+FESTWERT boost.gain 7
+  WERT 1 2
+  TEXT "never closed
+END
+FESTWERT boost.gain
+  WERT 4
+KENNLINIE boost.line 3
+  ST/X 1 2
+  WERT 1
+FESTWERT kinds_float64.gain
+  WERT 1
+END
+"""
+CSV = (
+    "name,value,unit\nboost.gain,1,1,1,1\nboost.gain,1,1\nkinds_float64.gain,1,1\nboost.gain,2,1\n"
+)
+CDFX = """<MSRSW><SW-INSTANCE><SHORT-NAME>boost.gain</SHORT-NAME><CATEGORY>VALUE</CATEGORY></SW-INSTANCE>
+<SW-INSTANCE><SHORT-NAME>kinds_float64.gain</SHORT-NAME><CATEGORY>VALUE</CATEGORY><SW-VALUE-CONT>
+<SW-VALUES-PHYS><V>1</V></SW-VALUES-PHYS></SW-VALUE-CONT></SW-INSTANCE></MSRSW>
+"""
+
+
+@pytest.mark.parametrize(("form", "text"), [("dcm", DCM), ("csv", CSV), ("cdfx", CDFX)])
+def test_what_is_malformed_of_other_functions_does_not_matter(form: str, text: str) -> None:
+    """Blocks with too many values, a quote or no END, names twice, an instance without a value."""
+    Path(f"ecu.{form}").write_text(text)
+    found = import_calibration(Path(f"ecu.{form}"), "kinds_float64", own_only=True)
+    assert found.values == {"gain": "1"}
+    passed = [remark.name for remark in found.remarks if remark.kind == "passed over"]
+    assert passed == ["boost.gain", *(["boost.line"] if form == "dcm" else [])]
+    with pytest.raises(mw.SpecError):
+        import_calibration(Path(f"ecu.{form}"), "kinds_float64")
+
+
 @pytest.mark.parametrize(
     ("text", "unit", "taken", "told"),
     [
