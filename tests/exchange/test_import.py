@@ -164,12 +164,17 @@ FESTWERT kinds_float64.gain
   WERT 1
 END
 """
-CSV = (
-    "name,value,unit\nboost.gain,1,1,1,1\nboost.gain,1,1\nkinds_float64.gain,1,1\nboost.gain,2,1\n"
-)
-CDFX = """<MSRSW><SW-INSTANCE><SHORT-NAME>boost.gain</SHORT-NAME><CATEGORY>VALUE</CATEGORY></SW-INSTANCE>
+CSV = """name,value,unit
+boost.gain,1,1,1,1
+boost.gain,1,1
+kinds_float64.gain,1,1
+boost.gain,2,1
+"""
+CDFX = """<MSRSW>
+<SW-INSTANCE><SHORT-NAME>boost.gain</SHORT-NAME><CATEGORY>VALUE</CATEGORY></SW-INSTANCE>
 <SW-INSTANCE><SHORT-NAME>kinds_float64.gain</SHORT-NAME><CATEGORY>VALUE</CATEGORY><SW-VALUE-CONT>
-<SW-VALUES-PHYS><V>1</V></SW-VALUES-PHYS></SW-VALUE-CONT></SW-INSTANCE></MSRSW>
+<SW-VALUES-PHYS><V>1</V></SW-VALUES-PHYS></SW-VALUE-CONT></SW-INSTANCE>
+</MSRSW>
 """
 
 
