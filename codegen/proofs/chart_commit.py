@@ -187,9 +187,9 @@ class Commit:
             is_taken = words.is_one(words.chosen(region), [words.number(transition)], words.before)
             fits = f"{is_taken} && {tail} <= {charting.size - more}"
             yield f"({fits}) ==> {words.now(TAIL.name)} == {tail} + {more}"
-            for place, name in enumerate(transition.raises):
-                number = charting.chart.signals[name].number
-                yield f"({fits}) ==> {queue}[{tail} + {place}] == {number}"
+            if more == 1:
+                number = charting.chart.signals[transition.raises[0]].number
+                yield f"({fits}) ==> {queue}[{tail}] == {number}"
         numbers = [words.number(transition) for transition, _ in raising]
         none = words.is_one(words.chosen(region), numbers, words.before)
         yield f"{none} || {words.now(TAIL.name)} == {tail}"

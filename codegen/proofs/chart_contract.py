@@ -32,11 +32,11 @@ from language.traversal import block_writes, reached, walk
 SELECT, HEAR, COMMIT = "select_transitions", "hear", "commit"
 SCRATCH = "*const work = &self->work;"
 """How C says that the values of a step are a part of the instance."""
-MODEL = ("-wp-model", "Typed+real", "-no-warn-invalid-bool", "-rte-no-mem")
-"""Reals are numbers without rounding, of which guards are comparisons. Accesses and truth values
-are looked at by the value analysis (values.py).
+MODEL = ("-wp-model", "Typed+real")
+"""Reals are numbers without rounding, of which guards are comparisons. Accesses and sums are looked
+at by the value analysis (values.py).
 """
-OF_PARTS = (*MODEL, "-wp-rte", "-wp-split")
+OF_PARTS = (*MODEL, "-wp-split")
 OF_CHART = MODEL
 """`select_transitions`, `hear` and `commit`, in which functions are run one after the other."""
 OWN_TYPE = r"\b(u?)int(?:16|32)_t (?={}\[)"

@@ -28,8 +28,10 @@ class Hearing:
         for said in self.consistent(self.words.now):
             yield f"ensures {said};"
         for region in self.words.charting.chart.regions:
-            name = taken(region.region)
-            own, heard = self.words.now(name), any_of(self._offers(region))
+            own, heard = self.words.now(taken(region.region)), any_of(self._offers(region))
+            if not self.words.charting.ways_in(region.region):
+                yield f"ensures {own} == 0;"
+                continue
             wished = self.words.now(wish(region.region))
             yield f"ensures {own} == 0 || ({own} == {wished} && {heard});"
             beaten = any_of(self._beats(other, region) for other in self._rivals(region))
@@ -81,6 +83,7 @@ class Hearing:
         for region in chart.regions:
             plain = [n.number for n in chart.leaves(region.region) if n.kind == "atomic"]
             around = [r for r in chart.regions if r is region or chart.is_inside(region, r)]
+            around = [r for r in around if words.charting.ways_in(r.region)]
             if chart.order == "inner_first":
                 around.reverse()
             listens = words.is_in(region.region, (n for n in plain if n is not None), words.now)

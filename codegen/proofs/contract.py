@@ -21,7 +21,6 @@ from codegen.proofs.proof import Proof, version_of
 from codegen.proofs.wp import Asked, asked, detected, pure
 from codegen.source import STATIC, c_files, c_program
 from codegen.usage import locals_of
-from language.fault import with_fault_transitions
 from language.model import Automaton
 from language.operation import Count
 from language.program import ModeInfo, Program, TransitionInfo
@@ -38,16 +37,17 @@ def contract(automaton: Automaton, program: Program, folder: Path) -> Proof:
     tool = f"Frama-C {version_of('frama-c', folder)} WP"
     modes = [mode for mode in program.modes if f"jump_{mode.name}" in made.blocks]
     files = c_files(program, by_amount=False)
-    if program.period is not None and automaton.tree is not None:
-        charting = charting_of(with_fault_transitions(automaton), program.transitions)
-        assert charting
+    charting = charting_of(automaton, program.transitions) if automaton.is_sampled else None
+    if charting and automaton.fault_mode is None:
         chart = ChartContract(charting, made)
         names = written(chart, files, folder)
         what = f"{len(names)} functions"
         what += f"; guards of {chart.unsaid} modes are left open" if chart.unsaid else ""
         return _told(tool, proven_of(program.name, names, folder), what)
     if program.period is None or program.regions or not modes:
-        about = "one region of a sampled automaton, and its chart, have contracts"
+        about = (
+            "one region of a sampled automaton, and a chart without a fault mode, have contracts"
+        )
         return Proof("contract", tool, about, is_asked=False)
     text, file = files[f"{program.name}.c"], f"{program.name}.c"
     for mode in modes:
