@@ -17,38 +17,30 @@ from language.action import (
     reading,
 )
 from language.activation import elapse
-from language.chart import Chart
-from language.charting import Charting
 from language.constants import derive_block, parameter_constants, values_of
 from language.covariance import COVARIANCE_RANGE
 from language.decision import decision_block
 from language.evaluate import Scalar
-from language.event import capacity
-from language.fault import FAULT_GUARD, fault_names, with_fault_transitions
+from language.fault import fault_names, with_fault_transitions
 from language.invariant import INVARIANTS, invariant_block
 from language.kalman import Kalman, kalman
 from language.limit import (
-    HAPPENED,
     MICRO_STEP_LIMIT,
     first_latched,
     latch,
 )
 from language.lower import equation_names, equations, variable_names
-from language.memory import delays_of, keep_block, with_delays
+from language.memory import delays_of, keep_block
 from language.micro_step import chart_blocks, chart_variables, first_entries, nothing_left
 from language.model import CHART, Automaton, Mode
 from language.operation import (
     Assign,
     Block,
-    Compare,
-    Expr,
     Op,
-    Ref,
     Run,
     Value,
     whole,
 )
-from language.parameter import constant_names
 from language.past import keep_past
 from language.problem import Problems
 from language.program import (
@@ -58,10 +50,10 @@ from language.program import (
     Program,
 )
 from language.recursive import recursive
-from language.region import in_modes
 from language.rewind import REWIND_LIMIT, advance_blocks, rewind_blocks
 from language.run import EVENT_LIMIT, run_motion, start_regions
 from language.sampled_variable import sampled_variables
+from language.situation import charting_of, names_now, names_of
 from language.stamp import STALE_CALIBRATION, STAMPS, stamps_block, stamps_of
 from language.tick import by_mode, silence, tick_block
 from language.transition import enter_run, sampled_commit, sampled_jump, transition_infos
@@ -98,34 +90,12 @@ class _Sampled:
         self.observers: dict[str, Kalman] = {}
         self.faults: list[str] = []
         self.motion: MotionInfo | None = None
-        self.before = self._names("before")
+        self.before = names_of(automaton, "before")
         self.delays = delays_of(automaton)
-        names = equation_names(automaton, "equation.")
-        self.all = with_delays(self.delays, {**self._names("input"), **names})
-        self.now = {name: value for name, value in self.all.items() if name not in names}
-        self.charting = self._charting(automaton.tree) if automaton.tree else None
+        self.all, self.now = names_now(automaton)
+        self.charting = charting_of(automaton, self.transitions)
         if self.charting and MICRO_STEP_LIMIT not in self.faults and self.charting.may_fault:
             self.faults.append(MICRO_STEP_LIMIT)
-
-    def _charting(self, chart: Chart) -> Charting:
-        infos = {info.key.partition(" ")[2]: info for info in self.transitions}
-        ways = [way for mode in self.automaton.all_modes for way in mode.transitions]
-        everywhere = {**self.now, **equation_names(self.automaton, "equation.")}
-        size = capacity(chart, ways)
-        return Charting(self.automaton, chart, infos, self.now, everywhere, size)
-
-    def _names(self, group: str) -> dict[str, Expr]:
-        automaton = self.automaton
-        known = dict(constant_names(automaton))
-        known.update(variable_names(automaton, group))
-        known.update(in_modes(automaton, "memory.mode"))
-        known[FAULT_GUARD] = Ref(HAPPENED)
-        if automaton.model:
-            known.update(in_modes(automaton.model, "memory.run_mode", f"{automaton.model.name}."))
-            for mode in automaton.model.modes.values():
-                is_in = Compare("==", Ref("memory.run_mode"), whole(mode.number))
-                known[f"in {automaton.model.name}.{mode.name}"] = is_in
-        return known
 
     def program(self) -> Program:
         automaton = self.automaton

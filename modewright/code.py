@@ -123,7 +123,8 @@ def prove(
 
     Raises SpecError, ToolMissing.
     """
-    yield from proofs(_generated(reference, values, root, calibrations), checks)
+    automaton, program = _made(reference, values, root, calibrations, None)
+    yield from proofs(automaton, program, checks)
 
 
 def fuzz(

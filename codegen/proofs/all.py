@@ -14,12 +14,15 @@ from codegen.proofs.stack import stack
 from codegen.proofs.strict import strict
 from codegen.proofs.values import values
 from codegen.source import c_files
+from language.model import Automaton
 from language.program import Program
 
 CHECKS = ("warnings", "misra", "stack", "sanitizers", "values", "contract")
 
 
-def proofs(program: Program, checks: Sequence[str] = CHECKS) -> Iterator[Proof]:
+def proofs(
+    automaton: Automaton, program: Program, checks: Sequence[str] = CHECKS
+) -> Iterator[Proof]:
     """Yield what each check says. Raises ToolMissing, BuildError."""
     with tempfile.TemporaryDirectory(prefix="modewright-") as name:
         folder = Path(name)
@@ -35,7 +38,7 @@ def proofs(program: Program, checks: Sequence[str] = CHECKS) -> Iterator[Proof]:
             "stack": lambda: [stack(folder, sources, f"{program.name}_Step")],
             "sanitizers": lambda: [sanitised(program, folder / "sanitizers")],
             "values": lambda: [values(program, folder / "values")],
-            "contract": lambda: [contract(program, folder / "contract")],
+            "contract": lambda: [contract(automaton, program, folder / "contract")],
         }
         for check in checks:
             yield from made[check]()

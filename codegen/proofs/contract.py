@@ -1,85 +1,73 @@
-"""Contract: what the guards of a mode may do, proven of the C by Frama-C's WP and SMT solvers.
+"""Contract: what the mode logic may do, proven of the C by Frama-C's WP and SMT solvers.
 
 `jump_<mode>` of a sampled automaton: nothing fires and the mode stays, or one of its transitions
 fires and the mode is that transition's target; one that waits fires in the tick in which its
 counter is full, and a full counter fires or starts anew; no counter passes its end; nothing else
 is written than what its actions set; no access, shift or sum is undefined. Taken for granted:
-functions of ha_math write nothing. Ranges are two comparisons here, as in `values.py`.
+functions of ha_math write nothing. Ranges are two comparisons here, as in `values.py`. Where modes
+stand inside modes the contracts are those of `chart_contract.py`.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from codegen.names import SOLVED_ON_PAGE, CNames, mode_constant
+from codegen.proofs.chart_contract import ChartContract, proven_of, written
 from codegen.proofs.proof import Proof, version_of
+from codegen.proofs.wp import Asked, asked, detected, pure
 from codegen.source import STATIC, c_files, c_program
-from codegen.tool import needed, told
 from codegen.usage import locals_of
+from language.model import Automaton
 from language.operation import Count
 from language.program import ModeInfo, Program, TransitionInfo
+from language.situation import charting_of
 from language.traversal import block_writes, reached, walk
 
-PROVER = "z3"
 PARTS = (("-wp-prop=@ensures", "-wp-split"), ("-wp-prop=-@ensures",))
 """Outcomes of a mode with many ranges are proven way by way only."""
-SECONDS = 20
-"""Of a prover for one goal."""
-PURE = re.compile(r"^(?=(?:static inline )?(?:double|float|bool|int32_t) ha_\w+\()", re.M)
-NOTHING = "/*@ assigns \\nothing; */\n"
-"""Functions of ha_math write nothing."""
-KERNEL = (
-    "-machdep",
-    "gcc_x86_32",
-    "-cpp-extra-args=-I. -Dvolatile=",
-    "-warn-special-float",
-    "none",
-)
-"""Whether reals stay finite is asked by the value analysis (values.py)."""
-OPTIONS = ("-wp", "-wp-rte", "-wp-prover", PROVER, "-wp-timeout", str(SECONDS))
-PROVED = re.compile(r"Proved goals: +(\d+) / (\d+)")
-OPEN = re.compile(r"^\[wp\] \[[^]]*\] Goal (\S+)(?! : Valid)(?: : |$)", re.M)
 
 
-def contract(program: Program, folder: Path) -> Proof:
+def contract(automaton: Automaton, program: Program, folder: Path) -> Proof:
     """Prove the contracts of the modes of a Program. Raises ToolMissing, BuildError."""
     made = c_program(program, by_amount=False)
+    tool = f"Frama-C {version_of('frama-c', folder)} WP"
     modes = [mode for mode in program.modes if f"jump_{mode.name}" in made.blocks]
     files = c_files(program, by_amount=False)
-    tool = f"Frama-C {version_of('frama-c', folder)} WP"
+    charting = charting_of(automaton, program.transitions) if automaton.is_sampled else None
+    if charting and automaton.fault_mode is None:
+        chart = ChartContract(charting, made)
+        names = written(chart, files, folder)
+        what = f"{len(names)} functions"
+        what += f"; guards of {chart.unsaid} modes are left open" if chart.unsaid else ""
+        return _told(tool, proven_of(program.name, names, folder), what)
     if program.period is None or program.regions or not modes:
-        about = "one region of a sampled automaton has contracts"
+        about = (
+            "one region of a sampled automaton, and a chart without a fault mode, have contracts"
+        )
         return Proof("contract", tool, about, is_asked=False)
     text, file = files[f"{program.name}.c"], f"{program.name}.c"
     for mode in modes:
         text = _Mode(program, made, mode).annotated(text)
     for name, own in {**files, file: text}.items():
-        (folder / name).write_text(PURE.sub(lambda found: NOTHING, own))
-    return _proven(folder, file, tool, [f"jump_{mode.name}" for mode in modes])
+        (folder / name).write_text(pure(own))
+    found = _proven(folder, file, [f"jump_{mode.name}" for mode in modes])
+    return _told(tool, found, f"{len(modes)} modes")
 
 
-def _proven(folder: Path, file: str, tool: str, functions: list[str]) -> Proof:
+def _told(tool: str, found: Asked, what: str) -> Proof:
+    about = f"{found.proven} of {found.asked} goals; {what}" if found.asked else "no result"
+    return Proof("contract", tool, about, found.open)
+
+
+def _proven(folder: Path, file: str, functions: Sequence[str]) -> Asked:
     """Prove outcomes way by way, and everything else at once."""
-    home, proven, asked = {"HOME": str(folder)}, 0, 0
-    needed(PROVER)
-    told(["why3", "config", "detect"], folder, home)
-    found: list[str] = []
-    for part in PARTS:
-        words = [*KERNEL, *OPTIONS, *part, "-wp-fct", ",".join(functions), file]
-        done = told(["frama-c", *words], folder, home)
-        counts = PROVED.search(done.stdout)
-        if done.returncode or counts is None:
-            last = (done.stdout + done.stderr).strip().splitlines()[-1:]
-            return Proof("contract", tool, "no result", tuple(last) or ("no result",))
-        proven, asked = proven + int(counts[1]), asked + int(counts[2])
-        found += OPEN.findall(done.stdout)
-    if proven < asked and not found:
-        found = [f"{asked - proven} goals were not proven"]
-    about = f"{proven} of {asked} goals; {len(functions)} modes"
-    return Proof("contract", tool, about, tuple(found))
+    detected(folder)
+    found = [asked(folder, file, functions, ("-wp-rte", *part)) for part in PARTS]
+    return sum(found, start=Asked(0, 0, ()))
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,9 @@ from codegen.proofs.stack import stack
 from codegen.proofs.strict import strict
 from codegen.source import c_files
 from codegen.tool import PACKAGES
+from language.load import load_automaton
 from language.program import Program
+from language.project import Project
 from modewright.api import program
 from modewright.code import prove
 
@@ -72,8 +74,11 @@ def test_what_guards_may_do_is_proven_of_each_mode() -> None:
     (found,) = prove("contactor", checks=("contract",))
     assert found.findings == ()
     assert re.fullmatch(r"(\d+) of \1 goals; 2 modes", found.about)
-    (chart,) = prove("supervisor", checks=("contract",))
-    assert not chart.is_asked and not chart.findings
+
+
+def test_what_is_plain_in_parts_has_no_contract() -> None:
+    (found,) = prove("driveline", checks=("contract",))
+    assert not found.is_asked and not found.findings
 
 
 @pytest.mark.parametrize(
@@ -94,7 +99,7 @@ def test_a_mode_that_breaks_its_contract_is_found(
     assert made["contactor.c"].count(right) == 1
     broken = {**made, "contactor.c": made["contactor.c"].replace(right, wrong)}
     monkeypatch.setattr("codegen.proofs.contract.c_files", lambda program, by_amount: broken)
-    found = contract(program("contactor"), tmp_path)
+    found = contract(load_automaton("contactor", Project(Path())), program("contactor"), tmp_path)
     assert any(goal in finding for finding in found.findings), found
 
 

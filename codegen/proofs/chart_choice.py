@@ -1,0 +1,158 @@
+"""Chart choice: what a chart says of its counters, and of which transition each region wishes for.
+
+A region wishes for the first enabled transition, by priority, of the outermost or innermost of its
+active modes that has one; a wait is over when its guard was true in one tick more than it takes.
+"""
+
+from __future__ import annotations
+
+from collections import ChainMap
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from codegen.proofs.configuration import Configuration, all_of
+from language.activation import Edge, edges_by_mode, guard_names, value_of
+from language.activity import is_complete
+from language.chart import Node
+from language.charting import FIRST, OVER, wish
+from language.event import EVENT
+from language.lower import expression
+from language.model import Mode, Transition
+from language.operation import Expr
+from language.program import TransitionInfo
+from language.transition import awaited
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What is asked of counting and choosing; guards are said of the values of now."""
+
+    words: Configuration
+
+    def of_mode(self, node: Node) -> Iterator[str]:
+        """Yield what `choose_<mode>` leaves. Raises Unsaid."""
+        name = wish(node.region)
+        yield f"ensures {self.words.now(name)} == {self._chain([node], self.words.before(name))};"
+
+    def counted(self, node: Node) -> Iterator[str]:
+        """Yield what `count_<mode>` leaves. Raises Unsaid."""
+        yield from self._counts(node, "")
+
+    def of_region(self, region: Node) -> Iterator[str]:
+        """Yield what is wished for in a region, and what its modes count. Raises Unsaid."""
+        chart, words = self.words.charting.chart, self.words
+        name, mode = wish(region.region), words.mode(region.region)
+        wishes = []
+        for leaf in chart.leaves(region.region):
+            chain = [n for n in chart.chain(leaf) if words.charting.ways_of(n)]
+            ordered = chain if chart.order == "inner_first" else chain[::-1]
+            assert leaf.number is not None
+            here = f"{words.now(mode)} == {words.place.whole(mode, leaf.number)}"
+            wishes.append(f"({here} ==> {words.now(name)} == {self._chain(ordered, '0')})")
+        for said in wishes:
+            yield f"ensures {said};"
+        known = " || ".join(
+            f"{words.now(mode)} == {leaf.number}" for leaf in chart.leaves(region.region)
+        )
+        yield f"ensures ({known}) || {words.now(name)} == 0;"
+        for node in chart.nodes:
+            if node.region == region.region and words.charting.ways_of(node):
+                yield from self._counts(node, words.is_active(node, words.now))
+
+    def _chain(self, nodes: list[Node], none: str) -> str:
+        """Return the number of the first transition that is enabled."""
+        found = none
+        for node in reversed(nodes):
+            ways = self.words.charting.ways_of(node)
+            ordered = sorted(enumerate(ways), key=lambda pair: (pair[1].priority or 0, pair[0]))
+            for _, transition in reversed(ordered):
+                info = self.words.charting.info(transition)
+                test = self._due(info) if info.timer else self._enabled(node, transition)
+                number = self.words.place.whole(wish(node.region), info.number)
+                found = f"(({test}) ? {number} : {found})"
+        return found
+
+    def _due(self, info: TransitionInfo) -> str:
+        assert info.timer
+        ticks = self.words.speech.term(awaited(info), self.words.now)
+        return f"{self.words.now(info.timer)} > {ticks}"
+
+    def _enabled(self, node: Node, transition: Transition) -> str:
+        """Return that the event of a transition is heard and its guard is true."""
+        words, chart = self.words, self.words.charting.chart
+        if transition.completes:
+            return words.speech.predicate(is_complete(chart, node, "memory.mode"), words.now)
+        said = words.speech.predicate(self._guard(node, transition), words.now)
+        if not transition.events:
+            return said
+        numbers = (chart.signals[name].number for name in transition.events)
+        return all_of([words.is_one(EVENT.name, numbers, words.now), said])
+
+    def _guard(self, node: Node, transition: Transition) -> Expr:
+        return expression(transition.when.tree, self._known(node))
+
+    def _known(self, node: Node) -> Mapping[str, Expr]:
+        charting = self.words.charting
+        return ChainMap(guard_names(charting.automaton, self._mode(node)), self._names)
+
+    @property
+    def _names(self) -> dict[str, Expr]:
+        return dict(self.words.charting.everywhere)
+
+    def _mode(self, node: Node) -> Mode:
+        mode = self.words.charting.mode(node)
+        assert mode
+        return mode
+
+    def _counts(self, node: Node, active: str) -> Iterator[str]:
+        """Yield what the counters and edges of a mode are, if that is `active`; else the same."""
+        for transition in self.words.charting.ways_of(node):
+            info = self.words.charting.info(transition)
+            if info.timer:
+                old, new = self.words.before(info.timer), self.words.now(info.timer)
+                value = self._count(info, self._enabled(node, transition), old)
+                yield f"ensures {new} == {f'({active} ? {value} : {old})' if active else value};"
+        automaton = self.words.charting.automaton
+        for edge in edges_by_mode(automaton).get(self._mode(node).key, ()):
+            said = self._edge(edge, node)
+            same = f"({self._same(edge.opposite)})"
+            yield f"ensures {f'({active} ? {said} : {same})' if active else said};"
+
+    def _count(self, info: TransitionInfo, enabled: str, old: str) -> str:
+        """A tick counts once; a wait that begins in a later micro-step begins there (rule 4)."""
+        first = f"({enabled} ? ({old} < {info.most} ? {old} + 1 : {old}) : 0)"
+        if not self.words.charting.several:
+            return first
+        later = f"({enabled} ? ({old} == 0 ? 1 : {old}) : 0)"
+        over = f"({self.words.now(OVER.name)} ? {old} : {later})"
+        return f"({self.words.now(FIRST.name)} ? {first} : {over})"
+
+    def _edge(self, edge: Edge, node: Node) -> str:
+        """An edge is seen where its argument turned since the last look (rule 8)."""
+        words = self.words
+        level = expression(edge.tree.arguments[0], self._names)
+        seen, old = words.now(f"work.edge_{edge.number}"), words.before(edge.opposite)
+        if edge.is_change:
+            last = value_of(words.charting.automaton, edge, f"memory.last_{edge.number}")
+            text = self._text(level)
+            relation = "<==>" if last.name in words.speech.truths else "=="
+            turned = f"({old} && !({text} {relation} {words.before(last.name)}))"
+            left = [words.now(edge.opposite), f"({words.now(last.name)} {relation} {text})"]
+        else:
+            wanted = words.speech.predicate(level, words.now)
+            wanted = f"!({wanted})" if edge.tree.function == "falling" else wanted
+            turned = f"(({wanted}) && {old})"
+            left = [f"({words.now(edge.opposite)} <==> !({wanted}))"]
+        looked = all_of([f"({seen} <==> {turned})", *left])
+        if not words.charting.several:
+            return looked
+        past = f"({words.now(OVER.name)} && !{words.now(FIRST.name)})"
+        return f"({past} ? (!{seen} && {self._same(edge.opposite)}) : {looked})"
+
+    def _text(self, expr: Expr) -> str:
+        speech = self.words.speech
+        say = speech.predicate if speech.is_truth(expr) else speech.term
+        return say(expr, self.words.now)
+
+    def _same(self, name: str) -> str:
+        return f"({self.words.now(name)} <==> {self.words.before(name)})"

@@ -1,0 +1,236 @@
+"""Chart contract: what the functions of a micro-step of a chart may do, before each of them in C.
+
+What is asked follows from the chart: of `select_transitions`, `hear` and `commit`, and of what
+counts and chooses in a mode. The others, and the choices that these three are made of, have lemmas
+from the Program (`summary.py`): what they leave, and that they write nothing else.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from codegen.names import c_member
+from codegen.proofs.acsl import Unsaid
+from codegen.proofs.chart_choice import Choice
+from codegen.proofs.chart_commit import Commit
+from codegen.proofs.chart_hearing import Hearing
+from codegen.proofs.configuration import Configuration
+from codegen.proofs.outline import Function, function_of, outlined, part_name
+from codegen.proofs.summary import Summary
+from codegen.proofs.wp import Asked, asked, detected, pure
+from codegen.usage import locals_of
+from language.chart import Node
+from language.charting import Charting, ident, wish
+from language.operation import Assign, Block, Branch, Choose, Count, Loop, Op, Ref, Select, Store
+from language.program import Program
+from language.traversal import block_writes, reached, walk
+
+SELECT, HEAR, COMMIT = "select_transitions", "hear", "commit"
+SCRATCH = "*const work = &self->work;"
+"""How C says that the values of a step are a part of the instance."""
+MODEL = ("-wp-model", "Typed+real")
+"""Reals are numbers without rounding, of which guards are comparisons. Accesses and sums are looked
+at by the value analysis (values.py).
+"""
+OF_PARTS = (*MODEL, "-wp-split")
+OF_CHART = MODEL
+"""`select_transitions`, `hear` and `commit`, in which functions are run one after the other."""
+OWN_TYPE = r"\b(u?)int(?:16|32)_t (?={}\[)"
+
+
+def written(made: ChartContract, files: Mapping[str, str], folder: Path) -> list[str]:
+    """Write C with its contracts into a folder; return the names of the functions that have one."""
+    name = made.made.name
+    text, names = made.annotated(files[f"{name}.c"])
+    head = made.with_apart(files[f"{name}.h"])
+    for file, own in {**files, f"{name}.c": text, f"{name}.h": head}.items():
+        (folder / file).write_text(pure(own))
+    return names
+
+
+def proven_of(name: str, functions: Sequence[str], folder: Path) -> Asked:
+    """Prove the contracts of functions of a module. Raises ToolMissing, BuildError."""
+    detected(folder)
+    chart = [one for one in functions if one in (SELECT, HEAR, COMMIT)]
+    parts = [one for one in functions if one not in chart]
+    found = Asked(0, 0, ())
+    for own, options in ((parts, OF_PARTS), (chart, OF_CHART)):
+        found += asked(folder, f"{name}.c", own, options) if own else Asked(0, 0, ())
+    return found
+
+
+@dataclass(frozen=True)
+class ChartContract:
+    """The contracts of a chart; `made` is the Program that the C is printed of."""
+
+    charting: Charting
+    made: Program
+
+    @cached_property
+    def words(self) -> Configuration:
+        """The words of the contracts."""
+        return Configuration(self.charting, self.made)
+
+    @property
+    def functions(self) -> list[str]:
+        """The functions of a micro-step."""
+        starts = [name for name in (SELECT, HEAR, COMMIT) if name in self.made.blocks]
+        found = {name for start in starts for name in reached(start, self.made.blocks)}
+        return [name for name in self.made.blocks if name in found]
+
+    @property
+    def unsaid(self) -> int:
+        """The modes whose choice has a lemma only: what their guards compute is not said."""
+        found = 0
+        for node in self._moving:
+            try:
+                list(Choice(self.words).of_mode(node))
+                list(Choice(self.words).counted(node))
+            except Unsaid:
+                found += 1
+        return found
+
+    def annotated(self, text: str) -> tuple[str, list[str]]:
+        """Return C with contracts before its functions, and the names of these."""
+        proven: list[str] = []
+        is_inside = SCRATCH in text
+        for name in self.functions:
+            function = function_of(text, name)
+            parts = outlined(function)
+            proven += [part.name for part in parts]
+            made = "\n".join(self._contract(name, part, is_inside) for part in parts)
+            text = text[: function.start] + made + text[function.end :]
+        return text, proven
+
+    def with_apart(self, text: str) -> str:
+        """Return a header in which arrays of whole numbers are of a type of their own: what is
+        stored there is no value of a variable then, and every number fits.
+        """
+        for variable in self.made.variables:
+            if variable.size and variable.type == "whole":
+                text = re.sub(OWN_TYPE.format(c_member(variable.name)), r"\1int64_t ", text)
+        return text
+
+    def _contract(self, block: str, part: Function, is_inside: bool) -> str:
+        op = self._ops(block).get(part.name)
+        own = (op,) if op else self.made.blocks[block]
+        lines = [*_pointers(part.parameters, is_inside), *self._required(block, part.name, own)]
+        lines += [f"assigns {self._assigned(block, own)};", *self._ensured(block, part.name, own)]
+        lines.append("exits \\false;")
+        return "/*@\n  " + "\n  ".join(lines) + "\n*/\n" + part.text
+
+    def _ops(self, block: str) -> dict[str, Op]:
+        """Return the operations of a block that are choices, by the part that they are in C."""
+        found = [op for op in self.made.blocks[block] if _is_choice(op)]
+        return {part_name(block, number): op for number, op in enumerate(found)}
+
+    def _required(self, block: str, part: str, own: Block) -> Iterator[str]:
+        said: Iterable[str] = ()
+        words = self.words
+        if block == COMMIT and part == block:
+            before = Hearing(words).consistent(words.now)
+            said = (*words.valid(words.now), *before, *Commit(words).required())
+        elif block == SELECT and (region := self._selected.get(part)):
+            said = (f"{words.now(wish(region.region))} == 0",)
+        yield from (f"requires {one};" for one in said)
+        yield from (f"requires {one}" for one in self._places(own))
+
+    def _ensured(self, block: str, part: str, own: Block) -> Iterator[str]:
+        try:
+            asked = list(self._asked(block, part))
+        except Unsaid:
+            asked = []
+        yield from asked or self._lemmas(block, own)
+        yield from (f"ensures {one}" for one in self._places(own))
+
+    def _asked(self, block: str, part: str) -> Iterator[str]:
+        """Yield what the chart asks of a function. Raises Unsaid."""
+        words = self.words
+        if block in self._counting:
+            yield from Choice(words).counted(self._counting[block])
+        elif block in self._choosing:
+            yield from Choice(words).of_mode(self._choosing[block])
+        elif block == SELECT:
+            own = self._selected.get(part)
+            for region in self.charting.chart.regions if part == block else [own] if own else []:
+                yield from Choice(words).of_region(region)
+        elif part != block:
+            return
+        elif block == HEAR:
+            yield from Hearing(words).ensured()
+        elif block == COMMIT:
+            yield from Commit(words).ensured()
+
+    def _lemmas(self, block: str, own: Block) -> Iterator[str]:
+        silent = {v.name for v in self.made.variables if v.size}
+        silent |= self._locals[block]
+        words = self.words
+        made = Summary(self.made.blocks, words.speech, words.before, words.now)
+        return made.ensured(own, frozenset(silent))
+
+    @cached_property
+    def _locals(self) -> Mapping[str, frozenset[str]]:
+        return locals_of(self.made)
+
+    def _assigned(self, block: str, own: Block) -> str:
+        blocks = {**self.made.blocks, "": own}
+        names: set[str] = set()
+        for name in reached("", blocks):
+            local = self._locals[name or block]
+            written = set(block_writes(blocks[name]))
+            names |= written - local
+        sizes = {v.name: f"[0 .. {v.size - 1}]" for v in self.made.variables if v.size}
+        said = sorted(self.words.place(name) + sizes.get(name, "") for name in names)
+        return ", ".join(said) or "\\nothing"
+
+    def _places(self, own: Block) -> Iterator[str]:
+        """Yield that places at which a part of a function stores something are none before 0."""
+        stores = [op for op in walk(own) if isinstance(op, Store)] if len(own) == 1 else []
+        names = {op.index.name for op in stores if isinstance(op.index, Ref)}
+        yield from (f"0 <= {self.words.now(name)};" for name in sorted(names))
+
+    @cached_property
+    def _counting(self) -> dict[str, Node]:
+        return {f"count_{ident(node.path)}": node for node in self._moving}
+
+    @cached_property
+    def _choosing(self) -> dict[str, Node]:
+        return {f"choose_{ident(node.path)}": node for node in self._moving}
+
+    @property
+    def _moving(self) -> list[Node]:
+        return [node for node in self.charting.chart.nodes if self.charting.ways_of(node)]
+
+    @cached_property
+    def _selected(self) -> dict[str, Node]:
+        """The region that a part of `select_transitions` chooses in."""
+        regions = {self.words.mode(r.region): r for r in self.charting.chart.regions}
+        ops = self._ops(SELECT)
+        found = {name: op for name, op in ops.items() if isinstance(op, Choose)}
+        return {name: regions[op.selector] for name, op in found.items()}
+
+
+def _is_choice(op: Op) -> bool:
+    """Tell whether an operation is a choice or a loop in C."""
+    if isinstance(op, Assign):
+        value = op.value
+        parts = (value.then, value.other) if isinstance(value, Select) else ()
+        return any(isinstance(part, Select) for part in parts)
+    return isinstance(op, Branch | Choose | Count | Loop)
+
+
+def _pointers(parameters: str, is_inside: bool) -> Iterator[str]:
+    """Yield that pointers are valid, and what they point to apart: `work` maybe in `self`."""
+    pointers = re.findall(r"(const [^,*]*)?\*(\w+)", parameters)
+    names = [name for _, name in pointers]
+    for constant, name in pointers:
+        yield f"requires \\valid{'_read' if constant else ''}({name});"
+    if is_inside and "self" in names and "work" in names:
+        yield "requires work == &self->work;"
+        names.remove("work")
+    if len(names) > 1:
+        yield f"requires \\separated({', '.join(names)});"

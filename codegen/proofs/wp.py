@@ -1,0 +1,68 @@
+"""WP: contracts of functions proven by Frama-C's WP and z3, and what it leaves open."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from codegen.tool import needed, told
+
+PROVER = "z3"
+SECONDS = 20
+"""Of a prover for one goal."""
+KERNEL = (
+    "-machdep",
+    "gcc_x86_32",
+    "-cpp-extra-args=-I. -Dvolatile=",
+    "-warn-special-float",
+    "none",
+)
+"""Whether reals stay finite is asked by the value analysis (values.py)."""
+OPTIONS = ("-wp", "-wp-prover", PROVER, "-wp-timeout", str(SECONDS))
+PROVED = re.compile(r"Proved goals: +(\d+) / (\d+)")
+OPEN = re.compile(r"^\[wp\] \[[^]]*\] Goal (\S+)(?! : Valid)(?: : |$)", re.M)
+PURE = re.compile(r"^(?=(?:static inline )?(?:double|float|bool|int32_t) ha_\w+\()", re.M)
+NOTHING = "/*@ assigns \\nothing; exits \\false; */\n"
+"""Functions of ha_math write nothing, and return."""
+
+
+@dataclass(frozen=True)
+class Asked:
+    """How many goals WP made and how many of them are proven; the `open` ones, or what it said."""
+
+    proven: int
+    asked: int
+    open: tuple[str, ...]
+
+    def __add__(self, other: Asked) -> Asked:
+        """Return the goals of both."""
+        open_ones = (*self.open, *other.open)
+        return Asked(self.proven + other.proven, self.asked + other.asked, open_ones)
+
+
+def detected(folder: Path) -> None:
+    """Tell why3 which provers there are. Raises ToolMissing."""
+    needed(PROVER)
+    told(["why3", "config", "detect"], folder, {"HOME": str(folder)})
+
+
+def pure(text: str) -> str:
+    """Return C in which functions of ha_math write nothing."""
+    return PURE.sub(lambda found: NOTHING, text)
+
+
+def asked(folder: Path, file: str, functions: Sequence[str], more: Sequence[str] = ()) -> Asked:
+    """Prove the contracts of some functions of a file. Raises ToolMissing, BuildError."""
+    words = [*KERNEL, *OPTIONS, *more, "-wp-fct", ",".join(functions), file]
+    done = told(["frama-c", *words], folder, {"HOME": str(folder)})
+    counts = PROVED.search(done.stdout)
+    if done.returncode or counts is None:
+        last = (done.stdout + done.stderr).strip().splitlines()[-1:]
+        return Asked(0, 0, tuple(last) or ("no result",))
+    proven, goals = int(counts[1]), int(counts[2])
+    found = OPEN.findall(done.stdout)
+    if proven < goals and not found:
+        found = [f"{goals - proven} goals were not proven"]
+    return Asked(proven, goals, tuple(found))

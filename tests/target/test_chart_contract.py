@@ -1,0 +1,155 @@
+"""The contracts of a chart under Frama-C's WP, and mistakes that break them."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+from codegen.proofs.chart_contract import ChartContract, proven_of, written
+from codegen.proofs.wp import OPTIONS
+from codegen.source import c_files, c_program
+from codegen.tool import PACKAGES
+from language.charting import Charting
+from language.load import load_automaton
+from language.operation import Choose
+from language.project import Project
+from language.situation import charting_of
+from modewright.api import program
+from modewright.code import prove
+
+pytestmark = pytest.mark.skipif(
+    not all(map(shutil.which, PACKAGES)), reason="a tool is missing: make system-packages"
+)
+NAME = "supervisor"
+FAULT = "work->wish_chart = supervisor_FIRED_operation_fault;"
+TRIPPED = "work->wish_chart = supervisor_FIRED_operation_tripped;"
+MISTAKES = {
+    "priorities are exchanged": ("choose_operation", FAULT, TRIPPED),
+    "a guard lacks a condition": (
+        "choose_operation_standby",
+        "(self->latched.key == supervisor_key_ignition) && in->hv_ok",
+        "self->latched.key == supervisor_key_ignition",
+    ),
+    "a wait ends a tick early": (
+        "choose_operation_precharge",
+        "self->timer.operation_precharge_ready > 5U",
+        "self->timer.operation_precharge_ready > 4U",
+    ),
+    "a wait never begins anew": (
+        "count_operation",
+        "    } else {\n        self->timer.operation_fault = 0U;\n    }\n}",
+        "    } else {\n        /* nothing to do */\n    }\n}",
+    ),
+    "an inner mode goes before the outer one": (
+        "select_transitions_1",
+        "        choose_operation(self, work);\n        if (work->wish_chart == 0U) {\n"
+        "            choose_operation_standby(self, in, work);\n        }",
+        "        choose_operation_standby(self, in, work);\n        if (work->wish_chart == 0U) {\n"
+        "            choose_operation(self, work);\n        }",
+    ),
+    "of two wishes both are taken": (
+        "hear_operation_drive_torque",
+        "            work->takes_chart = 0U;\n        }\n"
+        "        work->takes_operation_drive_torque",
+        "            /* nothing to do */\n        }\n        work->takes_operation_drive_torque",
+    ),
+    "a history is not kept": (
+        "leave_operation",
+        "        self->left_operation_drive = 1;\n        work->exit_operation_drive = true;\n"
+        "        self->opposite_1 = false;\n        break;",
+        "        work->exit_operation_drive = true;\n"
+        "        self->opposite_1 = false;\n        break;",
+    ),
+    "a target is another mode": (
+        "commit_17",
+        "self->mode_main = supervisor_main_shut;",
+        "self->mode_main = supervisor_main_open;",
+    ),
+    "something else is written": (
+        "commit_18",
+        "self->mode_pre = supervisor_pre_shut;",
+        "self->mode_pre = supervisor_pre_shut;\n        self->mode_main = supervisor_main_open;",
+    ),
+}
+
+
+SECONDS = "2"
+"""Enough for a goal that holds: those are done in a tenth of it."""
+
+
+@pytest.fixture
+def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Wait less for goals that no prover ends."""
+    monkeypatch.setattr("codegen.proofs.wp.OPTIONS", (*OPTIONS[:-1], SECONDS))
+
+
+def made() -> ChartContract:
+    return ChartContract(charting(), c_program(program(NAME), by_amount=False))
+
+
+def charting() -> Charting:
+    found = charting_of(load_automaton(NAME, Project(Path())), program(NAME).transitions)
+    assert found
+    return found
+
+
+def test_what_a_micro_step_may_do_is_proven_of_a_chart() -> None:
+    (found,) = prove(NAME, checks=("contract",))
+    assert found.findings == ()
+    assert re.fullmatch(r"(\d+) of \1 goals; \d+ functions", found.about)
+
+
+@pytest.mark.usefixtures("impatient")
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_in_the_c_of_a_chart_is_found(mistake: str, tmp_path: Path) -> None:
+    function, right, wrong = MISTAKES[mistake]
+    files = c_files(program(NAME), by_amount=False)
+    text, file = files[f"{NAME}.c"], f"{NAME}.c"
+    start = text.index(f" {re.sub(r'_[0-9]+$', '', function)}(")
+    place = text.index(right, start)
+    broken = text[:place] + wrong + text[place + len(right) :]
+    written(made(), {**files, file: broken}, tmp_path)
+    found = proven_of(NAME, [function], tmp_path)
+    assert any(function in goal for goal in found.open), found
+
+
+@pytest.mark.usefixtures("impatient")
+def test_a_chart_that_was_lowered_to_another_order_is_found(tmp_path: Path) -> None:
+    """The chart says inner modes first, its C goes by outer ones first."""
+    own = charting()
+    chart = dataclasses.replace(own.chart, order="inner_first")
+    other = dataclasses.replace(own, chart=chart)
+    files = c_files(program(NAME), by_amount=False)
+    written(dataclasses.replace(made(), charting=other), files, tmp_path)
+    found = proven_of(NAME, ["select_transitions_1"], tmp_path)
+    assert any("select_transitions_1" in goal for goal in found.open), found
+
+
+@pytest.mark.usefixtures("impatient")
+def test_a_chart_that_was_lowered_to_another_target_is_found(tmp_path: Path) -> None:
+    """C and Program agree on it, so it is the chart that says that it is wrong."""
+    own = made()
+    commit = own.made.blocks["commit"]
+    entered = [op for op in commit if isinstance(op, Choose) and op.selector == "work.takes_main"]
+    (first, to_shut), (second, to_open) = entered[-1].cases
+    wrong = dataclasses.replace(entered[-1], cases=((first, to_open), (second, to_shut)))
+    blocks = {
+        **own.made.blocks,
+        "commit": tuple(wrong if op is entered[-1] else op for op in commit),
+    }
+    files = c_files(program(NAME), by_amount=False)
+    shut, opened = (f"self->mode_main = supervisor_main_{mode};" for mode in ("shut", "open"))
+    text = files[f"{NAME}.c"]
+    place = text.index(shut) - 200
+    tail = text[place:].replace(shut, "@", 1).replace(opened, shut, 1).replace("@", opened, 1)
+    lowered = dataclasses.replace(own.made, blocks=blocks)
+    written(
+        ChartContract(own.charting, lowered), {**files, f"{NAME}.c": text[:place] + tail}, tmp_path
+    )
+    assert proven_of(NAME, ["commit_17"], tmp_path).open == ()
+    found = proven_of(NAME, ["commit"], tmp_path)
+    assert any("commit_ensures" in goal for goal in found.open), found
