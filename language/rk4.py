@@ -31,12 +31,12 @@ CUBIC = "cubic"
 
 
 def rk4(field: Field) -> Method:
-    """Return the method for a field. Inside a tick, what all modes do alike is a block of its own:
-    an ECU that computes in software has the values of one stage on its stack, not those of all.
+    """Return the method for a field. Where that `is_staged`, what all modes do alike is a block of
+    its own: an ECU that computes in software has the values of one stage on its stack, not of all.
     """
     blocks: dict[str, Block] = {}
     stages = {f"stage_{stage}": tuple(_stage(field, stage)) for stage in STAGES}
-    alike = {**stages, CUBIC: tuple(_cubic(field))} if field.is_run else {}
+    alike = {**stages, CUBIC: tuple(_cubic(field))} if field.is_staged else {}
     blocks.update(alike)
     for name in field.automaton.modes:
         blocks[f"step_{name}"] = _step(field, name)
@@ -57,7 +57,7 @@ def _step(field: Field, mode: str) -> Block:
     ops: list[Op] = [*at_state(field), *at_time(field, real(0.0))]
     for stage in STAGES:
         ops.append(Run(f"rates_{mode}"))
-        ops += [Run(f"stage_{stage}")] if field.is_run else _stage(field, stage)
+        ops += [Run(f"stage_{stage}")] if field.is_staged else _stage(field, stage)
     return tuple(ops)
 
 
@@ -88,7 +88,7 @@ def _series(field: Field, mode: str) -> Block:
     ops: list[Op] = [Assign(f"work.at_{name}", Ref(f"work.end_{name}")) for name in field.states]
     ops += at_time(field, Ref("work.h"))
     ops.append(Run(f"rates_{mode}"))
-    ops += [Run(CUBIC)] if field.is_run else _cubic(field)
+    ops += [Run(CUBIC)] if field.is_staged else _cubic(field)
     return tuple(ops)
 
 

@@ -93,7 +93,14 @@ def run_motion(
         problems.error("run", remembering.span, label)
         problems.stop_if_any()
     _refuse_actions(automaton, model, problems)
-    field = Field(model, constant_names(automaton), inputs, MODE, f"{model.name} ", is_run=True)
+    field = Field(
+        model,
+        constant_names(automaton),
+        inputs,
+        MODE,
+        f"{model.name} ",
+        is_staged=automaton.numbers == "float64",
+    )
     blocks = field_blocks(field)
     h = automaton.period / first.substeps
     place = first.method_span or first.span
