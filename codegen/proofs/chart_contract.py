@@ -20,6 +20,7 @@ from codegen.proofs.chart_commit import Commit
 from codegen.proofs.chart_hearing import Hearing
 from codegen.proofs.configuration import Configuration
 from codegen.proofs.outline import Function, function_of, outlined, part_name
+from codegen.proofs.pointers import is_inside, required
 from codegen.proofs.summary import Summary
 from codegen.proofs.wp import Asked, asked, detected, pure
 from codegen.usage import locals_of
@@ -30,8 +31,6 @@ from language.program import Program
 from language.traversal import block_writes, reached, walk
 
 SELECT, HEAR, COMMIT = "select_transitions", "hear", "commit"
-SCRATCH = "*const work = &self->work;"
-"""How C says that the values of a step are a part of the instance."""
 MODEL = ("-wp-model", "Typed+real")
 """Reals are numbers without rounding, of which guards are comparisons. Accesses and sums are looked
 at by the value analysis (values.py).
@@ -97,12 +96,12 @@ class ChartContract:
     def annotated(self, text: str) -> tuple[str, list[str]]:
         """Return C with contracts before its functions, and the names of these."""
         proven: list[str] = []
-        is_inside = SCRATCH in text
+        work_is_inside = is_inside(text)
         for name in self.functions:
             function = function_of(text, name)
             parts = outlined(function)
             proven += [part.name for part in parts]
-            made = "\n".join(self._contract(name, part, is_inside) for part in parts)
+            made = "\n".join(self._contract(name, part, work_is_inside) for part in parts)
             text = text[: function.start] + made + text[function.end :]
         return text, proven
 
@@ -115,10 +114,10 @@ class ChartContract:
                 text = re.sub(OWN_TYPE.format(c_member(variable.name)), r"\1int64_t ", text)
         return text
 
-    def _contract(self, block: str, part: Function, is_inside: bool) -> str:
+    def _contract(self, block: str, part: Function, work_is_inside: bool) -> str:
         op = self._ops(block).get(part.name)
         own = (op,) if op else self.made.blocks[block]
-        lines = [*_pointers(part.parameters, is_inside), *self._required(block, part.name, own)]
+        lines = [*required(part.parameters, work_is_inside), *self._required(block, part.name, own)]
         lines += [f"assigns {self._assigned(block, own)};", *self._ensured(block, part.name, own)]
         lines.append("exits \\false;")
         return "/*@\n  " + "\n  ".join(lines) + "\n*/\n" + part.text
@@ -221,16 +220,3 @@ def _is_choice(op: Op) -> bool:
         parts = (value.then, value.other) if isinstance(value, Select) else ()
         return any(isinstance(part, Select) for part in parts)
     return isinstance(op, Branch | Choose | Count | Loop)
-
-
-def _pointers(parameters: str, is_inside: bool) -> Iterator[str]:
-    """Yield that pointers are valid, and what they point to apart: `work` maybe in `self`."""
-    pointers = re.findall(r"(const [^,*]*)?\*(\w+)", parameters)
-    names = [name for _, name in pointers]
-    for constant, name in pointers:
-        yield f"requires \\valid{'_read' if constant else ''}({name});"
-    if is_inside and "self" in names and "work" in names:
-        yield "requires work == &self->work;"
-        names.remove("work")
-    if len(names) > 1:
-        yield f"requires \\separated({', '.join(names)});"

@@ -17,6 +17,7 @@ from pathlib import Path
 
 from codegen.names import SOLVED_ON_PAGE, CNames, mode_constant
 from codegen.proofs.chart_contract import ChartContract, proven_of, written
+from codegen.proofs.pointers import is_inside, required
 from codegen.proofs.proof import Proof, version_of
 from codegen.proofs.wp import Asked, asked, detected, pure
 from codegen.source import STATIC, c_files, c_program
@@ -94,17 +95,13 @@ class _Mode:
         head = re.compile(rf"^{STATIC}void jump_{self.mode.name}\(([^)]*)\)", re.M)
         found = head.search(text)
         assert found, self.mode.name
-        pointers = re.findall(r"(const [^,*]*)?\*(\w+)", found[1])
-        lines = [*self._required(pointers), f"assigns {', '.join(self._written(found[1]))};"]
+        lines = [*required(found[1], is_inside(text)), *self._required()]
+        lines.append(f"assigns {', '.join(self._written(found[1]))};")
         lines += self._ensured()
         contract = "\n  ".join(["/*@", *lines]) + "\n*/\n"
         return text[: found.start()] + contract + text[found.start() :]
 
-    def _required(self, pointers: list[tuple[str, str]]) -> Iterator[str]:
-        for constant, name in pointers:
-            yield f"requires \\valid{'_read' if constant else ''}({name});"
-        if len(pointers) > 1:
-            yield f"requires \\separated({', '.join(name for _, name in pointers)});"
+    def _required(self) -> Iterator[str]:
         mode = mode_constant(self.program, self.mode.number)
         yield f"requires self->mode == {mode} && self->fired == 0;"
         for count in self._counts():
