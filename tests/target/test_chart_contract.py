@@ -19,6 +19,7 @@ from language.operation import Choose
 from language.project import Project
 from language.situation import charting_of
 from modewright.api import program
+from modewright.code import prove
 
 pytestmark = pytest.mark.skipif(
     not all(map(shutil.which, PACKAGES)), reason="a tool is missing: make system-packages"
@@ -96,13 +97,10 @@ def charting() -> Charting:
     return found
 
 
-def test_what_a_micro_step_may_do_is_proven_of_a_chart(tmp_path: Path) -> None:
-    """Of the functions that are broken below; of all of them it is a figure of `make verify`."""
-    functions = sorted({function for function, _, _ in MISTAKES.values()})
-    written(made(), c_files(program(NAME), by_amount=False), tmp_path)
-    found = proven_of(NAME, functions, tmp_path)
-    assert found.open == ()
-    assert found.proven == found.asked > 100
+def test_what_a_micro_step_may_do_is_proven_of_a_chart() -> None:
+    (found,) = prove(NAME, checks=("contract",))
+    assert found.findings == ()
+    assert re.fullmatch(r"(\d+) of \1 goals; \d+ functions", found.about)
 
 
 @pytest.mark.usefixtures("impatient")
