@@ -111,7 +111,8 @@ def _row(
 ) -> Iterator[Row]:
     """Yield the one row of a line, or none with the problem reported; none of another's."""
     texts, problems = [cell.strip() for cell in cells], reading.problems
-    name = "".join(texts[columns.index("name") :][:1])
+    place = columns.index("name")
+    name = texts[place] if place < len(texts) else ""
     if name and not reading.owned.has(Cell(name, span)):
         return
     if len(texts) != len(columns):

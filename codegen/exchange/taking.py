@@ -56,7 +56,7 @@ def taken(
     automaton: Automaton,
     program: Program,
     problems: Problems,
-    owned: Owned | None = None,
+    owned: Owned,
 ) -> Taken:
     """Return what a file says of an automaton's page. Raises SpecError with all problems.
 
@@ -64,9 +64,9 @@ def taken(
     """
     known = {page_name(program, constant): constant for constant in page_constants(program)}
     desk = Desk(automaton, program.number, problems)
-    for other in owned.passed.values() if owned else ():
+    for other in owned.passed.values():
         desk.remark("passed over", other, "is of another function")
-    if owned and owned.passed and not file.characteristics:
+    if owned.passed and not file.characteristics:
         label = f"no name of this file begins with `{program.name}.`"
         problems.error("name", next(iter(owned.passed.values())).span, label)
     given = _known(file, known, program.name, problems)

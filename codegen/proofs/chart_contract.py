@@ -82,16 +82,11 @@ class ChartContract:
         return [name for name in self.made.blocks if name in found]
 
     @property
-    def unsaid(self) -> int:
-        """The modes whose choice has a lemma only: what their guards compute is not said."""
-        found = 0
-        for node in self._moving:
-            try:
-                list(Choice(self.words).of_mode(node))
-                list(Choice(self.words).counted(node))
-            except Unsaid:
-                found += 1
-        return found
+    def unsaid(self) -> tuple[str, ...]:
+        """The functions that have a lemma only: what the chart asks of them is not said in ACSL."""
+        places = [(name, name) for name in self.functions]
+        places += [(SELECT, part) for part in self._selected]
+        return tuple(part for block, part in places if self._said(block, part) is None)
 
     def annotated(self, text: str) -> tuple[str, list[str]]:
         """Return C with contracts before its functions, and the names of these."""
@@ -139,12 +134,15 @@ class ChartContract:
         yield from (f"requires {one}" for one in self._places(own))
 
     def _ensured(self, block: str, part: str, own: Block) -> Iterator[str]:
-        try:
-            asked = list(self._asked(block, part))
-        except Unsaid:
-            asked = []
-        yield from asked or self._lemmas(block, own)
+        yield from self._said(block, part) or self._lemmas(block, own)
         yield from (f"ensures {one}" for one in self._places(own))
+
+    def _said(self, block: str, part: str) -> list[str] | None:
+        """Return what the chart asks of a function; None where that is not said in ACSL."""
+        try:
+            return list(self._asked(block, part))
+        except Unsaid:
+            return None
 
     def _asked(self, block: str, part: str) -> Iterator[str]:
         """Yield what the chart asks of a function. Raises Unsaid."""

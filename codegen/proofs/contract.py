@@ -43,7 +43,7 @@ def contract(automaton: Automaton, program: Program, folder: Path) -> Proof:
         chart = ChartContract(charting, made)
         names = written(chart, files, folder)
         what = f"{len(names)} functions"
-        what += f"; guards of {chart.unsaid} modes are left open" if chart.unsaid else ""
+        what += f", of {', '.join(chart.unsaid)} lemmas alone" if chart.unsaid else ""
         return _told(tool, proven_of(program.name, names, folder), what)
     if program.period is None or program.regions or not modes:
         about = (
