@@ -11,7 +11,19 @@ from collections.abc import Iterator
 from functools import reduce
 
 from language.number import LARGEST
-from language.operation import Assign, Binary, Block, Branch, Call, Compare, Expr, Ref, Run, Value
+from language.operation import (
+    Assign,
+    Binary,
+    Block,
+    Branch,
+    Call,
+    Compare,
+    Expr,
+    Ref,
+    Run,
+    Unary,
+    Value,
+)
 from language.program import Program
 from language.substitution import with_expressions
 
@@ -61,6 +73,8 @@ def centred(expr: Expr) -> Expr:
             if low == -high:
                 return Compare("<=", Call("abs", (value,)), Value(high))
             return Call(WITHIN, (value, Value(low), Value(high)))
+        case Unary("not", Binary() as inside):
+            return Unary("not", centred(inside))
     return expr
 
 

@@ -44,7 +44,7 @@ from language.traversal import reads, walk
 from language.wiring import finished
 
 ENTRIES = ("init", "derive", "step")
-RARE = (LATCH_EACH, THROUGH)
+RARE = (LATCH_EACH, THROUGH, "back_")
 """Blocks that are kept out of the way of what a step does nearly always."""
 NOT_INLINED = {
     "RARELY": "Runs rarely: not inlined",

@@ -15,7 +15,7 @@ from language.evaluate import Scalar
 from language.kalman import SolvedNames
 from language.limit import stored
 from language.matrix import Matrix
-from language.model import Automaton, Observer
+from language.model import Automaton, Mode, Observer
 from language.operation import (
     Assign,
     Binary,
@@ -38,6 +38,7 @@ from language.operation import (
 from language.parameter import tunables_of
 from language.problem import Problems
 from language.program import Variable
+from language.syntax import form
 
 COVARIANCE_RANGE = "covariance_range"
 States = tuple[str, ...]
@@ -91,8 +92,8 @@ def pairs(states: States) -> Iterator[tuple[str, str]]:
             yield row, column
 
 
-def spread(solved: SolvedNames, ahead: Ahead) -> Block:
-    """P = Phi P Phi' + Qd, through T = Phi P; `work.density_<state>` are the varying densities."""
+def rows(solved: SolvedNames, ahead: Ahead) -> Block:
+    """T = Phi P, of P = Phi P Phi' + Qd over a period."""
     states, phi = solved.observer.states, ahead.numbers["Phi"]
     ops: list[Op] = []
     for row in states:
@@ -100,6 +101,13 @@ def spread(solved: SolvedNames, ahead: Ahead) -> Block:
             old: dict[str, Expr] = {name: _of(states, name, column) for name in states}
             parts = solved.row("Phi", phi, row, old)
             ops.append(Assign(f"work.t_{row}__{column}", total(parts)))
+    return tuple(ops)
+
+
+def columns(solved: SolvedNames, ahead: Ahead) -> Block:
+    """P = T Phi' + Qd; `work.density_<state>` are the varying densities."""
+    states, phi = solved.observer.states, ahead.numbers["Phi"]
+    ops: list[Op] = []
     for row, column in pairs(states):
         half: dict[str, Expr] = {name: Ref(f"work.t_{row}__{name}") for name in states}
         parts = solved.row("Phi", phi, column, half)
@@ -133,6 +141,27 @@ def corrected(
         less = times(Ref(f"work.gain_{row}"), pc[column])
         ops.append(Assign(before.name, subtract(before, less)))
     return tuple(ops)
+
+
+def bounding(
+    automaton: Automaton, mode: Mode, values: Mapping[str, Scalar], problems: Problems
+) -> dict[str, Block]:
+    """Return what keeps P within its limits at the end of a tick, or nothing: one block of all
+    modes that have the same limits.
+    """
+    observer = mode.observer
+    assert observer
+    if not observer.limits:
+        return {}
+    limits = variance_limits(automaton, observer, values, problems)
+    observers = {m.name: m.observer for m in automaton.modes.values() if m.observer}
+    first = next(n for n, other in observers.items() if _written(other) == _written(observer))
+    return {f"bound_{first}": bounded(observer.states, limits)}
+
+
+def _written(observer: Observer) -> dict[str, object]:
+    """Return the limits of variances as they are written."""
+    return {n: (form(low.tree), form(high.tree)) for n, (low, high) in observer.limits.items()}
 
 
 def variance_limits(

@@ -51,7 +51,7 @@ class Field:
 
     `inputs` are what its inputs read; `mode` is the variable that holds its mode; `timed` says
     whether something changes with `work.s`, the time since the start of the step; `remembered` is
-    what the guards of a mode (by its key) remember.
+    what the guards of a mode (by its key) remember; `is_staged` is whether stages have blocks.
     """
 
     automaton: Automaton
@@ -61,6 +61,7 @@ class Field:
     prefix: str
     timed: bool = False
     remembered: Mapping[str, Names] = dataclasses.field(default_factory=dict)
+    is_staged: bool = False
 
     @property
     def states(self) -> tuple[str, ...]:

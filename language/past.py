@@ -151,11 +151,11 @@ def input_at(automaton: Automaton, name: str, group: Literal["past", "after"] = 
     return Ref(f"work.{group}_{name}", kept_inputs(automaton)[name].whole)
 
 
-def find_place(automaton: Automaton, back: Expr) -> Assign:
+def find_place(automaton: Automaton, back: Expr) -> Block:
     """Return what finds the place of the tick so many places before the newest one."""
-    here = Compare(">=", NEWEST, back)
-    before = subtract(NEWEST, back)
-    return Assign(PLACE.name, Select(here, before, add(before, whole(_size(automaton)))))
+    around = Assign(PLACE.name, add(PLACE, whole(_size(automaton))))
+    find = Assign(PLACE.name, subtract(NEWEST, back))
+    return (find, Branch(Compare("<", PLACE, whole(0)), (around,)))
 
 
 def states_at_place(automaton: Automaton, group: Literal["at", "after"]) -> list[Op]:

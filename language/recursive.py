@@ -11,7 +11,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 
-from language.covariance import Ahead, bounded, corrected, entry, pairs, spread, variance_limits
+from language.covariance import Ahead, bounding, columns, corrected, entry, pairs, rows
 from language.density import at_rest, varies
 from language.derived import with_model
 from language.entries import number_diagonal, number_matrix, output_matrix
@@ -115,16 +115,17 @@ class _Recursive:
             constants += extra
         else:
             mean, extra = self._mean(observer, own)
-            spreads = {f"spread_{self.mode.name}": self._spread(observer, own)}
+            spreads = self._spreads(observer, own)
             late, more = self._late(observer, self.mode.name)
-            predict = (*map(Run, spreads), *mean, *late)
+            predict = (Run(f"spread_{self.mode.name}"), *mean, *late)
             constants += extra + more
         info = ObserverInfo(
             self.mode.name, self.states, observer.inputs, measured, own.a, (), c,
             (), r, self.period, {}, "recursive",
         )  # fmt: skip
-        correct = self._correct(observer, c)
-        return Kalman(predict, correct, tuple(constants), info, start, enter, spreads)
+        bounds = bounding(self.automaton, self.mode, self.values, self.problems)
+        correct = (*self._correct(observer, c), *map(Run, bounds))
+        return Kalman(predict, correct, tuple(constants), info, start, enter, {**spreads, **bounds})
 
     def _same_states(self) -> None:
         """The covariance belongs to the automaton, as its states do."""
@@ -232,7 +233,7 @@ class _Recursive:
                 solved = SolvedNames(tag, observer)
                 depends_on = tunables_of(self.automaton, solved_formulas(observer))
                 constants += solved.constants(ahead.numbers, depends_on)
-                spreads[f"spread_{tag}"] = self._spread(observer, ahead)
+                spreads |= self._spreads(observer, ahead)
                 cases.append((mode.number, (Run(f"spread_{tag}"),)))
                 late, more = self._late(observer, tag)
                 constants += more
@@ -253,19 +254,20 @@ class _Recursive:
         """What inputs do that changed within this tick, at an instant that is not known."""
         solved, known = SolvedNames(tag, observer), (self.before, self.now)
         ops, constants = changed(self.automaton, solved, known, self.values, self.problems)
-        return (*ops, *(self._bounded(observer) if ops else ())), constants
+        return ops, constants
 
-    def _spread(self, observer: Observer, ahead: Ahead) -> Block:
-        """The densities of now, then the covariance over the period."""
-        ops = []
+    def _spreads(self, observer: Observer, ahead: Ahead) -> dict[str, Block]:
+        """The densities of now, then the covariance over the period: its rows, its columns."""
+        ops: list[Op] = []
         for name, formula in self.varying.items():
             key = f"{self.automaton.name} {formula.key}"
             ops.append(Assign(f"work.density_{name}", expression(formula.tree, self.now), key))
-        return (*ops, *spread(SolvedNames(ahead.tag, observer), ahead), *self._bounded(observer))
-
-    def _bounded(self, observer: Observer) -> Block:
-        limits = variance_limits(self.automaton, observer, self.values, self.problems)
-        return bounded(self.states, limits)
+        solved, tag = SolvedNames(ahead.tag, observer), ahead.tag
+        return {
+            f"spread_{tag}": (*ops, Run(f"rows_{tag}"), Run(f"columns_{tag}")),
+            f"rows_{tag}": rows(solved, ahead),
+            f"columns_{tag}": columns(solved, ahead),
+        }
 
     def _correct(self, observer: Observer, c: Matrix) -> Block:
         """Innovations against the prediction, then one measurement at a time in their order."""
@@ -279,8 +281,7 @@ class _Recursive:
             seen = self._seen(observer, solved, c, name, known)
             error = subtract(known[name], seen)
             first.append(Branch(fresh, (Assign(f"innovation.{name}", error),)))
-            one = (*corrected(self.automaton, solved, c, name, error), *self._bounded(observer))
-            second.append(Branch(fresh, one))
+            second.append(Branch(fresh, corrected(self.automaton, solved, c, name, error)))
         return (*first, *second)
 
     def _seen(

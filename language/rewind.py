@@ -108,7 +108,7 @@ def carry_on(rewinding: Rewinding) -> Block:
     place = find_place(automaton, subtract(subtract(BACK, whole(2)), LOOK))
     inputs = run_inputs_at_place(automaton)
     later: Block = (
-        *((place, *inputs) if inputs else ()),
+        *((*place, *inputs) if inputs else ()),
         Run(f"run_{target.name}"),
     )
     is_later = Compare("<", add(LOOK, whole(1)), BACK)
@@ -157,7 +157,7 @@ def _search(rewinding: Rewinding) -> Block:
     automaton, until = rewinding.automaton, Run(f"until_{rewinding.label}")
     is_wanted = Binary("and", Compare("==", BACK, whole(0)), Compare("<", LOOK, KEPT))
     look: Block = (
-        find_place(automaton, LOOK),
+        *find_place(automaton, LOOK),
         *states_at_place(automaton, "at"),
         *inputs_at_place(automaton, "past"),
         until,
@@ -172,7 +172,7 @@ def _located(rewinding: Rewinding) -> Block:
     """The point is at the tick before the crossing: put the states at the crossing."""
     automaton = rewinding.automaton
     ring = (
-        find_place(automaton, subtract(BACK, whole(2))),
+        *find_place(automaton, subtract(BACK, whole(2))),
         *states_at_place(automaton, "after"),
         *inputs_at_place(automaton, "after"),
     )

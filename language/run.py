@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
+from fractions import Fraction
 
 from language.check_memory import uses_memory
 from language.evaluate import Scalar
@@ -55,6 +56,13 @@ from language.wiring import enter_initial
 
 EVENT_LIMIT = "event_limit"
 MODE = "memory.run_mode"
+HOLD = "hold"
+DIVIDING = ("midpoint", "rk4")
+"""Methods with a polynomial that divides by the step: of a short one it may be of any size."""
+LEAST_REST = Fraction(1, 2**60)
+"""Periods. The rest after a crossing that is no end is at least 2^-25 of its step (`RUN_HALVINGS`):
+two crossings leave more than this, or nothing.
+"""
 
 
 @dataclass(frozen=True)
@@ -85,7 +93,14 @@ def run_motion(
         problems.error("run", remembering.span, label)
         problems.stop_if_any()
     _refuse_actions(automaton, model, problems)
-    field = Field(model, constant_names(automaton), inputs, MODE, f"{model.name} ")
+    field = Field(
+        model,
+        constant_names(automaton),
+        inputs,
+        MODE,
+        f"{model.name} ",
+        is_staged=automaton.numbers == "float64",
+    )
     blocks = field_blocks(field)
     h = automaton.period / first.substeps
     place = first.method_span or first.span
@@ -98,6 +113,8 @@ def run_motion(
         **motion_blocks(field, method, blocks, merge, RUN_HALVINGS, lambda mode: None),
     }
     made.update(_switches(field, problems))
+    held = tuple(kept(automaton, model.states)[1])
+    made.update({HOLD: held} if first.method in DIVIDING and held else {})
     variables = (
         *_modes(model),
         Variable("work.left", "real", "s", about="rest of the tick, or of its substep"),
@@ -125,15 +142,22 @@ def run_block(automaton: Automaton, run: ModelRun, rest: Expr | None = None) -> 
     assert model and automaton.period is not None
     field = Field(model, {}, {}, MODE, "")
     length = real(automaton.period / run.substeps) if rest is None else rest
-    through = _through_events if run.follow else _one_flow
-    body = through(automaton, field, run, length)
     before, after = kept(automaton, model.states)
+    held: Block = (Run(HOLD),) if run.method in DIVIDING and after else tuple(after)
+    inside, outside = (held, ()) if run.follow and run.method in DIVIDING else ((), held)
+    if run.follow:
+        body = _through_events(automaton, field, run, length, inside)
+    else:
+        body = _one_flow(automaton, field, run, length)
     moved: Block = body if run.substeps == 1 else (Loop(run.substeps, "work.substep", body),)
-    return (*before, *moved, *after)
+    return (*before, *moved, *outside)
 
 
-def _through_events(automaton: Automaton, field: Field, run: ModelRun, length: Expr) -> Block:
-    """One substep, segment by segment, at most `events` jumps."""
+def _through_events(
+    automaton: Automaton, field: Field, run: ModelRun, length: Expr, held: Block
+) -> Block:
+    """One substep, segment by segment, at most `events` jumps; states are `held` after each."""
+    assert automaton.period is not None
     may_jump = Compare("<", Ref("work.piece"), whole(run.events))
     at_limit: Block = (FaultBit(EVENT_LIMIT), Assign("work.left", real(0.0)))
     look = (*at_state(field), by_mode(field, "guards"))
@@ -141,10 +165,12 @@ def _through_events(automaton: Automaton, field: Field, run: ModelRun, length: E
     segment: Block = (
         Assign("work.h", Ref("work.left")),
         by_mode(field, "move"),
+        *held,
         Assign("work.left", subtract(Ref("work.left"), Ref("work.elapsed"))),
         Branch(Ref("work.crossed"), after),
     )
-    left = Compare(">", Ref("work.left"), real(0.0))
+    least = automaton.period * LEAST_REST if run.method in DIVIDING else Fraction(0)
+    left = Compare(">", Ref("work.left"), real(least))
     return (
         Assign("work.left", length, f"{automaton.name} {run.key}"),
         Loop(run.events + 1, "work.piece", (Branch(left, segment),)),

@@ -6,6 +6,7 @@ By the value analysis of Frama-C (EVA): intervals of all values, over all inputs
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 from codegen.expression import literal
@@ -16,8 +17,9 @@ from codegen.rendering import render
 from codegen.source import c_files, stepped
 from codegen.tool import told
 from language.number import LARGEST
-from language.operation import Loop
+from language.operation import Count, Expr, Item, Loop, Op, Ref, Run, Store
 from language.program import Constant, Program, Variable
+from language.substitution import own_expressions, subexpressions
 from language.traversal import walk
 
 KERNEL = (
@@ -27,6 +29,8 @@ KERNEL = (
 )
 """The page is not `volatile` here: it changes between steps only."""
 ANALYSIS = ("-eva", "-eva-precision", "1", "-eva-no-show-progress")
+MERGED = ("-eva-slevel-function", "main:0")
+"""Steps are not followed one by one: all of them are one state, which begins with any counts."""
 ALARM = re.compile(
     r"\[eva:alarm\] (?P<file>[^:]+):(?P<line>\d+): Warning: *(?P<what>[^\n]*)\n? *(?P<more>[^\n]*)"
 )
@@ -39,7 +43,8 @@ def values(program: Program, folder: Path) -> Proof:
     for name, text in files.items():
         (folder / name).write_text(text)
     sources = [name for name in files if name.endswith(".c")]
-    unrolled = ("-eva-min-loop-unroll", str(_turns(program)))
+    turns = str(_turns(program))
+    unrolled = ("-eva-min-loop-unroll", turns, *(MERGED if program.run_modes else ()))
     done = told(["frama-c", *KERNEL, *ANALYSIS, *unrolled, *sources], folder)
     tool = f"Frama-C {version_of('frama-c', folder)}"
     alarms = {
@@ -59,8 +64,35 @@ def _turns(program: Program) -> int:
     """
     if not program.run_modes:
         return 0
-    loops = (op for block in program.blocks.values() for op in walk(block) if isinstance(op, Loop))
-    return max((loop.count for loop in loops), default=0)
+    loops = [op for block in program.blocks.values() for op in walk(block) if isinstance(op, Loop)]
+    running = (op for op in loops if any(isinstance(inner, Run) for inner in walk(op.body)))
+    return max((loop.count for loop in running), default=0)
+
+
+def step_counts(program: Program) -> dict[str, int]:
+    """Return the most of what counts from step to step: timers, and places in what is kept.
+
+    A count that begins with any of its values needs no step to be followed until it is full.
+    """
+    if not program.run_modes:
+        return {}
+    sizes = {variable.name: variable.size for variable in program.variables}
+    found: dict[str, int] = {}
+    for op in (op for block in program.blocks.values() for op in walk(block)):
+        if isinstance(op, Count):
+            found[op.timer] = max(op.limit, found.get(op.timer, 0))
+        for array, index in _places(op):
+            if isinstance(index, Ref) and index.name.startswith("memory.") and sizes.get(array):
+                found[index.name] = min(sizes[array] - 1, found.get(index.name, sizes[array]))
+    return found
+
+
+def _places(op: Op) -> Iterator[tuple[str, Expr]]:
+    """Yield the arrays that an operation writes or reads, and where."""
+    if isinstance(op, Store):
+        yield op.array, op.index
+    for whole in own_expressions(op):
+        yield from ((e.name, e.index) for e in subexpressions(whole) if isinstance(e, Item))
 
 
 def _main(program: Program) -> str:
@@ -72,9 +104,13 @@ def _main(program: Program) -> str:
         if c.range
     ]
     real = REAL[program.number]
-    return render(
-        "values_main.c.jinja", {"name": program.name, "real": real, "inputs": inputs, "page": page}
-    )
+    kinds = {variable.name: c_type(variable, program.number) for variable in program.variables}
+    counts = [
+        (place(name).replace("self->", "self."), f"({kinds[name]})Frama_C_interval(0, {most})")
+        for name, most in step_counts(stepped(program)).items()
+    ]
+    given = {"name": program.name, "real": real, "inputs": inputs, "page": page, "counts": counts}
+    return render("values_main.c.jinja", given)
 
 
 def _any(program: Program, variable: Variable) -> str:

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import shutil
+
 import pytest
 
 from codegen.frame import apart
+from codegen.proofs.stack import LIMIT
 from codegen.source import c_files, c_program
+from codegen.tool import ARM_COMPILER
+from language.number import NumberType
 from modewright.api import program
+from modewright.code import metrics
 
 
 def test_what_computes_much_has_a_frame_of_its_own() -> None:
@@ -14,6 +20,30 @@ def test_what_computes_much_has_a_frame_of_its_own() -> None:
     assert {"predict_drive", "half_no_contact", "series_coast_contact", "point"} <= found
     assert "rates_drive_contact" not in found, "pull_drive_contact alone runs it, and is apart"
     assert not found & {"run_gap", "latch", "remember"}
+
+
+def test_what_is_alike_in_all_modes_of_a_run_stands_once_and_apart() -> None:
+    made = c_program(program("hko"))
+    stages = {"stage_1", "stage_2", "stage_3", "stage_4", "cubic", "hold"}
+    assert stages | {"rows_gap_no_contact", "columns_gap_no_contact"} <= apart(made)
+    assert "step_no_contact" not in apart(made), "it computes nothing itself"
+
+
+def test_what_a_loop_runs_is_apart() -> None:
+    assert "look_drive_contact" in apart(c_program(program("hko")))
+
+
+def test_whole_numbers_are_not_computed_in_software() -> None:
+    assert "jump_drive" not in apart(c_program(program("hko")))
+
+
+@pytest.mark.skipif(shutil.which(ARM_COMPILER) is None, reason="no compiler for the target")
+@pytest.mark.parametrize("numbers", ["float64", "float32"])
+@pytest.mark.parametrize("name", ["hko", "leaf_hko"])
+def test_a_step_of_the_recursive_observer_takes_little_stack(
+    name: str, numbers: NumberType
+) -> None:
+    assert metrics(name, numbers=numbers).stack <= LIMIT
 
 
 @pytest.mark.parametrize("name", ["estimator_float32", "driveline"])

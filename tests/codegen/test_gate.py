@@ -14,7 +14,7 @@ from codegen.names import REAL
 from codegen.source import c_files
 from language.evaluate import evaluate
 from language.number import NumberType
-from language.operation import Binary, Branch, Call, Compare, Expr, Ref, Run, Value
+from language.operation import Binary, Branch, Call, Compare, Expr, Ref, Run, Unary, Value
 from modewright.api import program as shipped
 from tests.language.making import program
 
@@ -45,6 +45,11 @@ def test_one_comparison_says_what_two_said(x: float) -> None:
 @pytest.mark.parametrize(("low", "high"), [(-2.0, 3.0), (0.0, 2.0), (-2.0, 0.0), (-0.0, 2.0)])
 def test_a_range_around_0_is_one_comparison_of_bits(low: float, high: float) -> None:
     assert centred(between(low, high)) == Call(WITHIN, (X, Value(low), Value(high)))
+
+
+def test_outside_of_a_range_is_not_within_it() -> None:
+    outside = Unary("not", between(-2.0, 3.0))
+    assert centred(outside) == Unary("not", Call(WITHIN, (X, Value(-2.0), Value(3.0))))
 
 
 @pytest.mark.parametrize(("low", "high"), [(2.0, 2.0), (2.0, -2.0), (1.0, 3.0), (-3.0, -1.0)])

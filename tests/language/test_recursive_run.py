@@ -9,7 +9,10 @@ import pytest
 from filterpy.common import van_loan_discretization
 
 from engine.interpreter import Interpreter
+from language.operation import Block, Branch, Compare, Loop, Ref, Run, Value
+from language.traversal import walk
 from lockstep.compare import compare
+from modewright.api import program as shipped_program
 from tests.language.making import program, project_of, told
 from tests.language.test_recursive import CONSTANT, SPEC, made
 from tests.lockstep.programs import taped
@@ -59,6 +62,8 @@ modes:
       measurement_noise: {y_x: 0.04}
 outputs: [x, v]
 """
+
+V_HELD = "v: {initial: 0.8 1/s, range: [-0.9, 0.9]}"
 
 
 def test_the_run_predicts_and_its_mode_spreads_the_covariance(tmp_path: Path) -> None:
@@ -117,3 +122,56 @@ def test_what_does_not_go_together_is_refused(tmp_path: Path) -> None:
     program(
         SPEC.replace("NOISE", CONSTANT).replace("  on_2: {}", OBSERVING.format(states="[x, v, b]"))
     )
+
+
+# A run by rk4 has ends that an interval knows.
+
+
+def blocks_by(method: str, folder: Path) -> dict[str, Block]:
+    text = HYBRID.replace("method: exponential", f"method: {method}")
+    return dict(program(text, project_of(folder, m=MODEL)).blocks)
+
+
+def test_a_run_by_rk4_holds_states_after_each_segment(tmp_path: Path) -> None:
+    blocks = blocks_by("rk4", tmp_path)
+    (loop,) = (op for op in blocks["run_only"] if isinstance(op, Loop))
+    assert Run("hold") in tuple(walk(loop.body))
+    assert "hold" not in blocks_by("exponential", tmp_path)
+
+
+@pytest.mark.parametrize(("method", "least"), [("rk4", 0.1 * 2.0**-60), ("exponential", 0.0)])
+def test_a_rest_that_a_cubic_is_divided_by_has_a_least_size(
+    method: str, least: float, tmp_path: Path
+) -> None:
+    (loop,) = (op for op in blocks_by(method, tmp_path)["run_only"] if isinstance(op, Loop))
+    (test,) = (op.condition for op in loop.body if isinstance(op, Branch))
+    assert test == Compare(">", Ref("work.left"), Value(least))
+
+
+def test_a_run_by_rk4_is_equal_in_c_where_it_leaves_its_ranges(tmp_path: Path) -> None:
+    text = HYBRID.replace("method: exponential", "method: rk4")
+    text = text.replace("v: {initial: 0.8 1/s, range: [-50, 50]}", V_HELD)
+    used = program(text, project_of(tmp_path, m=MODEL))
+    inputs = [
+        {"input.y_x": 0.08 * k, "input.u": 3.0 * (k % 3), "is_new.y_x": k % 2 == 0}
+        for k in range(30)
+    ]
+    tape = taped(used, inputs)
+    assert compare(tape).is_equal
+    inside = Interpreter(used)
+    for given in inputs:
+        for name, value in given.items():
+            inside.set(name, value)
+        inside.run("step")
+        assert abs(inside.get("state.v")) <= 0.9
+    assert int(inside.get("memory.faults")) & 1 << used.faults.index("range_v")
+
+
+# Limits of a covariance.
+
+
+def test_modes_with_the_same_limits_share_what_keeps_them() -> None:
+    blocks = shipped_program("hko").blocks
+    assert [name for name in blocks if name.startswith("bound_")] == ["bound_drive"]
+    for mode in ("drive", "gap", "coast"):
+        assert blocks[f"correct_{mode}"][-1] == Run("bound_drive")

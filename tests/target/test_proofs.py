@@ -55,7 +55,8 @@ def held(proofs: list[Proof]) -> list[str]:
 
 
 @pytest.mark.parametrize(
-    "name", ["estimator", "estimator_float32", "estimator_simple", "supervisor", "contactor"]
+    "name",
+    ["estimator", "estimator_float32", "estimator_simple", "hko", "supervisor", "contactor"],
 )
 def test_shipped_automata_pass(name: str) -> None:
     found = list(prove(name, checks=CHECKS))
