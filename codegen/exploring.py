@@ -9,6 +9,7 @@ from __future__ import annotations
 import struct
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from codegen.sanitizers import APP, ran
 from codegen.source import stepped
 from codegen.tool import output_of
 from language.program import Constant, Program
+from language.traversal import walk
 
 MAIN = Main("explore_main.c.jinja")
 CHANGES, GROUPS = 4, 96
@@ -27,6 +29,10 @@ CHANGES, GROUPS = 4, 96
 FACTORS = (0.0, -1.0, 0.5, 2.0, 1.1, 0.9, 10.0, -10.0, 100.0, 1e-3, 1e6, 1e30)
 HOLDS = (*(1,) * 16, *(2,) * 6, 3, 3, 5, 5, 8, 12, 20, 50, 120, 600)
 """Ticks of a group: mostly one, and as many as a wait takes."""
+LARGE, MOST = 1000, 1000
+"""Operations of a Program that is large, and most ticks of a way through it: else its ways, of
+thousands of ticks each, take most of the time and show nothing more.
+"""
 ANY = (-1e30, 1e30)
 CORPUS, WORDS = "corpus", "words.h"
 
@@ -59,6 +65,7 @@ def records(
     program: Program, ranges: Mapping[str, Range], ways: Sequence[bytes]
 ) -> Iterator[list[bytes]]:
     """Yield the records of ways that are gone with the page of the spec, as a `Tape` has them."""
+    most = most_ticks(program)
     table, size = words(program, ranges), 1 + len(fed(program))
     record, first = struct.Struct(f"<{size}d"), 3 * CHANGES if page_of(program) else 0
     for way in ways:
@@ -66,12 +73,19 @@ def records(
         inputs = fed_by(program, table, b"".join(group[1:] for group in groups))
         held = [HOLDS[group[0] % len(HOLDS)] for group in groups]
         pairs = zip(held, inputs, strict=True)
-        yield [one for ticks, values in pairs for one in [record.pack(*values, 0.0)] * ticks]
+        gone = (one for ticks, values in pairs for one in [record.pack(*values, 0.0)] * ticks)
+        yield list(islice(gone, most))
 
 
 def longest(program: Program) -> int:
     """Return the size of the longest way [bytes]."""
     return 3 * CHANGES + GROUPS * (1 + len(fed(program)))
+
+
+def most_ticks(program: Program) -> int:
+    """Return the most ticks of a way."""
+    count = sum(1 for block in program.blocks.values() for _ in walk(block))
+    return MOST if count > LARGE else GROUPS * max(HOLDS)
 
 
 def write_explorer(program: Program, ranges: Mapping[str, Range], folder: Path) -> list[Path]:
@@ -84,6 +98,7 @@ def write_explorer(program: Program, ranges: Mapping[str, Range], folder: Path) 
         "FACTORS": f"{len(FACTORS)}U",
         "HOLDS": f"{len(HOLDS)}U",
         "LONGEST": longest(program),
+        "MOST": f"{most_ticks(program)}U",
     }
     lines = [f"#define {name} {number}" for name, number in numbers.items()]
     lines.append(_array("double", "factor", FACTORS))

@@ -6,7 +6,7 @@ happens, so what is never true of it never is.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from codegen.proofs.cut import At, Cut, Visit, Way, blocks_of, items_of, loop_cut, step_cut
@@ -110,9 +110,7 @@ class World:
                 test = self._decided(condition, values, path)
                 self._merge(test, then, other, values, path)
             case Choose(selector, cases):
-                which = values[selector]
-                for number, case in cases:
-                    self._merge(which == number, case, (), values, path)
+                self._choose(values[selector], cases, values, path)
             case Loop() if path is self.always:
                 self._cut(op, values)
             case Loop(_, index, body):
@@ -134,15 +132,33 @@ class World:
         self, test: Any, then: Block, other: Block, values: dict[str, Any], path: Any
     ) -> None:
         z3 = self.z3
-        one, two = dict(values), dict(values)
+        one = dict(values)
         self._block(then, one, z3.And(path, test))
-        self._block(other, two, z3.And(path, z3.Not(test)))
-        for name in one | two:
-            a, b = one.get(name), two.get(name)
+        self._block(other, values, z3.And(path, z3.Not(test)))
+        self._join(test, one, values)
+
+    def _join(self, test: Any, one: Mapping[str, Any], values: dict[str, Any]) -> None:
+        """Some values are those of one way where a test is true."""
+        for name in one | values:
+            a, b = one.get(name), values.get(name)
             if a is None or b is None:
                 values[name] = self._any(name)
             elif a is not b:
                 values[name] = self.terms.choose(test, a, b)
+
+    def _choose(
+        self,
+        which: Any,
+        cases: Sequence[tuple[int, Block]],
+        values: dict[str, Any],
+        path: Any,
+    ) -> None:
+        """Each case begins with what there was before the choice, for only one is taken."""
+        before = dict(values)
+        for number, case in cases:
+            test, one = which == number, dict(before)
+            self._block(case, one, self.z3.And(path, test))
+            self._join(test, one, values)
 
     def _cut(self, loop: Loop, values: dict[str, Any]) -> None:
         """A loop that every step comes by: ways lead into it, through a turn of it, and on."""

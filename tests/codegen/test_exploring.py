@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import shutil
+from random import Random
 
 import pytest
 
+from codegen import exploring
 from codegen.exploring import explored, page_of
 from codegen.fuzzing import FUZZER
 from codegen.mcdc import EXPORTER, mcdc
@@ -57,3 +59,18 @@ def test_a_wait_of_many_ticks_and_another_page_are_found() -> None:
     assert shown["self->timer.unlit_lit > 400U"] == (True,)
     assert shown["(cal->least > 6.0F) || (self->latched.u < 1.0F)"] == (True, True)
     assert found.missed == mcdc(slow(), [], ways[::-1], RANGES).missed
+
+
+def test_the_ways_of_a_large_program_are_short(monkeypatch: pytest.MonkeyPatch) -> None:
+    """So many ticks are gone in C, and as many are looked at for borders."""
+    assert exploring.most_ticks(program_named("hko")) == exploring.MOST
+    assert exploring.most_ticks(slow()) > exploring.MOST
+    draw = Random(1)
+    ways = [draw.randbytes(size) for size in (40, 120, 200)]
+    for most in (None, 50):
+        if most:
+            monkeypatch.setattr(exploring, "LARGE", 0)
+            monkeypatch.setattr(exploring, "MOST", most)
+        gone = [len(one) for one in exploring.records(slow(), RANGES, ways)]
+        assert mcdc(slow(), [], ways, RANGES).steps == sum(gone)
+        assert (max(gone) == most) == bool(most)

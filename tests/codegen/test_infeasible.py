@@ -54,6 +54,19 @@ modes:
   up: {transitions: {still: {when: not held, wait: 20 ms}}}
 outputs: [mode]
 """
+TWICE = """language: 1
+automaton: twice
+period: 10 ms
+numbers: float64
+inputs: {u: {unit: "1", range: [-8, 8]}}
+states: {x: {unit: "1", initial: 0, range: [-9, 9]}}
+equations: {z: x + u}
+initial: one
+modes:
+  one: {transitions: {two: {when: u > 5, reset: {x: 1}}}}
+  two: {transitions: {one: {when: z > 3 and x + u <= 3}}}
+outputs: [z, mode]
+"""
 SEEDS = (14, 19)
 """Of small specs."""
 HELD = {"latched.u": (-8.0, 8.0), "state.level": (0.0, 5.0)}
@@ -154,3 +167,10 @@ def test_each_condition_is_an_object_of_its_own() -> None:
     for made, is_told_apart in ((used, False), (unshared(used), True)):
         found = [n for p in places_of(made) if p.text == "work->is_over" for n in p.conditions]
         assert (len(set(found)) == len(found)) is is_told_apart
+
+
+def test_a_case_begins_with_what_there_was_before_the_choice() -> None:
+    """What mode `one` resets is not asked in mode `two`: `x + u` is what `z` was made of."""
+    found = proven(program(TWICE), {})
+    text = "(self->equation.z > 3.0) && ((self->state.x + self->latched.u) <= 3.0)"
+    assert found[text] == ".F"
