@@ -32,13 +32,6 @@ class Real:
     nan: Any
 
 
-def literal_of(z3: Any, x: Real) -> float | None:
-    """Return the number that a term is, where it is a literal: not of -0 and other negatives."""
-    if z3.is_false(x.nan) and z3.is_rational_value(x.value):
-        return float(x.value.as_fraction())
-    return None
-
-
 class Terms:
     """Terms of one number type; each new one has a name that no other has."""
 
@@ -50,7 +43,6 @@ class Terms:
         self.count = 0
         self.bounds: dict[int, list[Any]] = {}
         self.known: dict[tuple[object, ...], tuple[Any, object]] = {}
-        self.largest = self.value(LARGEST[number]).value
 
     def value(self, value: float | int | bool) -> Any:
         """Return a literal; -0 is another term than 0, for 1 / -0 is another number."""
@@ -109,11 +101,7 @@ class Terms:
     def sum(self, operator: str, left: Any, right: Any) -> Any:
         """Return what + - * / give."""
         if isinstance(left, Real):
-            known = self._known(operator, left, right)
-            if known is not None:
-                return known
             made = self._left_open(operator, (left, right), "real")
-            self._zeros(operator, made, left, right)
             if operator == "*":
                 self._bound(made, left, right)
                 self._bound(made, right, left)
@@ -121,44 +109,6 @@ class Terms:
         if operator == "/":
             return self.new("whole", "quotient")
         return {"+": left + right, "-": left - right, "*": left * right}[operator]
-
-    def _known(self, operator: str, left: Real, right: Real) -> Real | None:
-        """Return what two literals give, rounded once."""
-        numbers = [literal_of(self.z3, one) for one in (left, right)]
-        match operator, numbers:
-            case _, [None, _] | [_, None]:
-                return None
-            case "+", [float(a), float(b)]:
-                return self._literal(a + b)
-            case "-", [float(a), float(b)]:
-                return self._literal(a - b)
-            case "*", [float(a), float(b)]:
-                return self._literal(a * b)
-        return None
-
-    def _literal(self, number: float) -> Real | None:
-        found = rounded(number, self.number)
-        return self.value(found) if isfinite(found) else None
-
-    def _zeros(self, operator: str, made: Real, left: Real, right: Real) -> None:
-        """Note what is exact: nothing more or less, nothing of something, the same less itself."""
-        z3, a, b = self.z3, left.value, right.value
-        is_number = z3.Not(made.nan)
-        finite = z3.And(self._is_finite(left), self._is_finite(right))
-        found: list[tuple[Any, Any]] = []
-        if operator in "+-":
-            found = [(b == 0, made.value == a)]
-        if operator == "+":
-            found.append((a == 0, made.value == b))
-        if operator == "-":
-            found.append((a == b, made.value == 0))
-        if operator == "*":
-            found = [(z3.Or(a == 0, b == 0), made.value == 0)]
-        if operator == "/":
-            found = [(z3.And(a == 0, b != 0), made.value == 0)]
-        for test, then in found:
-            bound = z3.Implies(z3.And(finite, test), z3.And(is_number, then))
-            self.bounds.setdefault(made.value.get_id(), []).append(bound)
 
     def _bound(self, product: Real, factor: Real, other: Real) -> None:
         """A product with a factor of at most 1 is no larger than the other one, rounded or not."""
@@ -184,8 +134,8 @@ class Terms:
         return found
 
     def _is_finite(self, x: Real) -> Any:
-        z3, largest = self.z3, self.largest
-        return z3.And(z3.Not(x.nan), -largest <= x.value, x.value <= largest)
+        largest = self.value(LARGEST[self.number]).value
+        return self.z3.And(self.z3.Not(x.nan), -largest <= x.value, x.value <= largest)
 
     def compare(self, operator: str, left: Any, right: Any) -> Any:
         """Return a relation; with a NaN it is false, except `!=`."""

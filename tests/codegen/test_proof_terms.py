@@ -106,35 +106,3 @@ def test_the_same_operands_give_the_same() -> None:
     assert terms.sum("+", x, y) is terms.sum("+", x, y)
     assert terms.sum("+", x, y) is not terms.sum("+", y, x)
     assert terms.call("exp", [x]) is terms.call("exp", [x])
-
-
-@pytest.mark.parametrize("number", NUMBERS)
-def test_nothing_more_and_nothing_of_something_are_exact(number: NumberType) -> None:
-    """What is known of + - * / is never refuted by numbers, and tells what one of 0 gives."""
-    some = (0.0, -0.0, 1.5, -1.5, LARGEST[number], -LARGEST[number], 1e-40)
-    for operator, (a, b) in itertools.product("+-*/", itertools.product(some, repeat=2)):
-        if operator == "/" and b == 0.0:
-            continue
-        seen = rounded(OPERATIONS[operator](a, b), number)
-        if math.isinf(seen):
-            continue
-        terms = Terms(number)
-        x, y = terms.new("real", "x"), terms.new("real", "y")
-        made, wanted = terms.sum(operator, x, y), real(terms, seen)
-        solver = terms.z3.Solver()
-        pairs = ((x, real(terms, rounded(a, number))), (y, real(terms, rounded(b, number))))
-        for left, right in pairs:
-            solver.add(left.value == right.value, terms.z3.Not(left.nan))
-        solver.add(*terms.lemmas([made.value]))
-        is_so = terms.z3.And(made.value == wanted.value, terms.z3.Not(made.nan))
-        assert solver.check(is_so) == terms.z3.sat
-        is_exact = b == 0.0 or (a == 0.0 and operator != "-") or (a == b and operator == "-")
-        if is_exact:
-            assert solver.check(terms.z3.Not(is_so)) == terms.z3.unsat
-
-
-def test_literals_are_added_at_once() -> None:
-    terms = Terms("float32")
-    tenth, two = terms.value(0.1), terms.value(2.0)
-    same(terms, terms.sum("*", two, tenth), rounded(2.0 * rounded(0.1, "float32"), "float32"))
-    same(terms, terms.sum("-", tenth, two), rounded(rounded(0.1, "float32") - 2.0, "float32"))
