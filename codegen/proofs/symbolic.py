@@ -137,7 +137,7 @@ class World:
         self._block(other, values, z3.And(path, z3.Not(test)))
         self._join(test, one, values)
 
-    def _join(self, test: Any, one: Mapping[str, Any], values: dict[str, Any]) -> None:
+    def _join(self, test: Any, one: dict[str, Any], values: dict[str, Any]) -> None:
         """Some values are those of one way where a test is true."""
         for name in one | values:
             a, b = one.get(name), values.get(name)
