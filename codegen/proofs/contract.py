@@ -4,32 +4,48 @@
 fires and the mode is that transition's target; one that waits fires in the tick in which its
 counter is full, and a full counter fires or starts anew; no counter passes its end; nothing else
 is written than what its actions set; no access, shift or sum is undefined. Taken for granted:
-functions of ha_math write nothing. Ranges are two comparisons here, as in `values.py`. Where modes
+functions of ha_math write nothing. Ranges are two comparisons here, as in `values.py`. Where a
+transition runs functions they have contracts too (`effect.py`), choices that set no mode stand in
+functions of their own (`outline.py`), and what `values.py` asks is not asked again. Where modes
 stand inside modes the contracts are those of `chart_contract.py`.
 """
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 from codegen.names import SOLVED_ON_PAGE, CNames, mode_constant
-from codegen.proofs.chart_contract import ChartContract, proven_of, written
+from codegen.proofs.chart_contract import MODEL, ChartContract, proven_of, written
+from codegen.proofs.effect import (
+    assigned,
+    called_by,
+    contract_text,
+    places_of,
+    with_effects,
+    with_turns,
+)
+from codegen.proofs.outline import Function, function_of, outlined_but
 from codegen.proofs.pointers import is_inside, required
 from codegen.proofs.proof import Proof, version_of
 from codegen.proofs.wp import Asked, asked, detected, pure
-from codegen.source import STATIC, c_files, c_program
+from codegen.source import c_files, c_program
 from codegen.usage import locals_of
 from language.model import Automaton
 from language.operation import Count
 from language.program import ModeInfo, Program, TransitionInfo
 from language.situation import charting_of
-from language.traversal import block_writes, reached, walk
+from language.traversal import walk
 
-PARTS = (("-wp-prop=@ensures", "-wp-split"), ("-wp-prop=-@ensures",))
+PARTS = (("-wp-rte", "-wp-prop=@ensures", "-wp-split"), ("-wp-rte", "-wp-prop=-@ensures"))
 """Outcomes of a mode with many ranges are proven way by way only."""
+OF_CALLED = MODEL
+"""Functions that transitions run: reals are numbers without rounding, nothing is asked of them."""
+OF_CALLING = (*MODEL, "-wp-split")
+"""Modes whose transitions run functions."""
+MODE, FIRED = "self->mode", "self->fired"
 
 
 def contract(automaton: Automaton, program: Program, folder: Path) -> Proof:
@@ -50,13 +66,28 @@ def contract(automaton: Automaton, program: Program, folder: Path) -> Proof:
             "one region of a sampled automaton, and a chart without a fault mode, have contracts"
         )
         return Proof("contract", tool, about, is_asked=False)
-    text, file = files[f"{program.name}.c"], f"{program.name}.c"
+    functions, called = written_of(program, files, folder)
+    found = proven_with(folder, f"{program.name}.c", functions, called)
+    also = f", {len(called)} functions that they run" if called else ""
+    return _told(tool, found, f"{len(modes)} modes{also}")
+
+
+def written_of(
+    program: Program, files: Mapping[str, str], folder: Path
+) -> tuple[list[str], list[str]]:
+    """Write C with its contracts into a folder; return the functions of modes and their parts, and
+    the functions that these run.
+    """
+    made, file = c_program(program, by_amount=False), f"{program.name}.c"
+    modes = [mode for mode in program.modes if f"jump_{mode.name}" in made.blocks]
+    called = called_by(made, [f"jump_{mode.name}" for mode in modes])
+    text, functions = with_effects(made, files[file], called), []
     for mode in modes:
-        text = _Mode(program, made, mode).annotated(text)
+        text, names = _Mode(program, made, mode).annotated(text, in_parts=bool(called))
+        functions += names
     for name, own in {**files, file: text}.items():
         (folder / name).write_text(pure(own))
-    found = _proven(folder, file, [f"jump_{mode.name}" for mode in modes])
-    return _told(tool, found, f"{len(modes)} modes")
+    return functions, called
 
 
 def _told(tool: str, found: Asked, what: str) -> Proof:
@@ -64,10 +95,13 @@ def _told(tool: str, found: Asked, what: str) -> Proof:
     return Proof("contract", tool, about, found.open)
 
 
-def _proven(folder: Path, file: str, functions: Sequence[str]) -> Asked:
-    """Prove outcomes way by way, and everything else at once."""
+def proven_with(folder: Path, file: str, functions: Sequence[str], called: Sequence[str]) -> Asked:
+    """Prove the contracts of functions of modes, and of what is `called` by them."""
     detected(folder)
-    found = [asked(folder, file, functions, ("-wp-rte", *part)) for part in PARTS]
+    asking = [(functions, options) for options in PARTS]
+    if called:
+        asking = [(called, OF_CALLED), (functions, OF_CALLING)]
+    found = [asked(folder, file, own, options) for own, options in asking if own]
     return sum(found, start=Asked(0, 0, ()))
 
 
@@ -80,51 +114,63 @@ class _Mode:
     mode: ModeInfo
 
     @property
+    def block(self) -> str:
+        """What it does in a tick."""
+        return f"jump_{self.mode.name}"
+
+    @cached_property
     def place(self) -> CNames:
         """Where names are in C."""
-        block = f"jump_{self.mode.name}"
-        return CNames(self.made, locals_of(self.made)[block], SOLVED_ON_PAGE)
+        return CNames(self.made, locals_of(self.made)[self.block], SOLVED_ON_PAGE)
 
     @property
     def transitions(self) -> list[TransitionInfo]:
         """Its transitions."""
         return [info for info in self.program.transitions if info.source == self.mode.number]
 
-    def annotated(self, text: str) -> str:
-        """Return C with the contract before its function."""
-        head = re.compile(rf"^{STATIC}void jump_{self.mode.name}\(([^)]*)\)", re.M)
-        found = head.search(text)
-        assert found, self.mode.name
-        lines = [*required(found[1], is_inside(text)), *self._required()]
-        lines.append(f"assigns {', '.join(self._written(found[1]))};")
-        lines += self._ensured()
-        contract = "\n  ".join(["/*@", *lines]) + "\n*/\n"
-        return text[: found.start()] + contract + text[found.start() :]
+    def annotated(self, text: str, in_parts: bool) -> tuple[str, list[str]]:
+        """Return C with contracts before its function and its parts, and the names of these."""
+        function = function_of(text, self.block)
+        *parts, whole = outlined_but(function, (MODE, FIRED)) if in_parts else [function]
+        pointers = list(required(function.parameters, is_inside(text)))
+        told = [self._part(part, pointers) for part in parts]
+        lines = [*pointers, *self._required(), assigned(self._places), *self._ensured()]
+        told.append(contract_text(lines) + with_turns(whole, self._places))
+        text = text[: function.start] + "\n".join(told) + text[function.end :]
+        return text, [part.name for part in (*parts, whole)]
+
+    def _part(self, part: Function, pointers: Sequence[str]) -> str:
+        """Return a part with its contract: it leaves the mode, and counts that are none of its own;
+        one that it counts goes one on or starts anew.
+        """
+        counts = {self.place(count.timer): count.limit - 1 for count in self._counts()}
+        own = [timer for timer in counts if f"{timer}++;" in part.body]
+        others = {MODE, FIRED, *counts} - set(own)
+        places = [place for place in self._places if place not in others]
+        lines = [*pointers, *(f"requires {timer} <= {counts[timer]};" for timer in own)]
+        lines.append(assigned(places))
+        lines += [f"ensures {timer} == 0 || {timer} == \\old({timer}) + 1;" for timer in own]
+        return contract_text([*lines, "exits \\false;"]) + with_turns(part, places)
 
     def _required(self) -> Iterator[str]:
         mode = mode_constant(self.program, self.mode.number)
-        yield f"requires self->mode == {mode} && self->fired == 0;"
+        yield f"requires {MODE} == {mode} && {FIRED} == 0;"
         for count in self._counts():
             yield f"requires {self.place(count.timer)} <= {count.limit - 1};"
 
     def _counts(self) -> list[Count]:
-        block = self.made.blocks[f"jump_{self.mode.name}"]
-        return [op for op in walk(block) if isinstance(op, Count)]
+        return [op for op in walk(self.made.blocks[self.block]) if isinstance(op, Count)]
 
-    def _written(self, parameters: str) -> list[str]:
-        names: set[str] = set()
-        for block in reached(f"jump_{self.mode.name}", self.made.blocks):
-            names |= set(block_writes(self.made.blocks[block]))
-        local = locals_of(self.made)[f"jump_{self.mode.name}"]
-        inside = sorted(self.place(name) for name in names - local if not name.startswith("work."))
-        return [*inside, *(["*work"] if "*work" in parameters else [])] or ["\\nothing"]
+    @cached_property
+    def _places(self) -> list[str]:
+        return places_of(self.made, self.block)
 
     def _ensured(self) -> Iterator[str]:
-        stays = f"self->mode == {mode_constant(self.program, self.mode.number)}"
-        outcomes = [f"(self->fired == 0 && {stays})"]
+        stays = f"{MODE} == {mode_constant(self.program, self.mode.number)}"
+        outcomes = [f"({FIRED} == 0 && {stays})"]
         for info in self.transitions:
             target = mode_constant(self.program, info.target)
-            outcomes.append(f"(self->fired == {info.number} && self->mode == {target})")
+            outcomes.append(f"({FIRED} == {info.number} && {MODE} == {target})")
         yield f"ensures {' || '.join(outcomes)};"
         for count in self._counts():
             timer, most = self.place(count.timer), count.limit - 1
@@ -132,5 +178,5 @@ class _Mode:
             for info in self.transitions:
                 if info.timer == count.timer and not info.tunable:
                     full = f"\\old({timer}) == {most}"
-                    yield f"ensures self->fired == {info.number} ==> {full};"
-                    yield f"ensures self->fired == 0 && {full} ==> {timer} == 0;"
+                    yield f"ensures {FIRED} == {info.number} ==> {full};"
+                    yield f"ensures {FIRED} == 0 && {full} ==> {timer} == 0;"

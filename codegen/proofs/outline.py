@@ -7,11 +7,13 @@ statements stay those of the module, in the same order; what a part may do is a 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 from codegen.source import STATIC
 
 CHOICE = re.compile(r"^    (?:if|switch|for) \(.*?^    }\n", re.M | re.S)
+INNER = re.compile(r"^( +)(?:if|switch|for) \(.*?^\1}\n", re.M | re.S)
 DECLARED = re.compile(r"^    (?:const )?\w+ \w+(?: =|;)", re.M)
 
 
@@ -36,6 +38,10 @@ class Function:
         """The function as C."""
         return f"{self.keyword}void {self.name}({self.parameters})\n{{\n{self.body}}}\n"
 
+    def with_body(self, body: str) -> Function:
+        """The function with another body."""
+        return replace(self, body=body)
+
 
 def function_of(text: str, name: str) -> Function:
     """Return a function of a module."""
@@ -52,18 +58,39 @@ def outlined(function: Function) -> list[Function]:
     """
     if len(function.choices) < 2 or DECLARED.search(function.body):
         return [function]
+    return _taken_out(function, [found.span() for found in CHOICE.finditer(function.body)])
+
+
+def outlined_but(function: Function, kept: Sequence[str]) -> list[Function]:
+    """Return the parts of a function, then what is left of it: parts are the outermost choices
+    that write none of some places. One with a variable of its own stays whole.
+    """
+    if DECLARED.search(function.body):
+        return [function]
+    return _taken_out(function, list(_without(function.body, kept)))
+
+
+def _without(body: str, kept: Sequence[str]) -> Iterator[tuple[int, int]]:
+    place = 0
+    while found := INNER.search(body, place):
+        writes = any(f"{one} =" in found[0] for one in kept)
+        if not writes:
+            yield found.span()
+        place = body.index("\n", found.start()) + 1 if writes else found.end()
+
+
+def _taken_out(function: Function, spans: Sequence[tuple[int, int]]) -> list[Function]:
     taken = ", ".join(re.findall(r"\*(\w+)", function.parameters))
     parts: list[Function] = []
-
-    def called(found: re.Match[str]) -> str:
+    body, place = "", 0
+    for start, end in spans:
         name = part_name(function.name, len(parts))
-        place = (function.start, function.start, function.keyword, name, function.parameters)
-        parts.append(Function(*place, found[0]))
-        return f"    {name}({taken});\n"
-
-    body = CHOICE.sub(called, function.body)
-    whole = (function.start, function.end, function.keyword, function.name, function.parameters)
-    return [*parts, Function(*whole, body)]
+        where = (function.start, function.start, function.keyword, name, function.parameters)
+        parts.append(Function(*where, function.body[start:end]))
+        indent = re.match(" *", function.body[start:end])
+        body += function.body[place:start] + f"{indent[0] if indent else ''}{name}({taken});\n"
+        place = end
+    return [*parts, function.with_body(body + function.body[place:])]
 
 
 def part_name(function: str, number: int) -> str:

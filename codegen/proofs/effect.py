@@ -1,0 +1,83 @@
+"""Effect: what the functions write that a mode's transitions run, as contracts of their own.
+
+WP takes a function by its contract where it is called, so that the numbers that a rewind computes
+are cut off. `assigns` says all that it may write, from the Program; it is proven of the function
+itself, and so is what each turn of a loop writes. All values of a step are one place here.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+
+from codegen.names import SOLVED_ON_PAGE, CNames
+from codegen.proofs.outline import Function, function_of
+from codegen.proofs.pointers import is_inside, required
+from codegen.usage import locals_of
+from language.program import Program
+from language.traversal import block_writes, reached
+
+LOOP = re.compile(r"^( *)for \(int32_t (\w+) = 0; \w+ < (\d+); \w+\+\+\) \{$", re.M)
+LOCAL = re.compile(r"^    (?!const |return )\w+ (\w+)(?: = [^;]+)?;$", re.M)
+NOTHING = "\\nothing"
+STEP = "*work"
+"""The values of a step."""
+
+
+def called_by(program: Program, blocks: Iterable[str]) -> list[str]:
+    """Return the blocks that some blocks run, directly or not."""
+    given = tuple(blocks)
+    inside = {name for block in given for name in reached(block, program.blocks)}
+    return sorted(inside - set(given))
+
+
+def places_of(program: Program, block: str) -> list[str]:
+    """Return the places that a block may write, and those that it runs."""
+    local = locals_of(program)
+    names = {
+        name
+        for inner in reached(block, program.blocks)
+        for name in block_writes(program.blocks[inner])
+        if name not in local[inner]
+    }
+    place = CNames(program, frozenset(), SOLVED_ON_PAGE)
+    sizes = {v.name: f"[0 .. {v.size - 1}]" for v in program.variables if v.size}
+    found = {STEP if n.startswith("work.") else place(n) + sizes.get(n, "") for n in names}
+    return sorted(found)
+
+
+def with_effects(program: Program, text: str, called: Iterable[str]) -> str:
+    """Return the C of a Program with a contract before each function that is `called`."""
+    inside = is_inside(text)
+    for name in called:
+        function, places = function_of(text, name), places_of(program, name)
+        lines = [*required(function.parameters, inside), assigned(places), "exits \\false;"]
+        told = contract_text(lines) + with_turns(function, places)
+        text = text[: function.start] + told + text[function.end :]
+    return text
+
+
+def assigned(places: Iterable[str]) -> str:
+    """Return that nothing else is written than some places."""
+    return f"assigns {', '.join(places) or NOTHING};"
+
+
+def contract_text(lines: Iterable[str]) -> str:
+    """Return the contract of a function."""
+    return "\n  ".join(["/*@", *lines]) + "\n*/\n"
+
+
+def with_turns(function: Function, places: Iterable[str]) -> str:
+    """Return a function as C with what each turn of its loops may write: what it may itself."""
+    own = LOCAL.findall(function.body)
+
+    def told(found: re.Match[str]) -> str:
+        indent, index, count = found.groups()
+        lines = [
+            f"loop invariant 0 <= {index} <= {count};",
+            f"loop {assigned((index, *own, *places))}",
+            f"loop variant {count} - {index};",
+        ]
+        return f"{indent}/*@ {' '.join(lines)} */\n{found[0]}"
+
+    return function.with_body(LOOP.sub(told, function.body)).text

@@ -1,0 +1,88 @@
+"""What functions write that a mode's transitions run, as contracts; parts that set no mode."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from codegen.proofs.contract import written_of
+from codegen.proofs.effect import called_by, places_of, with_effects, with_turns
+from codegen.proofs.outline import function_of, outlined_but
+from codegen.source import c_files, c_program
+from language.program import Program
+from modewright.api import program
+
+JUMPS = ("jump_drive", "jump_gap", "jump_coast")
+
+
+@cache
+def printed() -> tuple[Program, str]:
+    made = program("hko")
+    return c_program(made, by_amount=False), c_files(made, by_amount=False)["hko.c"]
+
+
+def contract_of(text: str, name: str) -> str:
+    found = re.search(rf"/\*@((?:(?!\*/).)*)\*/\nstatic \w+ void {name}\(", text, re.DOTALL)
+    assert found, name
+    return found[1]
+
+
+def test_what_transitions_run_has_a_contract_and_a_spread_has_none() -> None:
+    made, text = printed()
+    called = called_by(made, JUMPS)
+    assert {"back_drive_0", "rest_gap", "run_gap", "step_no_contact", "hold"} <= set(called)
+    assert not {*JUMPS, "rows_gap_no_contact", "correct_gap"} & set(called)
+    told = with_effects(made, text, called)
+    assert len(re.findall(r"^/\*@", told, re.M)) == len(called)
+
+
+def test_a_contract_names_what_is_written_and_nothing_else() -> None:
+    made, text = printed()
+    told = with_effects(made, text, called_by(made, JUMPS))
+    assert "assigns *work;" in contract_of(told, "guards_drive_contact")
+    assert "assigns self->run_mode;" in contract_of(told, "switch_drive_contact")
+    back = contract_of(told, "back_drive_0")
+    assert "requires work == &self->work;" in back
+    assert "self->mode" not in back and "self->fired" not in back
+    assert "self->state.w_w" in back and not re.search(r"\blow\b", back), "it lives inside"
+
+
+def test_an_array_is_written_from_end_to_end() -> None:
+    made, _ = printed()
+    assert "self->past_w_w[0 .. 2]" in places_of(made, "keep")
+
+
+def test_turns_of_a_loop_may_write_what_the_function_may_and_what_lives_in_it() -> None:
+    made, text = printed()
+    told = with_turns(function_of(text, "locate_no_contact"), places_of(made, "locate_no_contact"))
+    assert (
+        "/*@ loop invariant 0 <= halving <= 24; loop assigns halving, high, is_before_end, low"
+        in (told)
+    )
+    assert ", *work; loop variant 24 - halving; */\n    for (int32_t halving" in told
+
+
+def test_choices_that_set_no_mode_stand_in_functions_of_their_own() -> None:
+    _, text = printed()
+    function = function_of(text, "jump_gap")
+    *parts, whole = outlined_but(function, ("self->mode", "self->fired"))
+    assert len(parts) == 12, "four counts, two ranges of each of four transitions"
+    assert all("self->mode" not in part.body for part in parts)
+    assert whole.body.count("self->mode =") == 6
+    body = whole.body
+    for part in parts:
+        body = re.sub(
+            rf"^ *{part.name}\(self, work\);\n", lambda _, p=part: p.body, body, flags=re.M
+        )
+    assert body == function.body
+
+
+@pytest.mark.parametrize("name", ["contactor", "estimator_float32"])
+def test_modes_whose_transitions_run_nothing_stay_whole(name: str, tmp_path: Path) -> None:
+    made = program(name)
+    functions, called = written_of(made, c_files(made, by_amount=False), tmp_path)
+    assert called == []
+    assert functions == [f"jump_{mode.name}" for mode in made.modes]
