@@ -16,6 +16,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import TypeAlias
 
 from codegen.names import SOLVED_ON_PAGE, CNames, mode_constant
 from codegen.proofs.chart_contract import MODEL, ChartContract, proven_of, written
@@ -46,6 +47,8 @@ OF_CALLED = MODEL
 OF_CALLING = (*MODEL, "-wp-split")
 """Modes whose transitions run functions."""
 MODE, FIRED = "self->mode", "self->fired"
+Asking: TypeAlias = tuple[list[str], tuple[str, ...]]
+"""Functions, and how WP is asked for their contracts."""
 
 
 def contract(automaton: Automaton, program: Program, folder: Path) -> Proof:
@@ -66,17 +69,16 @@ def contract(automaton: Automaton, program: Program, folder: Path) -> Proof:
             "one region of a sampled automaton, and a chart without a fault mode, have contracts"
         )
         return Proof("contract", tool, about, is_asked=False)
-    functions, called = written_of(program, files, folder)
-    found = proven_with(folder, f"{program.name}.c", functions, called)
-    also = f", {len(called)} functions that they run" if called else ""
+    asking = written_of(program, files, folder)
+    run = sum(len(names) for names, options in asking if options == OF_CALLED)
+    also = f", {run} functions that they run" if run else ""
+    found = proven_with(folder, f"{program.name}.c", asking)
     return _told(tool, found, f"{len(modes)} modes{also}")
 
 
-def written_of(
-    program: Program, files: Mapping[str, str], folder: Path
-) -> tuple[list[str], list[str]]:
-    """Write C with its contracts into a folder; return the functions of modes and their parts, and
-    the functions that these run.
+def written_of(program: Program, files: Mapping[str, str], folder: Path) -> list[Asking]:
+    """Write C with its contracts into a folder; return what is to be proven: of modes and their
+    parts, and of the functions that these run.
     """
     made, file = c_program(program, by_amount=False), f"{program.name}.c"
     modes = [mode for mode in program.modes if f"jump_{mode.name}" in made.blocks]
@@ -87,7 +89,9 @@ def written_of(
         functions += names
     for name, own in {**files, file: text}.items():
         (folder / name).write_text(pure(own))
-    return functions, called
+    if called:
+        return [(called, OF_CALLED), (functions, OF_CALLING)]
+    return [(functions, options) for options in PARTS]
 
 
 def _told(tool: str, found: Asked, what: str) -> Proof:
@@ -95,12 +99,9 @@ def _told(tool: str, found: Asked, what: str) -> Proof:
     return Proof("contract", tool, about, found.open)
 
 
-def proven_with(folder: Path, file: str, functions: Sequence[str], called: Sequence[str]) -> Asked:
-    """Prove the contracts of functions of modes, and of what is `called` by them."""
+def proven_with(folder: Path, file: str, asking: Sequence[Asking]) -> Asked:
+    """Prove the contracts of functions of modes, and of what these run."""
     detected(folder)
-    asking = [(functions, options) for options in PARTS]
-    if called:
-        asking = [(called, OF_CALLED), (functions, OF_CALLING)]
     found = [asked(folder, file, own, options) for own, options in asking if own]
     return sum(found, start=Asked(0, 0, ()))
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from codegen.proofs.contract import contract
+from codegen.proofs.contract import contract, proven_with, written_of
 from codegen.proofs.misra import misra
 from codegen.proofs.proof import Proof
 from codegen.proofs.sanitised import sanitised
@@ -102,6 +102,46 @@ def test_a_mode_that_breaks_its_contract_is_found(
     monkeypatch.setattr("codegen.proofs.contract.c_files", lambda program, by_amount: broken)
     found = contract(load_automaton("contactor", Project(Path())), program("contactor"), tmp_path)
     assert any(goal in finding for finding in found.findings), found
+
+
+@pytest.mark.parametrize(
+    ("function", "right", "wrong", "goal"),
+    [
+        (
+            "jump_drive",
+            "self->mode = hko_MODE_gap;",
+            "self->mode = hko_MODE_coast;",
+            "jump_drive_ensures",
+        ),
+        (
+            "jump_gap",
+            "    if (!((self->equation.T_fast > self->equation.T_far) "
+            "&& (self->timer.after_1 >= 20U))) {\n        self->timer.gap_drive_fast = 0U;",
+            "    if (!((self->equation.T_fast > self->equation.T_far) "
+            "&& (self->timer.after_1 >= 20U))) {\n        self->timer.gap_drive_fast += 2U;",
+            "jump_gap_1_ensures",
+        ),
+        (
+            "switch_no_contact",
+            "self->run_mode = hko_RUN_drive_contact;",
+            "self->run_mode = hko_RUN_drive_contact;\n        self->mode = hko_MODE_drive;",
+            "switch_no_contact_assigns",
+        ),
+    ],
+)
+def test_a_mistake_in_what_transitions_run_is_found(
+    function: str, right: str, wrong: str, goal: str, tmp_path: Path
+) -> None:
+    """Of the function that is broken alone; of all of them it is a figure of `make prove`."""
+    made = c_files(program("hko"), by_amount=False)
+    text, file = made["hko.c"], "hko.c"
+    place = text.index(right, text.index(f" {function}("))
+    broken = text[:place] + wrong + text[place + len(right) :]
+    asking = written_of(program("hko"), {**made, file: broken}, tmp_path)
+    asked = goal.rpartition("_")[0]
+    own = [([name for name in names if name == asked], options) for names, options in asking]
+    found = proven_with(tmp_path, file, own)
+    assert found.asked and any(goal in one for one in found.open), found
 
 
 def test_each_tool_finds_a_mistake(tmp_path: Path) -> None:
