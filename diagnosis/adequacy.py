@@ -13,24 +13,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.bench import Bench
-from diagnosis.estimate import Estimate, looked_like
+from diagnosis.estimate import Estimate
 from diagnosis.evidence import inflation, inflations
-from diagnosis.layers import DRIFT, Layer, walks
-from diagnosis.level import units_of
+from diagnosis.layers import Layer, walks
 from diagnosis.location import places_of_freedom
 from diagnosis.naming import place_path
 from diagnosis.normal import solution
-from diagnosis.point import bounds_of, extended
+from diagnosis.point import bounds_of
+from diagnosis.room import drifts_gain
 from diagnosis.selection import Selection
-from diagnosis.tuning import tuned
+from diagnosis.simulation import nrmse
 from language.effect import own_names
-from language.problem import SpecError
 
 LEFT_PART = 0.12
 """Part of what was gained that drifts which are let free may gain beside it: forms differ."""
-FREE = 1000.0
-"""Units that such a drift may have."""
-
 MEMORY = 1.2
 """Innovations that count as one from which on those of a model remember."""
 HEARD = 1.6
@@ -51,6 +47,12 @@ an adequate one may then leave: a sensor's lag that imitates its delay leaves a 
 
 PILED = 0.5
 """Part of what an effect gained that a further one gains at the same place, where neither is it."""
+
+FAINT = 800.0
+"""Nats that effects gained together below which simulations have to show them as well."""
+HARDLY = 0.85
+"""Part of the misfit of simulation from which on they hardly show them: what foresees a little
+better from sample to sample and simulates no better is bent to what is there."""
 
 UNLIKELY = 20.0
 """Nats by which "none of these" then leads the best candidate."""
@@ -78,18 +80,9 @@ def freedom_gain(bench: Bench, selection: Selection) -> float:
 
 def _gain(bench: Bench, selection: Selection, drifts: Sequence[Layer]) -> float:
     """Return what some drifts gain [nats] that are let free; -inf where they do not go along."""
-    model, layers = selection.model, [tried.layer for tried in selection.accepted]
-    try:
-        candidate = bench.candidate(layers, drifts)
-    except SpecError:
-        return -np.inf
-    units = units_of(candidate, bench.series, model.values(0))
-    walking = {layer.place for layer in layers if walks(layer)}
-    most = {layer.named(DRIFT): FREE for layer in drifts if layer.place not in walking}
-    point = extended(candidate, model.candidate, model.point, {})
-    quiet = looked_like(candidate, bench.series, model.noises, point, model)
-    found = tuned(quiet, bench.series, units, most)
-    return (model.cost - found.cost) / inflation(model, bench.series)
+    held = {tried.layer.place for tried in selection.accepted if walks(tried.layer)}
+    gain = drifts_gain(bench, selection.model, drifts, held)
+    return gain / inflation(selection.model, bench.series)
 
 
 def remembers(bench: Bench, selection: Selection) -> bool:
@@ -130,6 +123,15 @@ def is_strained(selection: Selection) -> bool:
     """Tell whether accepted effects are pulled out of the ranges of their own parameters."""
     gained = sum(tried.evidence.train for tried in selection.accepted if tried.evidence)
     return strain(selection) > max(STRAINED, STRAINED_PART * gained)
+
+
+def hardly_shows(bench: Bench, selection: Selection) -> bool:
+    """Tell whether effects that gained little leave simulations nearly as they were."""
+    gained = sum(tried.evidence.train for tried in selection.accepted if tried.evidence)
+    if gained > FAINT:
+        return False
+    before, after = (nrmse(one, bench.series) for one in (selection.base, selection.model))
+    return float(np.mean(after / np.maximum(before, 1e-12))) > HARDLY
 
 
 def strain(selection: Selection) -> float:

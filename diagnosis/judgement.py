@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from diagnosis.adequacy import (
+    hardly_shows,
     is_inadequate,
     is_strained,
     piles_up,
@@ -137,6 +138,8 @@ def _why_not(selection: Selection, bench: Bench) -> str:
         return "two at one place gain alike"
     if remembers_mostly(bench, selection):
         return "most recordings remember what is left"
+    if hardly_shows(bench, selection):
+        return "simulations hardly show them"
     is_known = any(plainer_ones(first, selection.first_round))
     if not is_known and may_be_plainer(selection.model, first.layer, bench.series):
         return "the first may as well be a plainer one"

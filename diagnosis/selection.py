@@ -18,6 +18,7 @@ from diagnosis.needed import Needed, renewed, still_needed
 from diagnosis.plainer import plainest
 from diagnosis.point import extended
 from diagnosis.rival import rivals
+from diagnosis.room import is_full
 from diagnosis.search import Tell, Tried, searched
 from diagnosis.swap import swapped
 from diagnosis.threshold import EVERYWHERE, USUAL, Thresholds
@@ -94,6 +95,9 @@ def selected(
     layers = _near_best(known) or list(bench.layers())
     needed = 0.0
     while len(accepted) < MOST_EFFECTS:
+        if accepted and is_full(bench, model, thresholds.usual):
+            tell("free drifts find nothing more to do: no further effect is looked for")
+            break
         worth = (HOPE_BESIDE if accepted else HOPE) * max(needed, thresholds.usual)
         tried = searched(bench, model, units, layers, tell, worth)
         better, tried = looked_again(bench, model, units, tried, tell, worth)
