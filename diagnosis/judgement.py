@@ -18,6 +18,7 @@ from diagnosis.alone import LEFT_OUT, SIMULATED, alone, forgets
 from diagnosis.bench import Bench
 from diagnosis.bootstrap import bootstrapped, kept_thresholds
 from diagnosis.case import Case
+from diagnosis.company import has_hidden, in_company, is_outdone
 from diagnosis.description import Description, described
 from diagnosis.doubt import (
     explains_more,
@@ -29,7 +30,6 @@ from diagnosis.doubt import (
 )
 from diagnosis.estimate import Estimate
 from diagnosis.hidden import with_hidden
-from diagnosis.layers import has_parameters
 from diagnosis.level import units_of
 from diagnosis.location import located, unexplained
 from diagnosis.locus import Locus
@@ -96,7 +96,8 @@ def _judged_by_observer(case: Case, raw: Bench, ways: Sequence[Way], tell: Tell)
         says, selection = "unknown", selected_formula(selection, formula)
     else:
         formula = None
-        is_other = says == "effect" and leaves_much(selection, over, most)
+        is_free = says == "effect" and not has_hidden(selection)
+        is_other = is_free and leaves_much(selection, over, most)
         says, selection = _adequate(bench, selection, says, FREEDOM * most, units, is_other, tell)
     return Judgement(bench, base, selection, loci, says, thresholds, formula)
 
@@ -114,16 +115,16 @@ def _adequate(
 
     `is_other` where what they leave over at their places is known to be much.
     """
-    if not selection.accepted or any(not has_parameters(t.layer) for t in selection.accepted):
+    if not selection.accepted:
         return says, selection
     is_heard = says == "effect" and not is_still(selection, units)
-    why = (
-        "terms at their places explain much beside them" if is_other else _why_not(selection, bench)
-    )
-    if not why and is_heard and is_inadequate(bench, selection, needed):
-        why = "free drifts explain much beside them"
+    why = "terms at their places explain much beside them" if is_other else ""
+    why = why or _why_not(selection, bench)
+    if not why and is_heard and not has_hidden(selection):
+        is_less = is_inadequate(bench, selection, needed)
+        why = "free drifts explain much beside them" if is_less else ""
     if not why:
-        return says, selection
+        return says, in_company(bench, selection) if says == "effect" else selection
     names = ", ".join(tried.layer.id for tried in selection.accepted)
     tell(f"taken back: {names}: {why}, so it is something else")
     return "unknown", refused(selection)
@@ -132,6 +133,10 @@ def _adequate(
 def _why_not(selection: Selection, bench: Bench) -> str:
     """Return why accepted effects are something else; nothing where they seem to be right."""
     first = selection.accepted[0]
+    if is_outdone(bench, selection):
+        return "a hidden input explains much more where they act"
+    if has_hidden(selection):
+        return ""
     if is_strained(selection):
         return "they are pulled out of their ranges"
     if piles_up(selection):
