@@ -133,20 +133,19 @@ def _adequate(
 def _why_not(selection: Selection, bench: Bench) -> str:
     """Return why accepted effects are something else; nothing where they seem to be right."""
     first = selection.accepted[0]
+    is_free = not has_hidden(selection)
     if is_outdone(bench, selection):
         return "a hidden input explains much more where they act"
-    if has_hidden(selection):
-        return ""
-    if is_strained(selection):
+    if is_free and is_strained(selection):
         return "they are pulled out of their ranges"
-    if piles_up(selection):
+    if is_free and piles_up(selection):
         return "two at one place gain alike"
     if remembers_mostly(bench, selection):
         return "most recordings remember what is left"
-    if hardly_shows(bench, selection):
+    if is_free and hardly_shows(bench, selection):
         return "simulations hardly show them"
     is_known = any(plainer_ones(first, selection.first_round))
-    if not is_known and may_be_plainer(selection.model, first.layer, bench.series):
+    if is_free and not is_known and may_be_plainer(selection.model, first.layer, bench.series):
         return "the first may as well be a plainer one"
     return ""
 

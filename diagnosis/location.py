@@ -90,7 +90,7 @@ def likely(loci: Sequence[Locus], nearest: Iterable[str], bench: Bench) -> tuple
 
     A drift in a balance is as well one of the input that drives it. `nearest` are the paths of what
     comes nearest to what is missing and gains enough, best first: they tell which is more likely.
-    What turns with the angle of the balance is an input's: machines and discs ripple, losses do not.
+    What turns with the angle of a balance is an input's: machines and discs ripple, losses do not.
     """
     for path in (*nearest, *_rippling(bench, loci[:1])):
         section, _, place = path.partition(".")
