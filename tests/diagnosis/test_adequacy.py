@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 from diagnosis.adequacy import (
+    FAINT,
+    hardly_shows,
     is_inadequate,
     is_strained,
     piles_up,
@@ -163,3 +165,22 @@ def test_what_is_pulled_out_of_its_range_is_something_else(
     selection = accepting(own, own, "coulomb_friction@w_em")
     assert is_strained(selection) is strained
     assert (strain(selection) < 1.0) is not strained
+
+
+@pytest.mark.parametrize(("part", "loud"), [(0.1, 0.95), (10.0, 0.95), (0.1, 0.5)])
+def test_what_gained_little_has_to_show_in_simulations(
+    bench: Bench, rubbing: Bench, part: float, loud: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A faint name falls where simulations stay nearly as they were; a strong one need not show."""
+    selection = accepting(bench, rubbing, "coulomb_friction@w_em")
+    (first,) = selection.accepted
+    assert first.evidence is not None
+    assert not hardly_shows(rubbing, selection)
+    known = dataclasses.replace(first.evidence, train=part * FAINT)
+    faint = dataclasses.replace(selection, accepted=(dataclasses.replace(first, evidence=known),))
+    sizes = {
+        id(selection.base): np.array([0.1, 0.2]),
+        id(selection.model): loud * np.array([0.1, 0.2]),
+    }
+    monkeypatch.setattr("diagnosis.adequacy.nrmse", lambda one, series: sizes[id(one)])
+    assert hardly_shows(rubbing, faint) is (part < 1.0 and loud > 0.85)

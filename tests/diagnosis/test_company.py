@@ -1,0 +1,90 @@
+"""Company where a name acts makes it less sure; a hidden input there may undo it."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import pytest
+
+from diagnosis.bench import Bench
+from diagnosis.company import IN_COMPANY, OUTDONE, company_of, has_hidden, in_company, is_outdone
+from diagnosis.layers import fitting, shipped_effects
+from diagnosis.location import likely
+from diagnosis.locus import Locus
+from diagnosis.search import Tried
+from diagnosis.selection import Selection
+from tests.diagnosis.test_adequacy import accepting, rubbing
+from tests.diagnosis.test_estimation import bench
+
+__all__ = ["bench", "rubbing"]
+
+
+def with_second(bench: Bench, selection: Selection, effect: str, part: float) -> Selection:
+    """Return a selection with a second effect that gained `part` of what the first one did."""
+    (first,) = selection.accepted
+    assert first.evidence is not None
+    layers = {layer.id: layer for e in shipped_effects() for layer in fitting(bench.document, e)}
+    gained = dataclasses.replace(first.evidence, train=part * first.evidence.train)
+    second = Tried(layers[effect], 1.0, first.estimate, gained)
+    return dataclasses.replace(selection, accepted=(first, second))
+
+
+@pytest.mark.parametrize(
+    ("second", "is_company"),
+    [
+        ("stribeck_friction@w_em", True),
+        ("torque_gain@T_em", True),
+        ("unknown_input@w_em", True),
+        ("unknown_input@w_w", False),
+        ("sensor_lag@w_s", False),
+    ],
+)
+def test_company_acts_where_the_first_effect_does(
+    bench: Bench, rubbing: Bench, second: str, is_company: bool
+) -> None:
+    alone = accepting(bench, rubbing, "coulomb_friction@w_em")
+    both = with_second(bench, alone, second, 0.3)
+    assert [one.layer.id for one in company_of(rubbing, both)] == [second] * is_company
+    assert company_of(rubbing, alone) == ()
+    shares = [in_company(rubbing, one).probabilities() for one in (alone, both)]
+    sure, less = (share["coulomb_friction@w_em"] for share in shares)
+    assert sure > 0.9
+    assert less == pytest.approx(IN_COMPANY if is_company else sure, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("second", "part", "outdone"),
+    [
+        ("unknown_input@w_em", OUTDONE + 0.1, True),
+        ("unknown_input@w_em", OUTDONE - 0.1, False),
+        ("unknown_input@w_w", OUTDONE + 0.1, False),
+        ("stribeck_friction@w_em", OUTDONE + 0.1, False),
+    ],
+)
+def test_a_hidden_input_that_explains_much_more_undoes_a_name(
+    bench: Bench, rubbing: Bench, second: str, part: float, outdone: bool
+) -> None:
+    alone = accepting(bench, rubbing, "coulomb_friction@w_em")
+    both = with_second(bench, alone, second, part)
+    assert is_outdone(rubbing, both) is outdone
+    assert has_hidden(both) is second.startswith("unknown_input")
+    assert not is_outdone(rubbing, alone)
+    turned = dataclasses.replace(both, accepted=both.accepted[::-1])
+    assert not is_outdone(rubbing, turned), "a hidden input is not undone by an effect"
+
+
+@pytest.mark.parametrize(
+    ("feature", "correlation", "leads"),
+    [
+        ("order 2 of the angle of w_em", 0.8, "inputs.T_em"),
+        ("order 2 of the angle of w_em", 0.4, "flow.w_em"),
+        ("order 2 of the angle of w_w", 0.8, "flow.w_em"),
+        ("the sign of w_em", 0.8, "flow.w_em"),
+    ],
+)
+def test_what_ripples_with_an_angle_is_led_by_the_input_there(
+    bench: Bench, feature: str, correlation: float, leads: str
+) -> None:
+    first = Locus("flow", "w_em", 90.0, 2.0, along=((feature, correlation),))
+    rest = Locus("elements", "half_shaft", 10.0, 2.0)
+    assert likely((first, rest), (), bench)[0].path == leads
