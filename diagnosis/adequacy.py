@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.bench import Bench
+from diagnosis.company import has_hidden
 from diagnosis.estimate import Estimate
 from diagnosis.evidence import inflation, inflations
 from diagnosis.layers import Layer, walks
@@ -94,9 +95,12 @@ def remembers(bench: Bench, selection: Selection) -> bool:
 def remembers_mostly(bench: Bench, selection: Selection) -> bool:
     """Tell whether innovations remember, and those of most recordings in which they did before.
 
-    Where a form is not quite right some recordings show it that drive it far.
+    Where a form is not quite right some recordings show it that drive it far. An input that takes
+    up anything at all leaves nothing to remember.
     """
     together = inflation(selection.model, bench.series)
+    if has_hidden(selection):
+        return together > HEARD
     is_loud = together > LOUD
     if together < HEARD or not (is_loud or remembers(bench, selection)):
         return False

@@ -21,11 +21,6 @@ IN_COMPANY = 0.8
 where the library had the effect, and none where it was taken out, a fourth as often."""
 
 
-OUTDONE = 2.0
-"""Times what the first effect gained that a hidden input gains where that acts, from which on the
-effect is not what is missing: right ones gained more than it, wrong ones a tenth."""
-
-
 def company_of(bench: Bench, selection: Selection) -> tuple[Tried, ...]:
     """Return what was accepted beside the first effect at its place, or where that acts."""
     first, *others = selection.accepted
@@ -34,14 +29,7 @@ def company_of(bench: Bench, selection: Selection) -> tuple[Tried, ...]:
 
 def has_hidden(selection: Selection) -> bool:
     """Tell whether an input that explains anything at all was accepted."""
-    return any(_is_hidden(tried) for tried in selection.accepted)
-
-
-def is_outdone(bench: Bench, selection: Selection) -> bool:
-    """Tell whether a hidden input explains much more than the first effect, where that acts."""
-    first = selection.accepted[0]
-    hidden = (one for one in company_of(bench, selection) if _is_hidden(one))
-    return not _is_hidden(first) and any(_gain(one) > OUTDONE * _gain(first) for one in hidden)
+    return any(not has_parameters(tried.layer) for tried in selection.accepted)
 
 
 def in_company(bench: Bench, selection: Selection) -> Selection:
@@ -53,14 +41,6 @@ def in_company(bench: Bench, selection: Selection) -> Selection:
     return dataclasses.replace(selection, other=max(selection.other, max(scores) - apart))
 
 
-def _is_hidden(tried: Tried) -> bool:
-    return not has_parameters(tried.layer)
-
-
 def _where(bench: Bench, tried: Tried) -> set[str]:
     section, _, place = (path := place_path(tried.layer)).partition(".")
     return {path, acting(bench, section, place)}
-
-
-def _gain(tried: Tried) -> float:
-    return tried.evidence.train if tried.evidence else 0.0

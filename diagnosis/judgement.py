@@ -18,7 +18,7 @@ from diagnosis.alone import LEFT_OUT, SIMULATED, alone, forgets
 from diagnosis.bench import Bench
 from diagnosis.bootstrap import bootstrapped, kept_thresholds
 from diagnosis.case import Case
-from diagnosis.company import has_hidden, in_company, is_outdone
+from diagnosis.company import has_hidden, in_company
 from diagnosis.description import Description, described
 from diagnosis.doubt import (
     explains_more,
@@ -134,8 +134,6 @@ def _why_not(selection: Selection, bench: Bench) -> str:
     """Return why accepted effects are something else; nothing where they seem to be right."""
     first = selection.accepted[0]
     is_free = not has_hidden(selection)
-    if is_outdone(bench, selection):
-        return "a hidden input explains much more where they act"
     if is_free and is_strained(selection):
         return "they are pulled out of their ranges"
     if is_free and piles_up(selection):

@@ -25,7 +25,7 @@ from diagnosis.estimate import Estimate
 from diagnosis.estimation import estimated
 from diagnosis.evidence import evidence, inflations
 from diagnosis.joined import burnt
-from diagnosis.layers import effects_in, fitting
+from diagnosis.layers import effects_in, fitting, shipped_effects
 from diagnosis.level import settled, units_of
 from diagnosis.search import Tried
 from diagnosis.selection import Selection
@@ -184,3 +184,16 @@ def test_what_gained_little_has_to_show_in_simulations(
     }
     monkeypatch.setattr("diagnosis.adequacy.nrmse", lambda one, series: sizes[id(one)])
     assert hardly_shows(rubbing, faint) is (part < 1.0 and loud > 0.85)
+
+
+def test_a_hidden_input_leaves_nothing_to_remember(bench: Bench, rubbing: Bench) -> None:
+    """What takes up anything at all has less of an excuse than an effect with a form."""
+    base = based(rubbing)
+    quiet = dataclasses.replace(base, noises=dataclasses.replace(base.noises, drifts={}))
+    alone = estimated(quiet.candidate, rubbing.series, quiet.noises, quiet.point)
+    right = accepting(bench, rubbing, "coulomb_friction@w_em", alone)
+    layers = {layer.id: layer for e in shipped_effects() for layer in fitting(bench.document, e)}
+    hidden = Tried(layers["unknown_input@w_em"], 1.0, right.model, right.accepted[0].evidence)
+    for model, remembered in ((right.model, False), (alone, True)):
+        selection = dataclasses.replace(right, model=model, accepted=(*right.accepted, hidden))
+        assert remembers_mostly(rubbing, selection) is remembered
