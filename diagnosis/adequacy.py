@@ -10,21 +10,15 @@ import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from diagnosis.bench import Bench
-from diagnosis.company import has_hidden
-from diagnosis.estimate import Estimate
 from diagnosis.evidence import inflation, inflations
 from diagnosis.layers import Layer, walks
 from diagnosis.location import places_of_freedom
 from diagnosis.naming import place_path
-from diagnosis.normal import solution
-from diagnosis.point import bounds_of
 from diagnosis.room import drifts_gain
 from diagnosis.selection import Selection
 from diagnosis.simulation import nrmse
-from language.effect import own_names
 
 LEFT_PART = 0.12
 """Part of what was gained that drifts which are let free may gain beside it: forms differ."""
@@ -37,10 +31,6 @@ MEMORY_PART = 0.25
 memory, and a form that is not quite right leaves little of it."""
 TYPICAL_PART = 0.2
 """The same for the recordings, for which it is the median: a few may be far from the others."""
-
-STRAINED, STRAINED_PART = 60.0, 0.03
-"""Nats that accepted effects would gain beyond the ranges of their own parameters, and part of what
-they gained, from which on they are pulled out of these: what imitates another effect is."""
 
 LOUD, LOUD_PART = 3.0, 0.05
 """Innovations that count as one from which on those of a model are loud, and the typical part that
@@ -95,12 +85,9 @@ def remembers(bench: Bench, selection: Selection) -> bool:
 def remembers_mostly(bench: Bench, selection: Selection) -> bool:
     """Tell whether innovations remember, and those of most recordings in which they did before.
 
-    Where a form is not quite right some recordings show it that drive it far. An input that takes
-    up anything at all leaves nothing to remember.
+    Where a form is not quite right some recordings show it that drive it far.
     """
     together = inflation(selection.model, bench.series)
-    if has_hidden(selection):
-        return together > HEARD
     is_loud = together > LOUD
     if together < HEARD or not (is_loud or remembers(bench, selection)):
         return False
@@ -123,12 +110,6 @@ def piles_up(selection: Selection) -> bool:
     return False
 
 
-def is_strained(selection: Selection) -> bool:
-    """Tell whether accepted effects are pulled out of the ranges of their own parameters."""
-    gained = sum(tried.evidence.train for tried in selection.accepted if tried.evidence)
-    return strain(selection) > max(STRAINED, STRAINED_PART * gained)
-
-
 def hardly_shows(bench: Bench, selection: Selection) -> bool:
     """Tell whether effects that gained little leave simulations nearly as they were."""
     gained = sum(tried.evidence.train for tried in selection.accepted if tried.evidence)
@@ -136,34 +117,6 @@ def hardly_shows(bench: Bench, selection: Selection) -> bool:
         return False
     before, after = (nrmse(one, bench.series) for one in (selection.base, selection.model))
     return float(np.mean(after / np.maximum(before, 1e-12))) > HARDLY
-
-
-def strain(selection: Selection) -> float:
-    """Return what accepted effects would gain [nats] if their own parameters that are at the end of
-    a range had none, as the normal equations foresee it.
-    """
-    model = selection.model
-    if model.normal is None:
-        return 0.0
-    brought = {
-        tried.layer.named(name)
-        for tried in selection.accepted
-        for name in own_names(tried.layer.effect.body)
-    }
-    low, high = bounds_of(model.candidate).T
-    at_end = (model.point.shared <= low) | (model.point.shared >= high)
-    is_brought = np.array([name in brought for name in model.candidate.names], dtype=bool)
-    within = ~model.normal.own & ~at_end
-    beyond = ~model.normal.own & (is_brought | ~at_end)
-    return _foreseen(model, beyond) - _foreseen(model, within)
-
-
-def _foreseen(model: Estimate, free: NDArray[np.bool_]) -> float:
-    """Return what a step of the free shared coordinates (parameters,) gains, without ranges."""
-    assert model.normal is not None
-    slope = model.normal.g.sum(axis=0)[free] + model.point.shared[free]
-    matrix = model.normal.a.sum(axis=0)[np.ix_(free, free)] + np.eye(int(free.sum()))
-    return 0.5 * float(slope @ solution(matrix, slope))
 
 
 def refused(selection: Selection) -> Selection:

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from diagnosis.adequacy import (
     hardly_shows,
     is_inadequate,
-    is_strained,
     piles_up,
     refused,
     remembers_mostly,
@@ -39,6 +38,7 @@ from diagnosis.plainer import may_be_plainer, plainer_ones
 from diagnosis.search import Tell
 from diagnosis.selection import Selection, selected
 from diagnosis.series import Series
+from diagnosis.strain import is_strained
 from diagnosis.threshold import EVERYWHERE, USUAL, Thresholds
 from diagnosis.verdict import Says
 from diagnosis.ways import Way, better_way, chosen
@@ -118,11 +118,13 @@ def _adequate(
     if not selection.accepted:
         return says, selection
     is_heard = says == "effect" and not is_still(selection, units)
-    why = "terms at their places explain much beside them" if is_other else ""
-    why = why or _why_not(selection, bench)
-    if not why and is_heard and not has_hidden(selection):
-        is_less = is_inadequate(bench, selection, needed)
-        why = "free drifts explain much beside them" if is_less else ""
+    why = ""
+    if is_other:
+        why = "terms at their places explain much beside them"
+    elif not has_hidden(selection):  # which takes up anything at all
+        why = _why_not(selection, bench)
+        if not why and is_heard and is_inadequate(bench, selection, needed):
+            why = "free drifts explain much beside them"
     if not why:
         return says, in_company(bench, selection) if says == "effect" else selection
     names = ", ".join(tried.layer.id for tried in selection.accepted)
@@ -133,17 +135,16 @@ def _adequate(
 def _why_not(selection: Selection, bench: Bench) -> str:
     """Return why accepted effects are something else; nothing where they seem to be right."""
     first = selection.accepted[0]
-    is_free = not has_hidden(selection)
-    if is_free and is_strained(selection):
+    if is_strained(selection.model, selection.accepted):
         return "they are pulled out of their ranges"
-    if is_free and piles_up(selection):
+    if piles_up(selection):
         return "two at one place gain alike"
     if remembers_mostly(bench, selection):
         return "most recordings remember what is left"
-    if is_free and hardly_shows(bench, selection):
+    if hardly_shows(bench, selection):
         return "simulations hardly show them"
     is_known = any(plainer_ones(first, selection.first_round))
-    if is_free and not is_known and may_be_plainer(selection.model, first.layer, bench.series):
+    if not is_known and may_be_plainer(selection.model, first.layer, bench.series):
         return "the first may as well be a plainer one"
     return ""
 

@@ -1,11 +1,12 @@
 """Room: what drifts that are let free gain beside a model: about what further effects could.
 
-A drift follows anything at its place, late. Where none finds anything to do, no effect does.
+A drift follows anything at its place, late. Where those that there are have little to do, and none
+finds more when it is let free, no effect does.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -21,16 +22,24 @@ from language.problem import SpecError
 
 FREE = 1000.0
 """Units that such a drift may have."""
-
-
 LOUD = 1.6
 """Innovations that count as one from which on a model may be so far astray that drifts which are
 let free do not find their way."""
+HIGH = 0.5
+"""Units of a drift from which on it may stand for an effect: free ones then gain nothing more, and
+the effect gains what it explains better."""
 
 
-def is_full(bench: Bench, model: Estimate, needed: float) -> bool:
-    """Tell whether a further effect cannot gain what is `needed` [nats]."""
-    return inflation(model, bench.series) < LOUD and room_left(bench, model) < needed
+def is_full(bench: Bench, model: Estimate, units: Mapping[str, float], needed: float) -> bool:
+    """Tell whether a further effect cannot gain what is `needed` [nats].
+
+    Drifts that lose much when they are let free did not find their way: they tell nothing.
+    """
+    drifts = model.noises.drifts
+    is_low = all(drifts.get(name, 0.0) < HIGH * unit for name, unit in units.items())
+    if not is_low or inflation(model, bench.series) >= LOUD:
+        return False
+    return abs(room_left(bench, model)) < needed
 
 
 def room_left(bench: Bench, model: Estimate) -> float:

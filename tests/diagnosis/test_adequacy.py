@@ -13,24 +13,23 @@ from diagnosis.adequacy import (
     FAINT,
     hardly_shows,
     is_inadequate,
-    is_strained,
     piles_up,
     refused,
     remembers,
     remembers_mostly,
-    strain,
 )
 from diagnosis.bench import Bench
 from diagnosis.estimate import Estimate
 from diagnosis.estimation import estimated
 from diagnosis.evidence import evidence, inflations
 from diagnosis.joined import burnt
-from diagnosis.layers import effects_in, fitting, shipped_effects
+from diagnosis.layers import effects_in, fitting
 from diagnosis.level import settled, units_of
 from diagnosis.search import Tried
 from diagnosis.selection import Selection
 from diagnosis.series import Series
 from diagnosis.stirring import resting, stirring
+from diagnosis.strain import is_strained, strain
 from tests.diagnosis.test_estimation import bench
 from tests.diagnosis.test_location import based, with_effect
 from tests.language.making import ROOT
@@ -163,8 +162,9 @@ def test_what_is_pulled_out_of_its_range_is_something_else(
     (tmp_path / "coulomb_friction.yaml").write_text(limited)
     own = dataclasses.replace(rubbing, effects=effects_in(tmp_path), _made={})
     selection = accepting(own, own, "coulomb_friction@w_em")
-    assert is_strained(selection) is strained
-    assert (strain(selection) < 1.0) is not strained
+    given = selection.model, selection.accepted
+    assert is_strained(*given) is strained
+    assert (strain(*given) < 1.0) is not strained
 
 
 @pytest.mark.parametrize(("part", "loud"), [(0.1, 0.95), (10.0, 0.95), (0.1, 0.5)])
@@ -184,16 +184,3 @@ def test_what_gained_little_has_to_show_in_simulations(
     }
     monkeypatch.setattr("diagnosis.adequacy.nrmse", lambda one, series: sizes[id(one)])
     assert hardly_shows(rubbing, faint) is (part < 1.0 and loud > 0.85)
-
-
-def test_a_hidden_input_leaves_nothing_to_remember(bench: Bench, rubbing: Bench) -> None:
-    """What takes up anything at all has less of an excuse than an effect with a form."""
-    base = based(rubbing)
-    quiet = dataclasses.replace(base, noises=dataclasses.replace(base.noises, drifts={}))
-    alone = estimated(quiet.candidate, rubbing.series, quiet.noises, quiet.point)
-    right = accepting(bench, rubbing, "coulomb_friction@w_em", alone)
-    layers = {layer.id: layer for e in shipped_effects() for layer in fitting(bench.document, e)}
-    hidden = Tried(layers["unknown_input@w_em"], 1.0, right.model, right.accepted[0].evidence)
-    for model, remembered in ((right.model, False), (alone, True)):
-        selection = dataclasses.replace(right, model=model, accepted=(*right.accepted, hidden))
-        assert remembers_mostly(rubbing, selection) is remembered

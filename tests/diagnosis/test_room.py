@@ -21,12 +21,21 @@ __all__ = ["bench", "rubbing"]
 
 def test_a_model_with_what_is_missing_leaves_no_room(bench: Bench, rubbing: Bench) -> None:
     selection = accepting(bench, rubbing, "coulomb_friction@w_em")
-    assert is_full(rubbing, selection.model, USUAL)
+    units = units_of(selection.model.candidate, rubbing.series, selection.model.values(0))
+    assert is_full(rubbing, selection.model, units, USUAL)
     quiet = dataclasses.replace(selection.base.noises, drifts={})
     base = selection.base
     alone = settled(base.candidate, rubbing.series, quiet, base.point, {})
     assert room_left(rubbing, alone) > USUAL
-    assert not is_full(rubbing, alone, USUAL)
+    assert not is_full(rubbing, alone, units, USUAL)
+
+
+def test_a_drift_that_has_much_to_do_may_stand_for_an_effect(bench: Bench, rubbing: Bench) -> None:
+    model = accepting(bench, rubbing, "coulomb_friction@w_em").model
+    units = units_of(model.candidate, rubbing.series, model.values(0))
+    drifts = {**model.noises.drifts, "drift_balance_w_w": 2.0 * units["drift_balance_w_w"]}
+    noises = dataclasses.replace(model.noises, drifts=drifts)
+    assert not is_full(rubbing, dataclasses.replace(model, noises=noises), units, USUAL)
 
 
 def test_drifts_that_do_not_go_along_with_an_effect_are_left_out(bench: Bench) -> None:
