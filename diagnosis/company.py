@@ -6,19 +6,12 @@ effect that the library lacks.
 
 from __future__ import annotations
 
-import dataclasses
-import math
-
 from diagnosis.bench import Bench
 from diagnosis.layers import has_parameters
 from diagnosis.location import acting
 from diagnosis.naming import place_path
 from diagnosis.search import Tried
 from diagnosis.selection import Selection
-
-IN_COMPANY = 0.8
-"""Probability that the first name has at most with company: of 70 such names nine in ten were right
-where the library had the effect, and none where it was taken out, a fourth as often."""
 
 
 def company_of(bench: Bench, selection: Selection) -> tuple[Tried, ...]:
@@ -30,15 +23,6 @@ def company_of(bench: Bench, selection: Selection) -> tuple[Tried, ...]:
 def has_hidden(selection: Selection) -> bool:
     """Tell whether an input that explains anything at all was accepted."""
     return any(not has_parameters(tried.layer) for tried in selection.accepted)
-
-
-def in_company(bench: Bench, selection: Selection) -> Selection:
-    """Return a selection in which a first effect with company is less sure."""
-    scores = [tried.score for tried in selection.first_round if tried.evidence]
-    if not scores or not company_of(bench, selection):
-        return selection
-    apart = 2.0 * math.log(IN_COMPANY / (1.0 - IN_COMPANY))  # weights are those of Selection
-    return dataclasses.replace(selection, other=max(selection.other, max(scores) - apart))
 
 
 def _where(bench: Bench, tried: Tried) -> set[str]:

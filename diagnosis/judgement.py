@@ -17,7 +17,7 @@ from diagnosis.alone import LEFT_OUT, SIMULATED, alone, forgets
 from diagnosis.bench import Bench
 from diagnosis.bootstrap import bootstrapped, kept_thresholds
 from diagnosis.case import Case
-from diagnosis.company import has_hidden, in_company
+from diagnosis.company import has_hidden
 from diagnosis.description import Description, described
 from diagnosis.doubt import (
     explains_more,
@@ -39,6 +39,7 @@ from diagnosis.search import Tell
 from diagnosis.selection import Selection, selected
 from diagnosis.series import Series
 from diagnosis.strain import is_strained
+from diagnosis.sureness import less_sure
 from diagnosis.threshold import EVERYWHERE, USUAL, Thresholds
 from diagnosis.verdict import Says
 from diagnosis.ways import Way, better_way, chosen
@@ -126,7 +127,7 @@ def _adequate(
         if not why and is_heard and is_inadequate(bench, selection, needed):
             why = "free drifts explain much beside them"
     if not why:
-        return says, in_company(bench, selection) if says == "effect" else selection
+        return says, less_sure(bench, selection, tell) if says == "effect" else selection
     names = ", ".join(tried.layer.id for tried in selection.accepted)
     tell(f"taken back: {names}: {why}, so it is something else")
     return "unknown", refused(selection)

@@ -42,7 +42,8 @@ def test_what_it_is_confused_with_is_tried_though_it_was_not_fitted(
 ) -> None:
     """Alone it promised nothing; an effect that it is not confused with stays away."""
     used, accepted = late
-    model, told = accepted[-1].estimate, []
+    model = accepted[-1].estimate
+    told: list[str] = []
     assert model is not None
     units = units_of(model.candidate, used.series, model.values(0))
     rivals = [accepted[0], Tried(layer(bench, name), -5.0)]
