@@ -30,6 +30,11 @@ class Plan:
     strength: float = 1.0
     without_own: bool = False
 
+    @property
+    def is_compared(self) -> bool:
+        """Whether simpler methods are asked on the same cases: those that the page tells."""
+        return self.name in ("full", "clean")
+
 
 def plans(pairs: Sequence[tuple[str, str]], seed: int, share: float = 1.0) -> tuple[Plan, ...]:
     """Return the plans of a study; `pairs` are the effects that can be concealed together.
