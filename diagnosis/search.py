@@ -70,13 +70,15 @@ def searched(
     possible = ((layer, _possible(bench, base, layer)) for layer in layers)
     known = [(layer, candidate) for layer, candidate in possible if candidate is not None]
     found: list[Tried] = []
-    fits = FITS_BESIDE if base.candidate.layers else FULL_FITS
-    for place, promise in enumerate(promises(bench, base, known, least)):
+    left = FITS_BESIDE if base.candidate.layers else FULL_FITS
+    for promise in promises(bench, base, known, least):
         gain, layer, start = promise.gain, promise.layer, promise.start
         best = max((one.evidence.train for one in found if one.evidence), default=0.0)
-        if start is None or place >= fits or gain < max(worth, HOPELESS * best):
+        is_one = left > 0 and gain >= max(worth, HOPELESS * best)
+        if start is None or not is_one:
             found.append(Tried(layer, gain))
             continue
+        left -= 1
         given = (base.noises, start.point, start.columns, start.gains, units, start.cost - WORTH)
         make = partial(_fitted, bench, base, start, units)
         estimate = bench.kept("fitted", start.candidate, given, make)

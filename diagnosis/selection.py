@@ -18,7 +18,9 @@ from diagnosis.needed import Needed, renewed, still_needed
 from diagnosis.plainer import plainest
 from diagnosis.point import extended
 from diagnosis.rival import rivals
+from diagnosis.room import is_full
 from diagnosis.search import Tell, Tried, searched
+from diagnosis.strain import is_strained
 from diagnosis.swap import swapped
 from diagnosis.threshold import EVERYWHERE, USUAL, Thresholds
 
@@ -94,6 +96,9 @@ def selected(
     layers = _near_best(known) or list(bench.layers())
     needed = 0.0
     while len(accepted) < MOST_EFFECTS:
+        if accepted and is_full(bench, model, units, thresholds.usual):
+            tell("free drifts find nothing more to do: no further effect is looked for")
+            break
         worth = (HOPE_BESIDE if accepted else HOPE) * max(needed, thresholds.usual)
         tried = searched(bench, model, units, layers, tell, worth)
         better, tried = looked_again(bench, model, units, tried, tell, worth)
@@ -109,13 +114,26 @@ def selected(
         needed = PART * gained
         tell(f"accepted {best.layer.id}: {gained:.0f} nats")
         before = [*accepted, best]
-        accepted, model = swapped(bench, best.estimate, before, rounds[0], units, tell)
+        together, there = swapped(bench, best.estimate, before, rounds[0], units, tell)
+        if len(together) == MOST_EFFECTS and _strains(together, there, accepted, model):
+            tell(f"{best.layer.id} pulls effects out of their ranges: it is not taken")
+            break
+        accepted, model = together, there
         rounds[0] = renewed(rounds[0], before, accepted)
         layers = list(bench.layers()) if len(accepted) == 1 else _likely(tried, NEXT)
     found = Needed(base, model, tuple(accepted))
     found = still_needed(bench, found, units, thresholds, tell)
     first = tuple(renewed(rounds[0], accepted, found.kept)) if rounds else ()
     return Selection(base, found.model, found.kept, first, rivals(first, found.kept))
+
+
+def _strains(
+    together: Sequence[Tried], there: Estimate, accepted: Sequence[Tried], model: Estimate
+) -> bool:
+    """Tell whether effects are pulled out of their ranges by the last of them: it imitates, the
+    others did not.
+    """
+    return is_strained(there, together) and not is_strained(model, accepted)
 
 
 def _enough(
