@@ -13,7 +13,8 @@ from dataclasses import dataclass
 SEED = 20270102
 """Of all cases that are concealed; a study with another one is another study. Of 20261225 thirteen
 were looked at, of 20261227 more than ninety, of 20261228, 20261230 and 20270101 all, of 20261231
-most, and the method was changed after that."""
+most, and the method was changed after that; of 20270103 and 20270104 all, with methods that are not
+this one."""
 PAIRS = 40
 """Cases with two effects, at places of their own."""
 
