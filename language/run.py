@@ -87,11 +87,7 @@ def run_motion(
     if first.linearise is not None:
         model = linearised(model, first, point, problems)
     inputs = _inputs(automaton, problems)
-    remembering = uses_memory(model)
-    if remembering:
-        label = "a run inside a tick follows what has no memory"
-        problems.error("run", remembering.span, label)
-        problems.stop_if_any()
+    _refuse_memory(model, problems)
     _refuse_actions(automaton, model, problems)
     field = Field(
         model,
@@ -115,15 +111,25 @@ def run_motion(
     made.update(_switches(field, problems))
     held = tuple(kept(automaton, model.states)[1])
     made.update({HOLD: held} if first.method in DIVIDING and held else {})
-    variables = (
+    variables = (*_own_variables(model), *field_variables(field), *motion_variables(field, method))
+    return Motion(made, variables, method.constants, dataclasses.replace(info, events=events))
+
+
+def _own_variables(model: Automaton) -> tuple[Variable, ...]:
+    return (
         *_modes(model),
         Variable("work.left", "real", "s", about="rest of the tick, or of its substep"),
         Variable("work.piece", "whole"),
         Variable("work.substep", "whole"),
-        *field_variables(field),
-        *motion_variables(field, method),
     )
-    return Motion(made, variables, method.constants, dataclasses.replace(info, events=events))
+
+
+def _refuse_memory(model: Automaton, problems: Problems) -> None:
+    remembering = uses_memory(model)
+    if remembering:
+        label = "a run inside a tick follows what has no memory"
+        problems.error("run", remembering.span, label)
+        problems.stop_if_any()
 
 
 def _require_one_way(runs: list[ModelRun], problems: Problems) -> None:
