@@ -10,27 +10,18 @@ import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from diagnosis.bench import Bench
-from diagnosis.estimate import Estimate, looked_like
 from diagnosis.evidence import inflation, inflations
-from diagnosis.layers import DRIFT, Layer, walks
-from diagnosis.level import units_of
+from diagnosis.layers import Layer, walks
 from diagnosis.location import places_of_freedom
 from diagnosis.naming import place_path
-from diagnosis.normal import solution
-from diagnosis.point import bounds_of, extended
+from diagnosis.room import drifts_gain
 from diagnosis.selection import Selection
-from diagnosis.tuning import tuned
-from language.effect import own_names
-from language.problem import SpecError
+from diagnosis.simulation import nrmse
 
 LEFT_PART = 0.12
 """Part of what was gained that drifts which are let free may gain beside it: forms differ."""
-FREE = 1000.0
-"""Units that such a drift may have."""
-
 MEMORY = 1.2
 """Innovations that count as one from which on those of a model remember."""
 HEARD = 1.6
@@ -41,16 +32,18 @@ memory, and a form that is not quite right leaves little of it."""
 TYPICAL_PART = 0.2
 """The same for the recordings, for which it is the median: a few may be far from the others."""
 
-STRAINED, STRAINED_PART = 60.0, 0.03
-"""Nats that accepted effects would gain beyond the ranges of their own parameters, and part of what
-they gained, from which on they are pulled out of these: what imitates another effect is."""
-
 LOUD, LOUD_PART = 3.0, 0.05
 """Innovations that count as one from which on those of a model are loud, and the typical part that
 an adequate one may then leave: a sensor's lag that imitates its delay leaves a tenth."""
 
 PILED = 0.5
 """Part of what an effect gained that a further one gains at the same place, where neither is it."""
+
+FAINT = 800.0
+"""Nats that effects gained together below which simulations have to show them as well."""
+HARDLY = 0.85
+"""Part of the misfit of simulation from which on they hardly show them: what foresees a little
+better from sample to sample and simulates no better is bent to what is there."""
 
 UNLIKELY = 20.0
 """Nats by which "none of these" then leads the best candidate."""
@@ -78,18 +71,9 @@ def freedom_gain(bench: Bench, selection: Selection) -> float:
 
 def _gain(bench: Bench, selection: Selection, drifts: Sequence[Layer]) -> float:
     """Return what some drifts gain [nats] that are let free; -inf where they do not go along."""
-    model, layers = selection.model, [tried.layer for tried in selection.accepted]
-    try:
-        candidate = bench.candidate(layers, drifts)
-    except SpecError:
-        return -np.inf
-    units = units_of(candidate, bench.series, model.values(0))
-    walking = {layer.place for layer in layers if walks(layer)}
-    most = {layer.named(DRIFT): FREE for layer in drifts if layer.place not in walking}
-    point = extended(candidate, model.candidate, model.point, {})
-    quiet = looked_like(candidate, bench.series, model.noises, point, model)
-    found = tuned(quiet, bench.series, units, most)
-    return (model.cost - found.cost) / inflation(model, bench.series)
+    held = {tried.layer.place for tried in selection.accepted if walks(tried.layer)}
+    gain = drifts_gain(bench, selection.model, drifts, held)
+    return gain / inflation(selection.model, bench.series)
 
 
 def remembers(bench: Bench, selection: Selection) -> bool:
@@ -126,38 +110,13 @@ def piles_up(selection: Selection) -> bool:
     return False
 
 
-def is_strained(selection: Selection) -> bool:
-    """Tell whether accepted effects are pulled out of the ranges of their own parameters."""
+def hardly_shows(bench: Bench, selection: Selection) -> bool:
+    """Tell whether effects that gained little leave simulations nearly as they were."""
     gained = sum(tried.evidence.train for tried in selection.accepted if tried.evidence)
-    return strain(selection) > max(STRAINED, STRAINED_PART * gained)
-
-
-def strain(selection: Selection) -> float:
-    """Return what accepted effects would gain [nats] if their own parameters that are at the end of
-    a range had none, as the normal equations foresee it.
-    """
-    model = selection.model
-    if model.normal is None:
-        return 0.0
-    brought = {
-        tried.layer.named(name)
-        for tried in selection.accepted
-        for name in own_names(tried.layer.effect.body)
-    }
-    low, high = bounds_of(model.candidate).T
-    at_end = (model.point.shared <= low) | (model.point.shared >= high)
-    is_brought = np.array([name in brought for name in model.candidate.names], dtype=bool)
-    within = ~model.normal.own & ~at_end
-    beyond = ~model.normal.own & (is_brought | ~at_end)
-    return _foreseen(model, beyond) - _foreseen(model, within)
-
-
-def _foreseen(model: Estimate, free: NDArray[np.bool_]) -> float:
-    """Return what a step of the free shared coordinates (parameters,) gains, without ranges."""
-    assert model.normal is not None
-    slope = model.normal.g.sum(axis=0)[free] + model.point.shared[free]
-    matrix = model.normal.a.sum(axis=0)[np.ix_(free, free)] + np.eye(int(free.sum()))
-    return 0.5 * float(slope @ solution(matrix, slope))
+    if gained > FAINT:
+        return False
+    before, after = (nrmse(one, bench.series) for one in (selection.base, selection.model))
+    return float(np.mean(after / np.maximum(before, 1e-12))) > HARDLY
 
 
 def refused(selection: Selection) -> Selection:

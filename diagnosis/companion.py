@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -12,6 +13,7 @@ from diagnosis.estimate import Estimate
 from language.document import Scalar, Table
 
 Reals = NDArray[np.float64]
+ORDER = re.compile(r"order \d+ of the angle of (\w+)")
 MOST = 3
 """Companions that are told."""
 ORDERS = (1, 2, 3, 4, 6, 8, 12, 24)
@@ -36,6 +38,12 @@ def along(bench: Bench, free: Estimate, drifts: Sequence[Reals]) -> tuple[tuple[
     found += [(name, _order(target, _ends(each, drifts))) for name, each in angles]
     found = [(name, value) for name, value in found if np.isfinite(value)]
     return tuple(sorted(found, key=lambda pair: -abs(pair[1]))[:MOST])
+
+
+def turning_with(name: str) -> str | None:
+    """Return the rate of whose angle a feature is an order; None for other features."""
+    found = ORDER.fullmatch(name)
+    return found[1] if found else None
 
 
 def _ends(parts: Sequence[Reals], drifts: Sequence[Reals]) -> list[Reals]:

@@ -82,6 +82,13 @@ def less(whole: Evidence, parts: Sequence[Evidence]) -> Evidence:
     )
 
 
+def more(known: Evidence, gained: Evidence) -> Evidence:
+    """Return a gain with what was gained after it."""
+    each = zip(known.each, gained.each, strict=True)
+    total = tuple(first + second for first, second in each)
+    return Evidence(known.train + gained.train, known.left_out + gained.left_out, total)
+
+
 def inflation(model: Estimate, series: Sequence[Series]) -> float:
     """Return how many innovations count as one: 1 + 2 sum of squared autocorrelations, at least 1.
 

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from diagnosis.adequacy import (
+    hardly_shows,
     is_inadequate,
-    is_strained,
     piles_up,
     refused,
     remembers_mostly,
@@ -28,7 +28,6 @@ from diagnosis.doubt import (
 )
 from diagnosis.estimate import Estimate
 from diagnosis.hidden import with_hidden
-from diagnosis.layers import has_parameters
 from diagnosis.level import units_of
 from diagnosis.location import located, unexplained
 from diagnosis.locus import Locus
@@ -38,6 +37,8 @@ from diagnosis.plainer import may_be_plainer, plainer_ones
 from diagnosis.search import Tell
 from diagnosis.selection import Selection, selected
 from diagnosis.series import Series
+from diagnosis.strain import is_strained
+from diagnosis.sureness import less_sure
 from diagnosis.threshold import EVERYWHERE, USUAL, Thresholds
 from diagnosis.verdict import Says
 from diagnosis.ways import Way, better_way, chosen
@@ -95,7 +96,8 @@ def _judged_by_observer(case: Case, raw: Bench, ways: Sequence[Way], tell: Tell)
         says, selection = "unknown", selected_formula(selection, formula)
     else:
         formula = None
-        is_other = says == "effect" and leaves_much(selection, over, most)
+        is_free = says == "effect" and not selection.has_hidden
+        is_other = is_free and leaves_much(selection, over, most)
         says, selection = _adequate(bench, selection, says, FREEDOM * most, units, is_other, tell)
     return Judgement(bench, base, selection, loci, says, thresholds, formula)
 
@@ -113,16 +115,18 @@ def _adequate(
 
     `is_other` where what they leave over at their places is known to be much.
     """
-    if not selection.accepted or any(not has_parameters(t.layer) for t in selection.accepted):
+    if not selection.accepted:
         return says, selection
     is_heard = says == "effect" and not is_still(selection, units)
-    why = (
-        "terms at their places explain much beside them" if is_other else _why_not(selection, bench)
-    )
-    if not why and is_heard and is_inadequate(bench, selection, needed):
-        why = "free drifts explain much beside them"
+    why = ""
+    if is_other:
+        why = "terms at their places explain much beside them"
+    elif not selection.has_hidden:  # which takes up anything at all
+        why = _why_not(selection, bench)
+        if not why and is_heard and is_inadequate(bench, selection, needed):
+            why = "free drifts explain much beside them"
     if not why:
-        return says, selection
+        return says, less_sure(bench, selection, tell) if says == "effect" else selection
     names = ", ".join(tried.layer.id for tried in selection.accepted)
     tell(f"taken back: {names}: {why}, so it is something else")
     return "unknown", refused(selection)
@@ -131,12 +135,14 @@ def _adequate(
 def _why_not(selection: Selection, bench: Bench) -> str:
     """Return why accepted effects are something else; nothing where they seem to be right."""
     first = selection.accepted[0]
-    if is_strained(selection):
+    if is_strained(selection.model, selection.accepted):
         return "they are pulled out of their ranges"
     if piles_up(selection):
         return "two at one place gain alike"
     if remembers_mostly(bench, selection):
         return "most recordings remember what is left"
+    if hardly_shows(bench, selection):
+        return "simulations hardly show them"
     is_known = any(plainer_ones(first, selection.first_round))
     if not is_known and may_be_plainer(selection.model, first.layer, bench.series):
         return "the first may as well be a plainer one"

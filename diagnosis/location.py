@@ -8,11 +8,12 @@ places lead.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
 from diagnosis.bench import Bench
+from diagnosis.companion import turning_with
 from diagnosis.estimate import Estimate
 from diagnosis.evidence import inflation
 from diagnosis.freedom import freed
@@ -22,6 +23,8 @@ from language.document import Table
 from language.known import entries_of
 from language.rewrite import reads
 
+RIPPLE = 0.6
+"""Correlation with an order of an angle from which on a drift ripples."""
 DISTURBED = 0.3
 """Part that counts of what the small drifts of the base take up as well."""
 
@@ -87,13 +90,23 @@ def likely(loci: Sequence[Locus], nearest: Iterable[str], bench: Bench) -> tuple
 
     A drift in a balance is as well one of the input that drives it. `nearest` are the paths of what
     comes nearest to what is missing and gains enough, best first: they tell which is more likely.
+    What turns with the angle of a balance is an input's: machines and discs ripple, losses do not.
     """
-    for path in nearest:
+    for path in (*nearest, *_rippling(bench, loci[:1])):
         section, _, place = path.partition(".")
         if loci and acting(bench, section, place) == loci[0].path:
             first = dataclasses.replace(loci[0], section=section, place=place)
             return tuple(loci) if path == loci[0].path else (first, *loci)
     return tuple(loci)
+
+
+def _rippling(bench: Bench, first: Sequence[Locus]) -> Iterator[str]:
+    """Yield the inputs that drive the first place where its drift turns with the angle there."""
+    for locus in first:
+        name, part = locus.along[0] if locus.along else ("", 0.0)
+        if turning_with(name) == locus.place and part > RIPPLE:
+            paths = (f"inputs.{one}" for one in bench.automaton.inputs)
+            yield from (path for path in paths if acting(bench, *path.split(".")) == locus.path)
 
 
 def acting(bench: Bench, section: str, place: str) -> str:

@@ -7,6 +7,7 @@ few nats more of what is left of any form.
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 
@@ -25,6 +26,8 @@ PLAINLY = 5.0
 """Nats that the recordings must tell an effect from what it is where it is a plainer one."""
 NEARLY = 0.7
 """Part of what it gained that the plainer one gains at least."""
+AHEAD = 4.0
+"""Nats of score by which the plainer one then leads: odds of seven to one."""
 
 
 def plainest(
@@ -62,6 +65,18 @@ def plainer_ones(best: Tried, tried: Sequence[Tried]) -> Iterator[Tried]:
             continue
         if _numbers(other) < _numbers(best) and other.evidence.train > NEARLY * best.evidence.train:
             yield other
+
+
+def led_by(first: Tried, tried: Sequence[Tried]) -> tuple[Tried, list[Tried]]:
+    """Return the candidate that others gave way to, and all with it, best first: it leads those at
+    its place.
+    """
+    path = place_path(first.layer)
+    others = [t for t in tried if t.layer.id != first.layer.id]
+    beside = [t.score for t in others if place_path(t.layer) == path]
+    behind = max(beside, default=-math.inf) + AHEAD - first.score
+    lead = dataclasses.replace(first, lead=max(0.0, behind))
+    return lead, sorted([lead, *others], key=lambda one: -one.score)
 
 
 def may_be_plainer(model: Estimate, layer: Layer, series: Sequence[Series]) -> bool:

@@ -36,12 +36,16 @@ Tell = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Tried:
-    """A candidate with what it promised; `estimate` and `evidence` where it was fitted."""
+    """A candidate with what it promised; `estimate` and `evidence` where it was fitted.
+
+    `lead` [nats] is what puts it before one that gave way to it.
+    """
 
     layer: Layer
     promised: float
     estimate: Estimate | None = field(default=None, repr=False)
     evidence: Evidence | None = None
+    lead: float = 0.0
 
     @property
     def score(self) -> float:
@@ -54,7 +58,7 @@ class Tried:
             return self.promised - 1e6
         names = [self.layer.named(name) for name in own_names(self.layer.effect.body)]
         brought = set(names) & set(self.estimate.candidate.names)
-        return self.evidence.train + self.evidence.least - PLAIN * len(brought)
+        return self.evidence.train + self.evidence.least + self.lead - PLAIN * len(brought)
 
 
 def searched(
@@ -70,13 +74,15 @@ def searched(
     possible = ((layer, _possible(bench, base, layer)) for layer in layers)
     known = [(layer, candidate) for layer, candidate in possible if candidate is not None]
     found: list[Tried] = []
-    fits = FITS_BESIDE if base.candidate.layers else FULL_FITS
-    for place, promise in enumerate(promises(bench, base, known, least)):
+    left = FITS_BESIDE if base.candidate.layers else FULL_FITS
+    for promise in promises(bench, base, known, least):
         gain, layer, start = promise.gain, promise.layer, promise.start
         best = max((one.evidence.train for one in found if one.evidence), default=0.0)
-        if start is None or place >= fits or gain < max(worth, HOPELESS * best):
+        is_one = left > 0 and gain >= max(worth, HOPELESS * best)
+        if start is None or not is_one:
             found.append(Tried(layer, gain))
             continue
+        left -= 1
         given = (base.noises, start.point, start.columns, start.gains, units, start.cost - WORTH)
         make = partial(_fitted, bench, base, start, units)
         estimate = bench.kept("fitted", start.candidate, given, make)

@@ -12,13 +12,15 @@ import numpy as np
 from diagnosis.bench import Bench
 from diagnosis.estimate import Estimate
 from diagnosis.evidence import Evidence, evidence
-from diagnosis.layers import Layer
+from diagnosis.layers import Layer, has_parameters
 from diagnosis.level import settled
 from diagnosis.needed import Needed, renewed, still_needed
-from diagnosis.plainer import plainest
+from diagnosis.plainer import led_by, plainest
 from diagnosis.point import extended
 from diagnosis.rival import rivals
+from diagnosis.room import is_full
 from diagnosis.search import Tell, Tried, searched
+from diagnosis.strain import is_strained, within_range
 from diagnosis.swap import swapped
 from diagnosis.threshold import EVERYWHERE, USUAL, Thresholds
 
@@ -64,6 +66,11 @@ class Selection:
     rivals: tuple[Tried, ...]
     other: float = 2.0 * USUAL - OTHER
 
+    @property
+    def has_hidden(self) -> bool:
+        """Whether an input that explains anything at all was accepted."""
+        return any(not has_parameters(tried.layer) for tried in self.accepted)
+
     def probabilities(self) -> dict[str, float]:
         """Return the probability of each fitted candidate of the first round, and of `other`."""
         totals = {t.layer.id: t.score for t in self.first_round if t.evidence}
@@ -94,6 +101,9 @@ def selected(
     layers = _near_best(known) or list(bench.layers())
     needed = 0.0
     while len(accepted) < MOST_EFFECTS:
+        if accepted and is_full(bench, model, units, thresholds.usual):
+            tell("free drifts find nothing more to do: no further effect is looked for")
+            break
         worth = (HOPE_BESIDE if accepted else HOPE) * max(needed, thresholds.usual)
         tried = searched(bench, model, units, layers, tell, worth)
         better, tried = looked_again(bench, model, units, tried, tell, worth)
@@ -101,21 +111,44 @@ def selected(
             model = better
             base = base if accepted else better
         rounds.append(tried)
-        best = _enough(tried, needed, thresholds, left_out)
-        best = plainest(bench, model, units, best, tried) if best else None
-        if best is None or best.estimate is None or best.evidence is None:
+        enough = _enough(tried, needed, thresholds, left_out)
+        if enough is None:
+            break
+        best, rounds[-1] = _led(bench, model, units, enough, tried)
+        if best.estimate is None or best.evidence is None:
             break
         gained = counted(best.evidence, left_out)
         needed = PART * gained
         tell(f"accepted {best.layer.id}: {gained:.0f} nats")
         before = [*accepted, best]
-        accepted, model = swapped(bench, best.estimate, before, rounds[0], units, tell)
+        together, there = swapped(bench, best.estimate, before, rounds[0], units, tell)
+        if len(together) == MOST_EFFECTS and _strains(together, there, accepted, model):
+            tell(f"{best.layer.id} pulls effects out of their ranges: it is not taken")
+            break
+        accepted, model = together, there
         rounds[0] = renewed(rounds[0], before, accepted)
         layers = list(bench.layers()) if len(accepted) == 1 else _likely(tried, NEXT)
     found = Needed(base, model, tuple(accepted))
     found = still_needed(bench, found, units, thresholds, tell)
     first = tuple(renewed(rounds[0], accepted, found.kept)) if rounds else ()
     return Selection(base, found.model, found.kept, first, rivals(first, found.kept))
+
+
+def _led(
+    bench: Bench, model: Estimate, units: Mapping[str, float], best: Tried, tried: list[Tried]
+) -> tuple[Tried, list[Tried]]:
+    """Return what the best candidate gives way to, or that one, and all with it, best first."""
+    first = within_range(plainest(bench, model, units, best, tried), tried)
+    return (best, tried) if first is best else led_by(first, tried)
+
+
+def _strains(
+    together: Sequence[Tried], there: Estimate, accepted: Sequence[Tried], model: Estimate
+) -> bool:
+    """Tell whether effects are pulled out of their ranges by the last of them: it imitates, the
+    others did not.
+    """
+    return is_strained(there, together) and not is_strained(model, accepted)
 
 
 def _enough(

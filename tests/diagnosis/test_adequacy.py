@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from diagnosis.adequacy import (
+    FAINT,
+    hardly_shows,
     is_inadequate,
-    is_strained,
     piles_up,
     refused,
     remembers,
     remembers_mostly,
-    strain,
 )
 from diagnosis.bench import Bench
 from diagnosis.estimate import Estimate
@@ -29,6 +29,7 @@ from diagnosis.search import Tried
 from diagnosis.selection import Selection
 from diagnosis.series import Series
 from diagnosis.stirring import resting, stirring
+from diagnosis.strain import is_strained, strain
 from tests.diagnosis.test_estimation import bench
 from tests.diagnosis.test_location import based, with_effect
 from tests.language.making import ROOT
@@ -161,5 +162,25 @@ def test_what_is_pulled_out_of_its_range_is_something_else(
     (tmp_path / "coulomb_friction.yaml").write_text(limited)
     own = dataclasses.replace(rubbing, effects=effects_in(tmp_path), _made={})
     selection = accepting(own, own, "coulomb_friction@w_em")
-    assert is_strained(selection) is strained
-    assert (strain(selection) < 1.0) is not strained
+    given = selection.model, selection.accepted
+    assert is_strained(*given) is strained
+    assert (strain(*given) < 1.0) is not strained
+
+
+@pytest.mark.parametrize(("part", "loud"), [(0.1, 0.95), (10.0, 0.95), (0.1, 0.5)])
+def test_what_gained_little_has_to_show_in_simulations(
+    bench: Bench, rubbing: Bench, part: float, loud: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A faint name falls where simulations stay nearly as they were; a strong one need not show."""
+    selection = accepting(bench, rubbing, "coulomb_friction@w_em")
+    (first,) = selection.accepted
+    assert first.evidence is not None
+    assert not hardly_shows(rubbing, selection)
+    known = dataclasses.replace(first.evidence, train=part * FAINT)
+    faint = dataclasses.replace(selection, accepted=(dataclasses.replace(first, evidence=known),))
+    sizes = {
+        id(selection.base): np.array([0.1, 0.2]),
+        id(selection.model): loud * np.array([0.1, 0.2]),
+    }
+    monkeypatch.setattr("diagnosis.adequacy.nrmse", lambda one, series: sizes[id(one)])
+    assert hardly_shows(rubbing, faint) is (part < 1.0 and loud > 0.85)

@@ -13,7 +13,7 @@ from diagnosis.freedom import freed
 from diagnosis.joined import BURN_IN
 from diagnosis.layers import drift, fitting
 from diagnosis.level import first_fit, recalibrated, units_of
-from diagnosis.location import DISTURBED, acting, led_by, located, unexplained
+from diagnosis.location import DISTURBED, acting, led_by, likely, located, unexplained
 from diagnosis.locus import Locus, locus_of
 from diagnosis.place_sentence import NOTHING, place_sentence
 from diagnosis.series import Series
@@ -83,3 +83,20 @@ def test_the_place_of_an_accepted_effect_leads_with_what_its_balance_shows(bench
 
 def test_nothing_is_told_where_no_place_gains(bench: Bench) -> None:
     assert place_sentence([Locus("flow", "w_em", -3.0, 0.1)], bench) == NOTHING
+
+
+@pytest.mark.parametrize(
+    ("feature", "correlation", "leads"),
+    [
+        ("order 2 of the angle of w_em", 0.8, "inputs.T_em"),
+        ("order 2 of the angle of w_em", 0.4, "flow.w_em"),
+        ("order 2 of the angle of w_w", 0.8, "flow.w_em"),
+        ("the sign of w_em", 0.8, "flow.w_em"),
+    ],
+)
+def test_what_ripples_with_an_angle_is_led_by_the_input_there(
+    bench: Bench, feature: str, correlation: float, leads: str
+) -> None:
+    first = Locus("flow", "w_em", 90.0, 2.0, along=((feature, correlation),))
+    rest = Locus("elements", "half_shaft", 10.0, 2.0)
+    assert likely((first, rest), (), bench)[0].path == leads

@@ -8,13 +8,14 @@ import pytest
 
 from diagnosis.bench import Bench
 from diagnosis.estimate import Estimate
-from diagnosis.evidence import evidence
+from diagnosis.evidence import Evidence, evidence
 from diagnosis.layers import fitting, shipped_effects
 from diagnosis.level import settled, units_of
-from diagnosis.plainer import may_be_plainer, plainer_ones, plainest
+from diagnosis.plainer import AHEAD, led_by, may_be_plainer, plainer_ones, plainest
 from diagnosis.search import Tried
 from tests.diagnosis.test_estimation import bench
 from tests.diagnosis.test_location import based, with_effect
+from tests.diagnosis.test_needed import layer
 
 __all__ = ["bench"]
 RISES, PLAIN = "stribeck_friction@w_em", "coulomb_friction@w_em"
@@ -62,3 +63,19 @@ def test_a_plainer_one_gains_nearly_as_much_at_the_same_place(bench: Bench) -> N
     away = dataclasses.replace(other.layer, place="w_w")
     assert not list(plainer_ones(best, [dataclasses.replace(other, layer=away)]))
     assert not list(plainer_ones(other, [best]))
+
+
+@pytest.mark.parametrize(("gain", "is_put_ahead"), [(900.0, True), (1100.0, False)])
+def test_what_others_gave_way_to_leads_them(bench: Bench, gain: float, is_put_ahead: bool) -> None:
+    own = rubbing(bench, 0.0)
+    both = tried(own, based(own), PLAIN)
+    known = Evidence(gain, gain, (gain,))
+    plain = dataclasses.replace(both, evidence=known)
+    rising = Tried(layer(own, RISES), 0.0, both.estimate, Evidence(1000.0, 1000.0, (1000.0,)))
+    far = dataclasses.replace(rising, layer=layer(own, "sensor_lag@w_s"))
+    lead, ranked = led_by(plain, [rising, plain, far])
+    assert {one.layer.id for one in ranked} == {PLAIN, RISES, far.layer.id}
+    assert lead.evidence is known, "what was measured stays"
+    assert (lead.lead > 0.0) is is_put_ahead
+    assert lead.score == pytest.approx(max(plain.score, rising.score + AHEAD))
+    assert ranked[0] is lead

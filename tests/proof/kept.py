@@ -147,7 +147,7 @@ def _fill(
 
 def _row(plan: Plan, cases: Cases, name: str, label: Label, number: int, seed: int) -> Row:
     own = tuple(effect["id"] for effect in label["effects"]) if plan.without_own else ()
-    result: Result = diagnosed(cases.folder / name, own)
+    result: Result = diagnosed(cases.folder / name, own, plan.is_compared)
     return Row(
         number=number, variant=plan.name, scenario=name, sample=0, replicate=0, seed=seed,
         values={"strength": plan.strength, "rate": float(label["rate_Hz"])},

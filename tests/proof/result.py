@@ -38,14 +38,19 @@ class Result:
     free_gain: str = ""
 
 
-def diagnosed(case: Path, without: tuple[str, ...] = ()) -> Result:
-    """Diagnose a copy of a case on one core, with some effects taken out of the library."""
+def diagnosed(case: Path, without: tuple[str, ...] = (), is_compared: bool = True) -> Result:
+    """Diagnose a copy of a case on one core, with some effects taken out of the library.
+
+    Simpler methods are asked where they are compared with.
+    """
     with tempfile.TemporaryDirectory(prefix="sealed") as folder:
         copy = Path(folder) / secrets.token_hex(8)
         shutil.copytree(case, copy)
         found = Path(folder) / "found.json"
         library = [str(_library(Path(folder) / "effects", without))] if without else []
-        command = [sys.executable, "-m", "tests.proof.sealed", str(copy), str(found), *library]
+        alone = [] if is_compared else ["--alone"]
+        given = [str(copy), str(found), *library, *alone]
+        command = [sys.executable, "-m", "tests.proof.sealed", *given]
         try:
             done = subprocess.run(
                 command,

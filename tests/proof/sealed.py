@@ -1,6 +1,6 @@
 """Sealed: one case diagnosed under a guard that ends the process if it looks at what is concealed.
 
-python -m tests.proof.sealed CASE RESULT [EFFECTS]
+python -m tests.proof.sealed CASE RESULT [EFFECTS] [--alone]
 """
 
 from __future__ import annotations
@@ -25,29 +25,33 @@ COMPILERS = ("cc", "gcc", "clang")
 CODE = re.compile(r"\.pyc?(\.\d+)?$")
 """Ends of code, also of what Python writes before it renames it."""
 SPEC = "blind_driveline"
+ALONE = "--alone"
 WHO = (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
 
 
 def main() -> None:
-    """Diagnose a folder with train/ and held_out/; write the verdict and what it took."""
-    case, result = Path(sys.argv[1]), Path(sys.argv[2])
-    effects = sys.argv[3] if len(sys.argv) > 3 else None
+    """Diagnose a folder with train/ and held_out/; write the verdict and what it took.
+
+    Simpler methods are asked as well, unless it is diagnosed alone.
+    """
+    case, result, *effects = [word for word in sys.argv[1:] if word != ALONE]
+    library = effects[0] if effects else None
     sys.addaudithook(guard(_end))
     import modewright
     from diagnosis.dossier import verdict_json
 
     begun = time.monotonic()
-    train, held_out = (sorted((case / part).glob("*.csv")) for part in ("train", "held_out"))
-    found = modewright.diagnose(SPEC, train, held_out, effects=effects, thresholds="usual")
+    train, held_out = (sorted(Path(case, part).glob("*.csv")) for part in ("train", "held_out"))
+    found = modewright.diagnose(SPEC, train, held_out, effects=library, thresholds="usual")
     spent = sum(use.ru_utime + use.ru_stime for use in map(resource.getrusage, WHO))
     took = {"cpu_s": spent, "wall_s": time.monotonic() - begun}
     simpler = {}
-    if found.diagnosis is not None:
+    if found.diagnosis is not None and ALONE not in sys.argv:
         from tests.proof.baseline import baselines
 
         simpler = baselines(found.diagnosis)
     kept = {"verdict": verdict_json(found.verdict), **took, "baselines": simpler}
-    result.write_text(json.dumps(kept))
+    Path(result).write_text(json.dumps(kept))
 
 
 def guard(end: Callable[[str], None]) -> Callable[[str, tuple[Any, ...]], None]:

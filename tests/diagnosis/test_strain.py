@@ -1,0 +1,74 @@
+"""What is at a limit that was set to it gives way to what gains nearly as much at its place."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from diagnosis.bench import Bench
+from diagnosis.estimate import Estimate
+from diagnosis.evidence import Evidence
+from diagnosis.point import Point, bounds_of
+from diagnosis.search import Tried
+from diagnosis.strain import is_at_limit, within_range
+from tests.diagnosis.test_adequacy import accepting, rubbing
+from tests.diagnosis.test_estimation import bench
+from tests.diagnosis.test_needed import FRICTION, layer
+
+__all__ = ["bench", "rubbing"]
+LAG, DELAY = "sensor_lag@w_s", "sensor_delay@w_s"
+
+
+def at_end(bench: Bench, model: Estimate, effect: str, parameter: str, end: int) -> Estimate:
+    """Return a model with an effect, a parameter of which is at an end of its range (0 or 1)."""
+    candidate = bench.candidate([layer(bench, effect)])
+    shared = np.zeros(len(candidate.names))
+    k = list(candidate.names).index(parameter)
+    shared[k] = bounds_of(candidate)[k, end]
+    return dataclasses.replace(model, candidate=candidate, point=Point(shared, shared[None]))
+
+
+@pytest.mark.parametrize(
+    ("effect", "parameter", "end", "is_set"),
+    [
+        (FRICTION, "T_c_w_em", 0, False),
+        (FRICTION, "T_c_w_em", 1, True),
+        (FRICTION, "J_em", 1, False),
+        (LAG, "part_w_s", 0, False),
+        (LAG, "part_w_s", 1, False),
+        (LAG, "tau_w_s", 1, True),
+    ],
+)
+def test_a_limit_is_one_that_was_set_to_a_parameter_of_the_effect(
+    bench: Bench, rubbing: Bench, effect: str, parameter: str, end: int, is_set: bool
+) -> None:
+    model = accepting(bench, rubbing, FRICTION).model
+    limited = at_end(bench, model, effect, parameter, end)
+    assert is_at_limit(limited, layer(bench, effect)) is is_set
+    assert not is_at_limit(None, layer(bench, effect))
+
+
+@pytest.mark.parametrize(
+    ("gain", "end", "beside", "named"),
+    [
+        (950.0, 1, DELAY, DELAY),
+        (850.0, 1, DELAY, LAG),
+        (950.0, 0, DELAY, LAG),
+        (950.0, 1, FRICTION, LAG),
+    ],
+)
+def test_what_is_at_a_limit_gives_way_to_what_gains_nearly_as_much(
+    bench: Bench, rubbing: Bench, gain: float, end: int, beside: str, named: str
+) -> None:
+    model = accepting(bench, rubbing, FRICTION).model
+    parameter = "tau_w_s" if end else "part_w_s"
+    limited = at_end(bench, model, LAG, parameter, end)
+    best = Tried(layer(bench, LAG), 0.0, limited, Evidence(1000.0, 1000.0, (1000.0,)))
+    other = Tried(layer(bench, beside), 0.0, model, Evidence(gain, gain, (gain,)))
+    found = within_range(best, [best, other])
+    assert found.layer.id == named
+    assert (found is best) is (named == LAG)
+    blind = dataclasses.replace(best, evidence=None)
+    assert within_range(blind, [other]) is blind
