@@ -25,6 +25,7 @@ from codegen.proofs.effect import (
     called_by,
     contract_text,
     places_of,
+    seen_of,
     with_effects,
     with_turns,
 )
@@ -135,7 +136,8 @@ class _Mode:
         *parts, whole = outlined_but(function, (MODE, FIRED)) if in_parts else [function]
         pointers = list(required(function.parameters, is_inside(text)))
         told = [self._part(part, pointers) for part in parts]
-        lines = [*pointers, *self._required(), assigned(self._places), *self._ensured()]
+        seen = assigned(seen_of(function, self._places))
+        lines = [*pointers, *self._required(), seen, *self._ensured()]
         told.append(contract_text(lines) + with_turns(whole, self._places))
         text = text[: function.start] + "\n".join(told) + text[function.end :]
         return text, [part.name for part in (*parts, whole)]

@@ -51,10 +51,17 @@ def with_effects(program: Program, text: str, called: Iterable[str]) -> str:
     inside = is_inside(text)
     for name in called:
         function, places = function_of(text, name), places_of(program, name)
-        lines = [*required(function.parameters, inside), assigned(places), "exits \\false;"]
+        seen = assigned(seen_of(function, places))
+        lines = [*required(function.parameters, inside), seen, "exits \\false;"]
         told = contract_text(lines) + with_turns(function, places)
         text = text[: function.start] + told + text[function.end :]
     return text
+
+
+def seen_of(function: Function, places: Iterable[str]) -> list[str]:
+    """Return the places that a caller sees: values of a step may be the function's own."""
+    has_step = re.search(r"\bwork\b", function.parameters) is not None
+    return [place for place in places if place != STEP or has_step]
 
 
 def assigned(places: Iterable[str]) -> str:

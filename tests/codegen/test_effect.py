@@ -50,6 +50,18 @@ def test_a_contract_names_what_is_written_and_nothing_else() -> None:
     assert "self->state.w_w" in back and not re.search(r"\blow\b", back), "it lives inside"
 
 
+def test_values_of_a_step_that_live_in_a_function_are_not_seen_by_its_caller(
+    tmp_path: Path,
+) -> None:
+    made = program("estimator_simple")
+    written_of(made, c_files(made, by_amount=False), tmp_path)
+    text = (tmp_path / "estimator_simple.c").read_text()
+    function = function_of(text, "jump_gap")
+    assert "work" not in function.parameters and "Work scratch;" in function.body
+    assert "self->state.theta_b" in contract_of(text, "jump_gap")
+    assert "*work" not in contract_of(text, "jump_gap")
+
+
 def test_an_array_is_written_from_end_to_end() -> None:
     made, _ = printed()
     assert "self->past_w_w[0 .. 2]" in places_of(made, "keep")

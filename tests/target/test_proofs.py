@@ -14,8 +14,9 @@ from codegen.proofs.proof import Proof
 from codegen.proofs.sanitised import sanitised
 from codegen.proofs.stack import stack
 from codegen.proofs.strict import strict
+from codegen.proofs.wp import KERNEL
 from codegen.source import c_files
-from codegen.tool import PACKAGES
+from codegen.tool import PACKAGES, told
 from language.load import load_automaton
 from language.program import Program
 from language.project import Project
@@ -75,6 +76,19 @@ def test_what_guards_may_do_is_proven_of_each_mode() -> None:
     (found,) = prove("contactor", checks=("contract",))
     assert found.findings == ()
     assert re.fullmatch(r"(\d+) of \1 goals; 2 modes", found.about)
+
+
+@pytest.mark.parametrize(
+    "name", ["estimator", "estimator_float32", "estimator_simple", "estimator_written", "hko"]
+)
+def test_the_contracts_of_shipped_automata_can_be_read(name: str, tmp_path: Path) -> None:
+    """To prove them takes minutes; a contract that names what is not there proves nothing."""
+    made = program(name)
+    functions, _ = written_of(made, c_files(made, by_amount=False), tmp_path)[0]
+    done = told(["frama-c", *KERNEL, f"{name}.c"], tmp_path)
+    assert done.returncode == 0, done.stdout
+    text = (tmp_path / f"{name}.c").read_text()
+    assert all(f" {function}(" in text for function in functions)
 
 
 def test_what_is_plain_in_parts_has_no_contract() -> None:
