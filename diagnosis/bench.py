@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from fractions import Fraction
 
@@ -77,6 +79,11 @@ class Bench:
             return self.candidate(layers)
         except SpecError:
             return None
+
+    def all_possible(self, many: Sequence[Sequence[Layer]]) -> list[Candidate | None]:
+        """Return `possible` for each; those that are new are compiled side by side."""
+        with ThreadPoolExecutor(os.cpu_count()) as compilers:
+            return list(compilers.map(self.possible, many))
 
     def _can_tell(self, layer: Layer) -> bool:
         """An input must move, an output be compared, a balance be one of forces."""

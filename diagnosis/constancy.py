@@ -13,13 +13,21 @@ import numpy as np
 from diagnosis.estimate import Estimate
 from diagnosis.evidence import inflation
 from diagnosis.layers import Layer
+from diagnosis.naming import brought_by
 from diagnosis.search import Tried
 from diagnosis.series import Series
-from language.effect import own_names
 
 VARIED, VARIED_PART = 20.0, 0.012
 """Nats that values of its own in each recording would gain for an effect, and part of what it
 gained, from which on its parameters vary."""
+OTHER_PART = 0.2
+"""The same part from which on they are no constants of a machine: right ones have 0.15 at most."""
+
+
+def differs(model: Estimate, tried: Tried, series: Sequence[Series]) -> bool:
+    """Tell whether they differ so much that the effect is another one."""
+    gained = tried.evidence.train if tried.evidence else 0.0
+    return variation(model, tried.layer, series) > max(VARIED, OTHER_PART * gained)
 
 
 def varies(model: Estimate, tried: Tried, series: Sequence[Series]) -> bool:
@@ -36,7 +44,7 @@ def variation(model: Estimate, layer: Layer, series: Sequence[Series]) -> float:
     """
     if model.normal is None:
         return 0.0
-    brought = {layer.named(name) for name in own_names(layer.effect.body)}
+    brought = brought_by(layer)
     is_brought = np.array([name in brought for name in model.candidate.names], dtype=bool)
     own = np.flatnonzero(is_brought & ~model.normal.own)
     shrink, found = 1.0 / inflation(model, series), 0.0

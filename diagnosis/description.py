@@ -26,7 +26,7 @@ PLACES = 2
 FITTED = 3
 """Formulas that are fitted, the best of the regressions."""
 MOST_TERMS = 2
-NEARLY = 0.85
+LEADING_PART = 0.85
 """A formula at a place that asked for more of a freedom has to gain only this part."""
 FURTHER = 45.0
 """Nats that a second term has to gain."""
@@ -68,7 +68,7 @@ def described(
         if is_before:
             starts = [best.estimate.values(0)]
             again = _described(bench, base, one.formula, one.locus, starts, units)
-            if again is not None and _total(again) > NEARLY * _total(best):
+            if again is not None and _total(again) > LEADING_PART * _total(best):
                 tell(_line(again))
                 best = again
     return best

@@ -9,10 +9,10 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 
+from diagnosis.actor import acting
 from diagnosis.bench import Bench
 from diagnosis.description import Description
 from diagnosis.excess import excess_at
-from diagnosis.location import acting
 from diagnosis.naming import place_path
 from diagnosis.regression import ranking
 from diagnosis.search import Tried

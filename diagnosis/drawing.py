@@ -10,9 +10,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from diagnosis import wording
+from diagnosis.actor import acting
 from diagnosis.digits import per_cent, significant
 from diagnosis.dossier import Dossier
-from diagnosis.location import acting
 from diagnosis.locus_picture import locus_picture
 from diagnosis.missing_picture import missing_picture
 from diagnosis.place_sentence import PLACES

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.actor import acting
 from diagnosis.adequacy import remembers
 from diagnosis.bench import Bench
 from diagnosis.estimate import Estimate, looked_at, with_normal
@@ -21,7 +22,6 @@ from diagnosis.evidence import Evidence, evidence, inflation
 from diagnosis.freedom import ALL_LEVELS, SMALL_LEVEL, freed, scanned, with_levels
 from diagnosis.layers import Layer, fitting
 from diagnosis.level import units_of
-from diagnosis.location import acting
 from diagnosis.locus import Locus, Unknown, over_time, told
 from diagnosis.naming import place_path
 from diagnosis.noise import MAD

@@ -17,6 +17,7 @@ from diagnosis.alone import LEFT_OUT, SIMULATED, alone, forgets
 from diagnosis.bench import Bench
 from diagnosis.bootstrap import bootstrapped, kept_thresholds
 from diagnosis.case import Case
+from diagnosis.constancy import differs
 from diagnosis.description import Description, described
 from diagnosis.doubt import (
     explains_more,
@@ -37,7 +38,7 @@ from diagnosis.plainer import may_be_plainer, plainer_ones
 from diagnosis.search import Tell
 from diagnosis.selection import Selection, selected
 from diagnosis.series import Series
-from diagnosis.strain import is_strained
+from diagnosis.strain import is_at_limit, is_strained
 from diagnosis.sureness import less_sure
 from diagnosis.threshold import EVERYWHERE, USUAL, Thresholds
 from diagnosis.verdict import Says
@@ -137,6 +138,10 @@ def _why_not(selection: Selection, bench: Bench) -> str:
     first = selection.accepted[0]
     if is_strained(selection.model, selection.accepted):
         return "they are pulled out of their ranges"
+    if is_at_limit(selection.model, first.layer):
+        return "the first is at the end of a range"
+    if differs(selection.model, first, bench.series):
+        return "the parameters of the first differ from recording to recording"
     if piles_up(selection):
         return "two at one place gain alike"
     if remembers_mostly(bench, selection):

@@ -8,23 +8,19 @@ places lead.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from diagnosis.actor import acting, actors, rests
 from diagnosis.bench import Bench
-from diagnosis.companion import turning_with
 from diagnosis.estimate import Estimate
 from diagnosis.evidence import inflation
 from diagnosis.freedom import freed
 from diagnosis.layers import Layer, drift
 from diagnosis.locus import Locus, locus_of, over_time
 from language.document import Table
-from language.known import entries_of
-from language.rewrite import reads
 
-RIPPLE = 0.6
-"""Correlation with an order of an angle from which on a drift ripples."""
 DISTURBED = 0.3
 """Part that counts of what the small drifts of the base take up as well."""
 
@@ -88,34 +84,15 @@ def led_by(loci: Sequence[Locus], paths: Sequence[str], bench: Bench) -> tuple[L
 def likely(loci: Sequence[Locus], nearest: Iterable[str], bench: Bench) -> tuple[Locus, ...]:
     """Return places of something unknown, led by an input or a body that acts at the first one.
 
-    A drift in a balance is as well one of the input that drives it. `nearest` are the paths of what
-    comes nearest to what is missing and gains enough, best first: they tell which is more likely.
-    What turns with the angle of a balance is an input's: machines and discs ripple, losses do not.
+    What it does over time tells which; else `nearest`, the paths of what comes nearest to what is
+    missing and gains enough, best first.
     """
-    for path in (*nearest, *_rippling(bench, loci[:1])):
+    if not loci:
+        return ()
+    known = (path for path in nearest if not rests(bench, loci[0], path))
+    for path in (*actors(bench, loci[0]), *known):
         section, _, place = path.partition(".")
-        if loci and acting(bench, section, place) == loci[0].path:
+        if acting(bench, section, place) == loci[0].path:
             first = dataclasses.replace(loci[0], section=section, place=place)
             return tuple(loci) if path == loci[0].path else (first, *loci)
     return tuple(loci)
-
-
-def _rippling(bench: Bench, first: Sequence[Locus]) -> Iterator[str]:
-    """Yield the inputs that drive the first place where its drift turns with the angle there."""
-    for locus in first:
-        name, part = locus.along[0] if locus.along else ("", 0.0)
-        if turning_with(name) == locus.place and part > RIPPLE:
-            paths = (f"inputs.{one}" for one in bench.automaton.inputs)
-            yield from (path for path in paths if acting(bench, *path.split(".")) == locus.path)
-
-
-def acting(bench: Bench, section: str, place: str) -> str:
-    """Return the balance in which what is at an input or at an inertia acts."""
-    element = bench.automaton.elements.get(place)
-    if section == "elements" and element is not None and "speed" in element.parts:
-        return f"flow.{'.'.join(element.parts['speed'].reads)}"
-    balances = {layer.place for layer in bench.drifts}
-    for state, scalar in entries_of(bench.document.root, "flow"):
-        if section == "inputs" and state in balances and place in reads(scalar.text):
-            return f"flow.{state}"
-    return f"{section}.{place}"

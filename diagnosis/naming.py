@@ -38,10 +38,15 @@ def place_path(layer: Layer) -> str:
     return f"{SECTIONS[layer.effect.fits[0].kind]}.{layer.place}"
 
 
+def brought_by(layer: Layer) -> dict[str, str]:
+    """Return the names that an effect brings into a model, with those that it has for them."""
+    return {layer.named(name): name for name in own_names(layer.effect.body)}
+
+
 def named(layer: Layer, model: Estimate, automaton: Automaton) -> Named:
     """Return an effect of a model with its parameters, named as the effect names them."""
     quantities = quantities_of(model)
-    brought = {layer.named(name): name for name in own_names(layer.effect.body)}
+    brought = brought_by(layer)
     own = {
         brought[name]: quantity
         for name, quantity in quantities.items()

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from diagnosis.actor import acting
 from diagnosis.bench import Bench
-from diagnosis.location import acting
 from diagnosis.locus import Locus
 from diagnosis.scale import unit_of
 

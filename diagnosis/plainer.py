@@ -16,15 +16,14 @@ from diagnosis.estimate import Estimate
 from diagnosis.evidence import evidence, inflation
 from diagnosis.layers import Layer
 from diagnosis.level import settled
-from diagnosis.naming import covariance_of, place_path
+from diagnosis.naming import brought_by, covariance_of, place_path
 from diagnosis.point import extended
 from diagnosis.search import Tried
 from diagnosis.series import Series
-from language.effect import own_names
 
 PLAINLY = 5.0
 """Nats that the recordings must tell an effect from what it is where it is a plainer one."""
-NEARLY = 0.7
+PLAINER_PART = 0.7
 """Part of what it gained that the plainer one gains at least."""
 AHEAD = 4.0
 """Nats of score by which the plainer one then leads: odds of seven to one."""
@@ -63,7 +62,8 @@ def plainer_ones(best: Tried, tried: Sequence[Tried]) -> Iterator[Tried]:
     for other in tried:
         if other.evidence is None or place_path(other.layer) != place_path(best.layer):
             continue
-        if _numbers(other) < _numbers(best) and other.evidence.train > NEARLY * best.evidence.train:
+        least = PLAINER_PART * best.evidence.train
+        if _numbers(other) < _numbers(best) and other.evidence.train > least:
             yield other
 
 
@@ -95,7 +95,7 @@ def may_be_plainer(model: Estimate, layer: Layer, series: Sequence[Series]) -> b
 
 def _plain_ones(model: Estimate, layer: Layer) -> dict[int, float]:
     """Return the coordinates at which an effect is a plainer one, by their places."""
-    brought = {layer.named(name) for name in own_names(layer.effect.body)}
+    brought = brought_by(layer)
     return {
         k: one.coordinate(one.plain)
         for k, one in enumerate(model.candidate.uncertain)
@@ -104,4 +104,4 @@ def _plain_ones(model: Estimate, layer: Layer) -> dict[int, float]:
 
 
 def _numbers(tried: Tried) -> int:
-    return len(list(own_names(tried.layer.effect.body)))
+    return len(brought_by(tried.layer))

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
 
 from diagnosis.bench import Bench
-from diagnosis.candidate import Candidate
 from diagnosis.estimate import Estimate
 from diagnosis.evidence import Evidence, evidence, inflation
 from diagnosis.layers import Layer
 from diagnosis.level import fitted
+from diagnosis.naming import brought_by
 from diagnosis.point import point_of
 from diagnosis.screening import HINT, promises
-from language.effect import own_names
 
 FULL_FITS, FITS_BESIDE = 7, 4
 """Candidates that are fitted to the end, best foreseen first: alone, and beside what was accepted,
@@ -56,8 +55,7 @@ class Tried:
         """
         if self.evidence is None or self.estimate is None:
             return self.promised - 1e6
-        names = [self.layer.named(name) for name in own_names(self.layer.effect.body)]
-        brought = set(names) & set(self.estimate.candidate.names)
+        brought = brought_by(self.layer).keys() & set(self.estimate.candidate.names)
         return self.evidence.train + self.evidence.least + self.lead - PLAIN * len(brought)
 
 
@@ -71,8 +69,10 @@ def searched(
 ) -> list[Tried]:
     """Return the candidates that could be laid on the base's layers, best first."""
     least = max(HINT, HINT_PART * worth)
-    possible = ((layer, _possible(bench, base, layer)) for layer in layers)
-    known = [(layer, candidate) for layer, candidate in possible if candidate is not None]
+    there = {layer.id for layer in base.candidate.layers}
+    new = [layer for layer in layers if layer.id not in there]
+    made = bench.all_possible([[*base.candidate.layers, layer] for layer in new])
+    known = [(layer, one) for layer, one in zip(new, made, strict=True) if one is not None]
     found: list[Tried] = []
     left = FITS_BESIDE if base.candidate.layers else FULL_FITS
     for promise in promises(bench, base, known, least):
@@ -111,10 +111,3 @@ def _fitted(bench: Bench, base: Estimate, start: Estimate, units: Mapping[str, f
     point.shared[own], point.own[:, own] = start.point.shared[own], start.point.own[:, own]
     again = fitted(candidate, *given, point, units, first.cost)
     return min(first, again, key=lambda one: one.cost)
-
-
-def _possible(bench: Bench, base: Estimate, layer: Layer) -> Candidate | None:
-    layers: Sequence[Layer] = base.candidate.layers
-    if any(layer.id == known.id for known in layers):
-        return None
-    return bench.possible([*layers, layer])

@@ -105,11 +105,8 @@ def selected(
             tell("free drifts find nothing more to do: no further effect is looked for")
             break
         worth = (HOPE_BESIDE if accepted else HOPE) * max(needed, thresholds.usual)
-        tried = searched(bench, model, units, layers, tell, worth)
-        better, tried = looked_again(bench, model, units, tried, tell, worth)
-        if better is not None:
-            model = better
-            base = base if accepted else better
+        model, tried = _looked_for(bench, model, units, layers, worth, tell)
+        base = base if accepted else model
         rounds.append(tried)
         enough = _enough(tried, needed, thresholds, left_out)
         if enough is None:
@@ -132,6 +129,20 @@ def selected(
     found = still_needed(bench, found, units, thresholds, tell)
     first = tuple(renewed(rounds[0], accepted, found.kept)) if rounds else ()
     return Selection(base, found.model, found.kept, first, rivals(first, found.kept))
+
+
+def _looked_for(
+    bench: Bench,
+    model: Estimate,
+    units: Mapping[str, float],
+    layers: Sequence[Layer],
+    worth: float,
+    tell: Tell,
+) -> tuple[Estimate, list[Tried]]:
+    """Return candidates beside a model, best first, with it or a better fit of it."""
+    tried = searched(bench, model, units, layers, tell, worth)
+    better, tried = looked_again(bench, model, units, tried, tell, worth)
+    return (model if better is None else better), tried
 
 
 def _led(

@@ -11,13 +11,13 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from diagnosis.layers import Layer, automaton as laid_automaton
+from diagnosis.naming import brought_by
 from diagnosis.uncertain import uncertain_of
 from engine.band import PALETTE
 from engine.plot import Picture
 from engine.simulate import simulate
 from engine.trajectory import Trajectory
 from language.document import Document
-from language.effect import own_names
 from language.finding import document_of
 from language.known import unit_text
 from language.model import Automaton
@@ -74,9 +74,9 @@ def _usual_step(base: Automaton, layer: Layer) -> tuple[str, str]:
 
 def _visible(whole: Automaton, layer: Layer) -> tuple[Automaton, dict[str, str]]:
     """Return an automaton in which the effect's parameters are away from where it vanishes."""
-    brought = [layer.named(name) for name in own_names(layer.effect.body)]
+    brought = brought_by(layer)
     parameters, values = dict(whole.parameters), dict[str, str]()
-    for one in uncertain_of(whole, brought):
+    for one in uncertain_of(whole, list(brought)):
         if one.name in brought:
             neutral = parameters[one.name].fitting.neutral
             is_neutral = neutral == parameters[one.name].value

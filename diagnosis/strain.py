@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 
 from diagnosis.estimate import Estimate
 from diagnosis.layers import Layer
-from diagnosis.naming import place_path
+from diagnosis.naming import brought_by, place_path
 from diagnosis.normal import solution
 from diagnosis.point import bounds_of
 from diagnosis.rival import NEARLY
 from diagnosis.search import Tried
-from language.effect import own_names
 
 STRAINED, STRAINED_PART = 60.0, 0.03
 """Nats that accepted effects would gain beyond the ranges of their own parameters, and part of what
@@ -36,9 +35,7 @@ def strain(model: Estimate, accepted: Sequence[Tried]) -> float:
     """
     if model.normal is None:
         return 0.0
-    brought = {
-        tried.layer.named(name) for tried in accepted for name in own_names(tried.layer.effect.body)
-    }
+    brought = {name for tried in accepted for name in brought_by(tried.layer)}
     low, high = bounds_of(model.candidate).T
     at_end = (model.point.shared <= low) | (model.point.shared >= high)
     is_brought = np.array([name in brought for name in model.candidate.names], dtype=bool)
@@ -65,7 +62,7 @@ def is_at_limit(model: Estimate | None, layer: Layer) -> bool:
     """
     if model is None:
         return False
-    brought = {layer.named(name) for name in own_names(layer.effect.body)}
+    brought = brought_by(layer)
     return any(
         (z <= low and one.low != 0.0) or (z >= high and (one.high, one.unit) != (1.0, "1"))
         for one, z, (low, high) in zip(

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
 
 from diagnosis.bench import Bench
 from diagnosis.constancy import varies
 from diagnosis.search import Tell
 from diagnosis.selection import Selection
+from diagnosis.series import Series
 
 UNSURE = 0.88
 """Probability that a first name then has at most: of 170 that were unsure in a study, 158 were
@@ -23,7 +25,7 @@ def less_sure(bench: Bench, selection: Selection, tell: Tell) -> Selection:
     does what imitates an effect that the library lacks.
     """
     scores = [tried.score for tried in selection.first_round if tried.evidence]
-    why = _why(bench, selection)
+    why = _why(bench.series, selection)
     if not scores or not why:
         return selection
     tell(f"less sure: {selection.accepted[0].layer.id}: {why}")
@@ -31,9 +33,9 @@ def less_sure(bench: Bench, selection: Selection, tell: Tell) -> Selection:
     return dataclasses.replace(selection, other=max(selection.other, max(scores) - apart))
 
 
-def _why(bench: Bench, selection: Selection) -> str:
+def _why(series: Sequence[Series], selection: Selection) -> str:
     """Return why the first effect may be an imitation; nothing where it seems not to be."""
-    if varies(selection.model, selection.accepted[0], bench.series):
+    if varies(selection.model, selection.accepted[0], series):
         return "its parameters are not the same in each recording"
     if len(selection.accepted) > 1:
         return "it needs others beside it"

@@ -16,14 +16,14 @@ from diagnosis.layers import Layer
 from diagnosis.level import fitted
 from diagnosis.plainer import may_be_plainer
 from diagnosis.point import Point, extended
-from diagnosis.rival import NEARLY as NEARLY_ALIKE
+from diagnosis.rival import NEARLY
 from diagnosis.screening import starts_of
 from diagnosis.search import Tell, Tried
 from diagnosis.strain import is_at_limit
 
 CLEARLY = 3.0
 """Nats by which the model must be better with the other effect."""
-NEARLY = 0.5
+RIVAL_PART = 0.5
 """Part of what an accepted effect gains that another one gained alone, if it may stand for it."""
 
 
@@ -66,7 +66,7 @@ def _needed(old: Tried, model: Estimate, layer: Layer) -> float:
     the rival is at a limit, more than what keeps nearly as good ones apart.
     """
     gained = old.evidence.train if old.evidence else 0.0
-    return max(CLEARLY, (1.0 - NEARLY_ALIKE) * gained) if is_at_limit(model, layer) else CLEARLY
+    return max(CLEARLY, (1.0 - NEARLY) * gained) if is_at_limit(model, layer) else CLEARLY
 
 
 def _may_stand_for(rival: Tried, old: Tried) -> bool:
@@ -77,7 +77,7 @@ def _may_stand_for(rival: Tried, old: Tried) -> bool:
         return False
     if rival.evidence is None:
         return rival.layer.effect.name in old.layer.effect.confused_with
-    return rival.evidence.train > NEARLY * old.evidence.train
+    return rival.evidence.train > RIVAL_PART * old.evidence.train
 
 
 def _credited(rival: Tried, old: Tried, model: Estimate, gained: Evidence) -> Tried:

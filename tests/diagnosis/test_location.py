@@ -6,6 +6,7 @@ import dataclasses
 
 import pytest
 
+from diagnosis.actor import acting
 from diagnosis.bench import Bench
 from diagnosis.estimate import Estimate
 from diagnosis.evidence import inflation
@@ -13,7 +14,7 @@ from diagnosis.freedom import freed
 from diagnosis.joined import BURN_IN
 from diagnosis.layers import drift, fitting
 from diagnosis.level import first_fit, recalibrated, units_of
-from diagnosis.location import DISTURBED, acting, led_by, likely, located, unexplained
+from diagnosis.location import DISTURBED, led_by, likely, located, unexplained
 from diagnosis.locus import Locus, locus_of
 from diagnosis.place_sentence import NOTHING, place_sentence
 from diagnosis.series import Series

@@ -10,6 +10,7 @@ import pytest
 from diagnosis.bench import Bench
 from diagnosis.estimate import Estimate
 from diagnosis.evidence import Evidence
+from diagnosis.judgement import _why_not
 from diagnosis.point import Point, bounds_of
 from diagnosis.search import Tried
 from diagnosis.strain import is_at_limit, within_range
@@ -72,3 +73,13 @@ def test_what_is_at_a_limit_gives_way_to_what_gains_nearly_as_much(
     assert (found is best) is (named == LAG)
     blind = dataclasses.replace(best, evidence=None)
     assert within_range(blind, [other]) is blind
+
+
+@pytest.mark.parametrize(("end", "why"), [(1, "the first is at the end of a range"), (0, "")])
+def test_a_first_name_that_ends_at_a_limit_is_none(
+    bench: Bench, rubbing: Bench, end: int, why: str
+) -> None:
+    selection = accepting(bench, rubbing, FRICTION)
+    model = at_end(bench, selection.model, FRICTION, "T_c_w_em", end)
+    limited = dataclasses.replace(selection, model=dataclasses.replace(model, normal=None))
+    assert _why_not(limited, rubbing) == why
