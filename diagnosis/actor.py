@@ -22,9 +22,9 @@ from language.rewrite import reads
 Reals = NDArray[np.float64]
 RIPPLE = 0.6
 """Correlation with an order of an angle from which on a drift ripples."""
-MASS = 0.6
-"""Correlation with the acceleration from which on it is a mass: those of loads have 0.45 at most,
-those of a tyre and of a third inertia 0.73 at least."""
+MASS, MASS_PART = 0.6, 0.45
+"""Correlation with the acceleration, and part of what accelerates, from which on it is a mass: a
+tyre and a third inertia have 0.73 and 0.6 at least, loads 0.44 and 0.29 at most but for one."""
 STEADY = 0.95
 """Part of its squares that a constant and a line over the speed have of what is steady."""
 AT_REST = 0.3
@@ -83,7 +83,7 @@ def _ripples(locus: Locus) -> bool:
 
 def _goes_with_acceleration(bench: Bench, locus: Locus) -> bool:
     speeds = _speeds(locus)
-    if not speeds:
+    if not speeds or locus.part < MASS_PART:
         return False
     rates = np.concatenate([np.gradient(speed) for speed in speeds]) / float(bench.period)
     return bool(np.corrcoef(rates, _unknown(locus))[0, 1] > MASS)
