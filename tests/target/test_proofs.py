@@ -96,6 +96,7 @@ def test_what_is_plain_in_parts_has_no_contract() -> None:
     assert not found.is_asked and not found.findings
 
 
+@pytest.mark.usefixtures("impatient")
 @pytest.mark.parametrize(
     ("right", "wrong", "goal"),
     [
@@ -118,6 +119,7 @@ def test_a_mode_that_breaks_its_contract_is_found(
     assert any(goal in finding for finding in found.findings), found
 
 
+@pytest.mark.usefixtures("impatient")
 @pytest.mark.parametrize(
     ("function", "right", "wrong", "goal"),
     [
