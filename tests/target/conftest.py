@@ -7,7 +7,7 @@ import pytest
 from codegen.proofs.wp import OPTIONS
 
 SECONDS = "1"
-"""Of a prover for one goal, where one that is wrong is looked for: no prover ends it, and those that
+"""Of a prover for one goal, where a wrong one is looked for: no prover ends it, and those that
 hold are done in a fifth of that."""
 
 
