@@ -6,9 +6,9 @@ import pytest
 
 from codegen.proofs.wp import OPTIONS
 
-SECONDS = "1"
+SECONDS = "2"
 """Of a prover for one goal, where a wrong one is looked for: no prover ends it, and those that
-hold are done in a fifth of that."""
+hold are done in a tenth of it."""
 
 
 @pytest.fixture

@@ -102,6 +102,7 @@ def charting() -> Charting:
     return found
 
 
+@pytest.mark.usefixtures("impatient")
 def test_what_a_micro_step_may_do_is_proven_of_a_chart(tmp_path: Path) -> None:
     """Of the functions that are broken below; of all of them it is a figure of `make verify`."""
     functions = sorted({function for function, _, _ in MISTAKES.values()})

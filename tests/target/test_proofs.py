@@ -160,6 +160,18 @@ def test_a_mistake_in_what_transitions_run_is_found(
     assert found.asked and any(goal in one for one in found.open), found
 
 
+@pytest.mark.usefixtures("impatient")
+def test_without_a_mistake_all_of_it_is_proven_as_soon(tmp_path: Path) -> None:
+    """What is found above is the mistake, not a prover that had too little time."""
+    (contactor,) = prove("contactor", checks=("contract",))
+    assert contactor.is_asked and not contactor.findings
+    asking = written_of(program("hko"), c_files(program("hko"), by_amount=False), tmp_path)
+    names = {"jump_drive", "jump_gap_1", "switch_no_contact"}
+    own = [([name for name in known if name in names], options) for known, options in asking]
+    found = proven_with(tmp_path, "hko.c", own)
+    assert found.asked and found.open == ()
+
+
 def test_each_tool_finds_a_mistake(tmp_path: Path) -> None:
     (tmp_path / "wrong.c").write_text(WRONG)
     heard = [" ".join(proof.findings) for proof in strict(tmp_path, ["wrong.c"])]
