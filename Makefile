@@ -51,20 +51,20 @@ system-packages: ## install what the target needs (Debian, Ubuntu), if it is not
 demo: setup ## show the product at work
 	@$(BIN)/modewright demo $(ARGS)
 
-test: export CI := true
-test: export HYPOTHESIS_PROFILE := ci
-test: export LC_ALL := C
-test: export MPLBACKEND := Agg
-test: export OMP_NUM_THREADS := 1
-test: export OPENBLAS_NUM_THREADS := 1
-test: export PYTHONHASHSEED := 0
-test: export PYTHONUTF8 := 1
-test: export TZ := UTC
-test: setup ## run the tests, the same way everywhere
-	$(BIN)/pytest -n 2 -q $(ARGS)
+test target-test: export CI := true
+test target-test: export HYPOTHESIS_PROFILE := ci
+test target-test: export LC_ALL := C
+test target-test: export MPLBACKEND := Agg
+test target-test: export OMP_NUM_THREADS := 1
+test target-test: export OPENBLAS_NUM_THREADS := 1
+test target-test: export PYTHONHASHSEED := 0
+test target-test: export PYTHONUTF8 := 1
+test target-test: export TZ := UTC
+test: setup ## run the tests but those of the target, the same way everywhere
+	$(BIN)/pytest -n 2 --dist worksteal -q --ignore=tests/target $(ARGS)
 
-target-test: setup ## compare the C on an emulated Cortex-M4F with the engine
-	$(BIN)/pytest -n 2 -q tests/target $(ARGS)
+target-test: setup ## compare the C on an emulated Cortex-M4F with the engine, and prove contracts
+	$(BIN)/pytest -n 2 --dist worksteal -q tests/target $(ARGS)
 
 prove: setup ## check the C of every sampled automaton by compilers, cppcheck and Frama-C
 	$(BIN)/python tests/verify/proofs.py

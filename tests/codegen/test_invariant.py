@@ -22,7 +22,7 @@ from tests.lockstep.chance.running import taped
 from tests.lockstep.chance.spec import Spec, program as program_of
 from tests.verify.random_charts import programs
 
-CHARTS, SEEDS, TICKS = (3, 4), (14, 19), 300
+CHARTS, SEEDS, TICKS = (3, 6), (14, 19), 300
 """A chart without regions, one with two."""
 
 

@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 
 from codegen.proofs.chart_contract import ChartContract, proven_of, written
-from codegen.proofs.wp import OPTIONS
 from codegen.source import c_files, c_program
 from codegen.tool import PACKAGES
 from language.charting import Charting
@@ -91,14 +90,6 @@ modes:
       fast: {}
 outputs: [mode]
 """
-SECONDS = "2"
-"""Enough for a goal that holds: those are done in a tenth of it."""
-
-
-@pytest.fixture
-def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Wait less for goals that no prover ends."""
-    monkeypatch.setattr("codegen.proofs.wp.OPTIONS", (*OPTIONS[:-1], SECONDS))
 
 
 def made() -> ChartContract:
@@ -111,6 +102,7 @@ def charting() -> Charting:
     return found
 
 
+@pytest.mark.usefixtures("impatient")
 def test_what_a_micro_step_may_do_is_proven_of_a_chart(tmp_path: Path) -> None:
     """Of the functions that are broken below; of all of them it is a figure of `make verify`."""
     functions = sorted({function for function, _, _ in MISTAKES.values()})

@@ -96,6 +96,7 @@ def test_what_is_plain_in_parts_has_no_contract() -> None:
     assert not found.is_asked and not found.findings
 
 
+@pytest.mark.usefixtures("impatient")
 @pytest.mark.parametrize(
     ("right", "wrong", "goal"),
     [
@@ -118,6 +119,7 @@ def test_a_mode_that_breaks_its_contract_is_found(
     assert any(goal in finding for finding in found.findings), found
 
 
+@pytest.mark.usefixtures("impatient")
 @pytest.mark.parametrize(
     ("function", "right", "wrong", "goal"),
     [
@@ -156,6 +158,18 @@ def test_a_mistake_in_what_transitions_run_is_found(
     own = [([name for name in names if name == asked], options) for names, options in asking]
     found = proven_with(tmp_path, file, own)
     assert found.asked and any(goal in one for one in found.open), found
+
+
+@pytest.mark.usefixtures("impatient")
+def test_without_a_mistake_all_of_it_is_proven_as_soon(tmp_path: Path) -> None:
+    """What is found above is the mistake, not a prover that had too little time."""
+    (contactor,) = prove("contactor", checks=("contract",))
+    assert contactor.is_asked and not contactor.findings
+    asking = written_of(program("hko"), c_files(program("hko"), by_amount=False), tmp_path)
+    names = {"jump_drive", "jump_gap_1", "switch_no_contact"}
+    own = [([name for name in known if name in names], options) for known, options in asking]
+    found = proven_with(tmp_path, "hko.c", own)
+    assert found.asked and found.open == ()
 
 
 def test_each_tool_finds_a_mistake(tmp_path: Path) -> None:
