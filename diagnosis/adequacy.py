@@ -36,8 +36,9 @@ LOUD, LOUD_PART = 3.0, 0.05
 """Innovations that count as one from which on those of a model are loud, and the typical part that
 an adequate one may then leave: a sensor's lag that imitates its delay leaves a tenth."""
 
-PILED = 0.5
-"""Part of what an effect gained that a further one gains at the same place, where neither is it."""
+PILED = 0.35
+"""Part of what an effect gained that a further one gains at the same place, where neither is it:
+0.28 at most beside right ones."""
 
 FAINT = 800.0
 """Nats that effects gained together below which simulations have to show them as well."""

@@ -140,7 +140,7 @@ def _why_not(selection: Selection, bench: Bench) -> str:
         return "they are pulled out of their ranges"
     if is_at_limit(selection.model, first.layer):
         return "the first is at the end of a range"
-    if differs(selection.model, first, bench.series):
+    if differs(selection.model, first, bench.series, len(selection.accepted) == 1):
         return "the parameters of the first differ from recording to recording"
     if piles_up(selection):
         return "two at one place gain alike"

@@ -81,6 +81,29 @@ class Selection:
         return {name: weight / whole for name, weight in weights.items()}
 
 
+@dataclass(frozen=True)
+class _Asked:
+    """What a search for effects is given, the same in each round."""
+
+    bench: Bench
+    units: Mapping[str, float]
+    thresholds: Thresholds
+    left_out: float
+    tell: Tell
+
+
+@dataclass(frozen=True)
+class _Found:
+    """What the rounds so far have found, the `layers` to look at next and what one must gain."""
+
+    base: Estimate
+    model: Estimate
+    accepted: tuple[Tried, ...] = ()
+    first_round: tuple[Tried, ...] = ()
+    layers: tuple[Layer, ...] = ()
+    needed: float = 0.0
+
+
 def selected(
     bench: Bench,
     base: Estimate,
@@ -95,54 +118,53 @@ def selected(
     `left_out` is the part of the threshold that is asked for what is left out. `known` candidates,
     best first, were tried with the recordings read in another way: only the best are tried again.
     """
-    model = base
-    accepted: list[Tried] = []
-    rounds: list[list[Tried]] = []
-    layers = _near_best(known) or list(bench.layers())
-    needed = 0.0
-    while len(accepted) < MOST_EFFECTS:
-        if accepted and is_full(bench, model, units, thresholds.usual):
-            tell("free drifts find nothing more to do: no further effect is looked for")
-            break
-        worth = (HOPE_BESIDE if accepted else HOPE) * max(needed, thresholds.usual)
-        model, tried = _looked_for(bench, model, units, layers, worth, tell)
-        base = base if accepted else model
-        rounds.append(tried)
-        enough = _enough(tried, needed, thresholds, left_out)
-        if enough is None:
-            break
-        best, rounds[-1] = _led(bench, model, units, enough, tried)
-        if best.estimate is None or best.evidence is None:
-            break
-        gained = counted(best.evidence, left_out)
-        needed = PART * gained
-        tell(f"accepted {best.layer.id}: {gained:.0f} nats")
-        before = [*accepted, best]
-        together, there = swapped(bench, best.estimate, before, rounds[0], units, tell)
-        if len(together) == MOST_EFFECTS and _strains(together, there, accepted, model):
-            tell(f"{best.layer.id} pulls effects out of their ranges: it is not taken")
-            break
-        accepted, model = together, there
-        rounds[0] = renewed(rounds[0], before, accepted)
-        layers = list(bench.layers()) if len(accepted) == 1 else _likely(tried, NEXT)
-    found = Needed(base, model, tuple(accepted))
-    found = still_needed(bench, found, units, thresholds, tell)
-    first = tuple(renewed(rounds[0], accepted, found.kept)) if rounds else ()
-    return Selection(base, found.model, found.kept, first, rivals(first, found.kept))
+    asked = _Asked(bench, units, thresholds, left_out, tell)
+    found = _Found(base, base, layers=tuple(_near_best(known) or bench.layers()))
+    goes_on = True
+    while goes_on and len(found.accepted) < MOST_EFFECTS:
+        found, goes_on = _one_more(asked, found)
+    last = Needed(found.base, found.model, found.accepted)
+    kept = still_needed(bench, last, units, thresholds, tell)
+    first = tuple(renewed(found.first_round, found.accepted, kept.kept))
+    return Selection(found.base, kept.model, kept.kept, first, rivals(first, kept.kept))
 
 
-def _looked_for(
-    bench: Bench,
-    model: Estimate,
-    units: Mapping[str, float],
-    layers: Sequence[Layer],
-    worth: float,
-    tell: Tell,
-) -> tuple[Estimate, list[Tried]]:
-    """Return candidates beside a model, best first, with it or a better fit of it."""
-    tried = searched(bench, model, units, layers, tell, worth)
+def _one_more(asked: _Asked, found: _Found) -> tuple[_Found, bool]:
+    """Return what is found with one effect more, and whether yet another may be looked for."""
+    bench, units, tell = asked.bench, asked.units, asked.tell
+    if found.accepted and is_full(bench, found.model, units, asked.thresholds.usual):
+        tell("free drifts find nothing more to do: no further effect is looked for")
+        return found, False
+    found, tried = _looked_for(asked, found)
+    enough = _enough(tried, found.needed, asked.thresholds, asked.left_out)
+    if enough is None:
+        return found, False
+    best, led = _led(bench, found.model, units, enough, tried)
+    found = found if found.accepted else dataclasses.replace(found, first_round=tuple(led))
+    if best.estimate is None or best.evidence is None:
+        return found, False
+    gained = counted(best.evidence, asked.left_out)
+    tell(f"accepted {best.layer.id}: {gained:.0f} nats")
+    before = [*found.accepted, best]
+    together, there = swapped(bench, best.estimate, before, found.first_round, units, tell)
+    if len(together) == MOST_EFFECTS and _strains(together, there, found.accepted, found.model):
+        tell(f"{best.layer.id} pulls effects out of their ranges: it is not taken")
+        return found, False
+    first = tuple(renewed(found.first_round, before, together))
+    layers = tuple(bench.layers()) if len(together) == 1 else _likely(tried, NEXT)
+    return _Found(found.base, there, tuple(together), first, layers, PART * gained), True
+
+
+def _looked_for(asked: _Asked, found: _Found) -> tuple[_Found, list[Tried]]:
+    """Return candidates beside the model that was found, best first, and it or a better fit."""
+    worth = (HOPE_BESIDE if found.accepted else HOPE) * max(found.needed, asked.thresholds.usual)
+    model, bench, units, tell = found.model, asked.bench, asked.units, asked.tell
+    tried = searched(bench, model, units, found.layers, tell, worth)
     better, tried = looked_again(bench, model, units, tried, tell, worth)
-    return (model if better is None else better), tried
+    model = model if better is None else better
+    if found.accepted:
+        return dataclasses.replace(found, model=model), tried
+    return dataclasses.replace(found, base=model, model=model, first_round=tuple(tried)), tried
 
 
 def _led(
@@ -176,9 +198,9 @@ def _enough(
     )
 
 
-def _likely(tried: Sequence[Tried], most: int) -> list[Layer]:
+def _likely(tried: Sequence[Tried], most: int) -> tuple[Layer, ...]:
     """Return the layers that are looked at again beside what was accepted."""
-    return list({t.layer.id: t.layer for t in tried if t.promised > 0.0}.values())[:most]
+    return tuple({t.layer.id: t.layer for t in tried if t.promised > 0.0}.values())[:most]
 
 
 def _near_best(known: Sequence[Tried]) -> list[Layer]:

@@ -6,7 +6,7 @@ well: friction with a rise at rest takes up part of an offset that dry friction 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from diagnosis.bench import Bench
 from diagnosis.candidate import Candidate
@@ -30,8 +30,8 @@ RIVAL_PART = 0.5
 def swapped(
     bench: Bench,
     model: Estimate,
-    accepted: list[Tried],
-    rivals: list[Tried],
+    accepted: Sequence[Tried],
+    rivals: Sequence[Tried],
     units: Mapping[str, float],
     tell: Tell,
 ) -> tuple[list[Tried], Estimate]:

@@ -1,0 +1,52 @@
+"""What comes late alone has the same time in each recording, or is something else."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import pytest
+
+from diagnosis.bench import Bench
+from diagnosis.constancy import comes_late, differs
+from diagnosis.layers import fitting, shipped_effects
+from tests.diagnosis.test_adequacy import accepting, rubbing
+from tests.diagnosis.test_estimation import bench
+from tests.diagnosis.test_needed import FRICTION, layer
+
+__all__ = ["bench", "rubbing"]
+
+
+def test_lags_and_delays_come_late_and_nothing_else_does(bench: Bench) -> None:
+    laid = [one for effect in shipped_effects() for one in fitting(bench.document, effect)]
+    late = {one.effect.name for one in laid if comes_late(one)}
+    assert late == {"actuator_delay", "actuator_lag", "sensor_delay", "sensor_lag"}
+
+
+@pytest.mark.parametrize(
+    ("effect", "part", "is_alone", "is_other"),
+    [
+        ("sensor_lag@w_s", 0.01, True, False),
+        ("sensor_lag@w_s", 0.04, True, True),
+        ("sensor_lag@w_s", 0.04, False, False),  # what is beside it makes it vary
+        ("sensor_lag@w_s", 0.3, False, True),
+        (FRICTION, 0.15, True, False),
+        (FRICTION, 0.3, True, True),
+    ],
+)
+def test_what_comes_late_alone_is_the_same_in_each_recording(
+    bench: Bench,
+    rubbing: Bench,
+    effect: str,
+    part: float,
+    is_alone: bool,
+    is_other: bool,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Of an effect whose own values in each recording would gain a part of what it gained."""
+    selection = accepting(bench, rubbing, FRICTION)
+    (known,) = selection.accepted
+    assert known.evidence is not None
+    gained = dataclasses.replace(known.evidence, train=10_000.0)
+    tried = dataclasses.replace(known, layer=layer(bench, effect), evidence=gained)
+    monkeypatch.setattr("diagnosis.constancy.variation", lambda *of: part * 10_000.0)
+    assert differs(selection.model, tried, rubbing.series, is_alone) is is_other
