@@ -59,10 +59,13 @@ def rk4(field: Field, moves: Moves) -> Method:
 
 
 def _alike(field: Field, moves: Moves) -> tuple[str, ...]:
-    """Return the states that stages of their own move: those that move in every mode."""
+    """Return the states that stages of their own move: those that move in one mode at least. Where
+    one rests its rate is 0, and its end and its polynomial are written over.
+    """
     if not field.is_staged:
         return ()
-    return tuple(n for n in field.states if all(n in moving for moving in moves.values()))
+    never = resting(field, moves)
+    return tuple(name for name in field.states if name not in never)
 
 
 def _step(field: Field, moving: Sequence[str], alike: Sequence[str], mode: str) -> Block:
