@@ -70,7 +70,7 @@ def _alike(field: Field, moves: Moves) -> tuple[str, ...]:
 
 def _step(field: Field, moving: Sequence[str], alike: Sequence[str], mode: str) -> Block:
     ops: list[Op] = [*at_state(field), *at_time(field, real(0.0))]
-    own = [name for name in moving if name not in alike]
+    own = () if alike else moving
     for stage in STAGES:
         ops.append(Run(f"rates_{mode}"))
         ops += [Run(f"stage_{stage}")] if alike else []
@@ -104,7 +104,7 @@ def _end(name: str) -> Expr:
 
 
 def _series(field: Field, moving: Sequence[str], alike: Sequence[str], mode: str) -> Block:
-    own = [name for name in moving if name not in alike]
+    own = () if alike else moving
     return (
         *(Assign(f"work.at_{name}", Ref(f"work.end_{name}")) for name in field.states),
         *at_time(field, Ref("work.h")),

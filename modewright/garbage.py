@@ -19,7 +19,7 @@ def look_rarely() -> None:
 
 @contextmanager
 def rarely_looked() -> Iterator[None]:
-    """Let garbage be looked for rarely while it lasts: a diagnosis takes 0.96 of the time."""
+    """Let garbage be looked for rarely while it lasts: that took 4 % of a diagnosis."""
     before = gc.get_threshold()
     look_rarely()
     try:

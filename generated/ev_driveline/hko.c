@@ -2788,7 +2788,7 @@ static inline void compare_stamps(hko_Self *self, const volatile hko_Cal *cal)
 }
 
 /* Takes the inputs of now, each within its range */
-static inline void latch(hko_Self *self, const hko_In *in)
+static NOT_INLINED void latch(hko_Self *self, const hko_In *in)
 {
     if (ha_within(in->y_em, -400.0, 2400.0) && ha_within(in->y_w, -50.0, 300.0)
         && (fabs(in->T_em) <= 400.0) && ha_within(in->T_br, 0.0, 3000.0)) {

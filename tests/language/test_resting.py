@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from engine.interpreter import Interpreter
+from language.operation import Assign, Ref
 from language.program import Program
 from language.resting import movable, moving
 from language.traversal import block_writes, reached
@@ -101,15 +102,18 @@ def test_the_angle_of_the_gap_rests_in_contact_and_the_load_everywhere() -> None
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_nothing_is_computed_of_what_rests(tmp_path: Path, method: str) -> None:
+def test_of_what_rests_the_end_of_a_step_is_its_start(tmp_path: Path, method: str) -> None:
     made = clock(tmp_path, CLOCK, method)
     stages = {
         state: {name for name in written(made, f"step_{mode}") if name.endswith(f"_{state}")}
         for state, mode in (("a", "both"), ("b", "still"), ("c", "both"))
     }
-    assert stages["c"] <= {"work.at_c", "work.rate_c", "work.end_c"}
-    assert {name[:-1] for name in stages["b"]} == {name[:-1] for name in stages["c"]}
-    assert len(stages["a"]) >= len(stages["b"])
+    alone = {"work.at_", "work.rate_", "work.end_"}
+    assert {name[:-1] for name in stages["c"]} <= alone
+    if method != "rk4":  # whose stages are blocks of their own, for all modes
+        assert {name[:-1] for name in stages["b"]} <= alone
+    last = made.blocks["step_still"][-2:]
+    assert last == tuple(Assign(f"work.end_{n}", Ref(f"state.{n}")) for n in "bc")
     assert {v.name for v in made.variables if "series" in v.name} == {
         "work.series_a",
         "work.series_b",
