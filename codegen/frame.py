@@ -20,6 +20,9 @@ LEAST = 3
 ALWAYS = ("hold", "rows_", "columns_")
 """Blocks that are apart in any number type: a covariance is more than there are registers."""
 
+BESIDE = frozenset({"latch"})
+"""Blocks that are apart where one of those is: what their comparisons need would lie below it."""
+
 
 def apart(program: Program) -> frozenset[str]:
     """Return the blocks of a sampled automaton that compute much; not those that one of these
@@ -36,6 +39,8 @@ def apart(program: Program) -> frozenset[str]:
             callers[called].append(name)
     much = frozenset(name for name in program.blocks if _operations(program, name) >= LEAST)
     much |= always
+    if always:
+        much |= BESIDE & program.blocks.keys()
     return frozenset(n for n in much if len(callers[n]) != 1 or callers[n][0] not in much)
 
 

@@ -6,7 +6,7 @@ import os
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from importlib import resources
 from pathlib import Path
 
@@ -30,6 +30,8 @@ HEAD = re.compile(rf"^({'|'.join(KINDS)}):\s*([^\s#]+)", re.MULTILINE)
 INSIDE = {"test": ("scenario",)}
 """Kinds that are keys, too, of a file of another kind."""
 VERSION = "1"
+Head = tuple[Path, str, str]
+"""A file, the kind of what it holds, and its name."""
 
 
 @dataclass(frozen=True)
@@ -57,17 +59,19 @@ class Project:
 
     def _named(self, wanted: Callable[[str], bool]) -> dict[str, list[Path]]:
         own: dict[str, list[Path]] = {}
-        for path in _yaml_files(self.root / "spec"):
-            for kind, name in _heads_in(path, self.texts):
-                if wanted(kind):
-                    own.setdefault(name, []).append(path)
+        for path, kind, name in self._heads:
+            if wanted(kind):
+                own.setdefault(name, []).append(path)
         shipped = Path(str(resources.files("spec")))
         if shipped.resolve() != (self.root / "spec").resolve():
-            for path in _yaml_files(shipped):
-                for kind, name in _heads_in(path, {}):
-                    if wanted(kind):
-                        own.setdefault(name, [path])
+            for path, kind, name in _shipped_heads(shipped):
+                if wanted(kind):
+                    own.setdefault(name, [path])
         return own
+
+    @cached_property
+    def _heads(self) -> tuple[Head, ...]:
+        return tuple(_heads_below(self.root / "spec", self.texts))
 
     def read(self, path: Path) -> Document:
         """Return the document of a file, in an editor's text where it is open. Raises SpecError."""
@@ -161,6 +165,17 @@ def _check_version(root: Table, problems: Problems) -> None:
         )
     elif not isinstance(node, Scalar) or node.text != VERSION:
         problems.error("version", node.span, "this version of the language is not known: use 1")
+
+
+def _heads_below(folder: Path, texts: Mapping[Path, str]) -> Iterator[Head]:
+    for path in _yaml_files(folder):
+        yield from ((path, kind, name) for kind, name in _heads_in(path, texts))
+
+
+@cache
+def _shipped_heads(folder: Path) -> tuple[Head, ...]:
+    """The heads of what is shipped, which nobody changes: they are read once in a process."""
+    return tuple(_heads_below(folder, {}))
 
 
 def _yaml_files(folder: Path) -> Iterator[Path]:

@@ -7,6 +7,7 @@ the angle says that no side is reached, whatever the speeds are.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import reduce
 
 from language.field import Field
@@ -37,7 +38,21 @@ FIXED = ("constant.", "calibration.", "derived.")
 GUARD, AT = "work.guard_", "work.at_"
 
 
-def point_block(states: Sequence[str], terms: int) -> Block:
+@dataclass(frozen=True)
+class Path:
+    """The polynomials of a step with their number of `terms`; what is `resting` has none."""
+
+    terms: int
+    resting: frozenset[str]
+
+    def at(self, states: Sequence[str]) -> Block:
+        """Return what puts states where they are at `work.s`, where they are at the start first."""
+        still = [name for name in states if name in self.resting]
+        ops = [Assign(f"work.at_{name}", Ref(f"state.{name}")) for name in still]
+        return (*ops, *_polynomials([n for n in states if n not in self.resting], self.terms))
+
+
+def _polynomials(states: Sequence[str], terms: int) -> Block:
     """The polynomial x(s) = x0 + s (d0 + s (d1 + ...)) at `work.s`, by Horner's rule."""
     s = Ref("work.s")
     if terms <= MOST_WRITTEN_OUT:
@@ -62,7 +77,7 @@ def _written_out(name: str, terms: int) -> Assign:
     return Assign(f"work.at_{name}", add(Ref(f"state.{name}"), multiply(s, total)))
 
 
-def look_block(field: Field, mode: Mode, terms: int, flows: Mapping[str, Block]) -> Block:
+def look_block(field: Field, mode: Mode, path: Path, flows: Mapping[str, Block]) -> Block:
     """Return what reads the guards of a mode at `work.s`; `flows` are the blocks of the field."""
     guards = f"guards_{mode.name}"
     read = _read(guards, flows)
@@ -73,10 +88,10 @@ def look_block(field: Field, mode: Mode, terms: int, flows: Mapping[str, Block])
         rest = [name for name in needed if name not in first]
         if rest:
             closed = [Assign(op.target, Value(False)) for op in _guards(flows[guards])]
-            opened: Block = (*point_block(rest, terms), Run(guards))
-            return (*point_block(first, terms), Branch(gate, opened, tuple(closed)))
+            opened: Block = (*path.at(rest), Run(guards))
+            return (*path.at(first), Branch(gate, opened, tuple(closed)))
     is_all = len(needed) == len(field.states)
-    point: Block = (Run("point"),) if is_all else point_block(needed, terms)
+    point: Block = (Run("point"),) if is_all else path.at(needed)
     return (*point, Run(guards))
 
 

@@ -7,8 +7,10 @@ through the step, as the method is, and needs no third rate as a cubic would.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from language.field import Field, at_state, at_time
-from language.motion import Method
+from language.motion import Method, Moves, at_rest, flat, resting
 from language.operation import (
     Assign,
     Block,
@@ -29,42 +31,42 @@ from language.units import per_second
 TERMS = 2
 
 
-def midpoint(field: Field) -> Method:
-    """Return the method for a field."""
+def midpoint(field: Field, moves: Moves) -> Method:
+    """Return the method for a field, for the states that move in each mode."""
     blocks: dict[str, Block] = {}
-    for name in field.automaton.modes:
-        blocks[f"step_{name}"] = _step(field, name)
-        blocks[f"series_{name}"] = _series(field)
+    for mode, moving in moves.items():
+        blocks[f"step_{mode}"] = _step(field, mode, moving)
+        blocks[f"series_{mode}"] = (*_quadratics(moving), *flat(field, moves, mode, TERMS))
     variables = [
         Variable(f"work.{what}_{name}", "real", str(per_second(state.unit.dimension)))
         for what in ("first", "middle")
         for name, state in field.automaton.states.items()
     ]
-    return Method(blocks, TERMS, (), tuple(variables))
+    return Method(blocks, TERMS, (), tuple(variables), resting=resting(field, moves))
 
 
-def _step(field: Field, mode: str) -> Block:
+def _step(field: Field, mode: str, moving: Sequence[str]) -> Block:
     """x + h f(x + h/2 f(x))."""
     h = Ref("work.h")
     half = multiply(real(0.5), h)
     ops: list[Op] = [*at_state(field), *at_time(field, real(0.0)), Run(f"rates_{mode}")]
-    for name in field.states:
+    for name in moving:
         ops.append(Assign(f"work.first_{name}", Ref(f"work.rate_{name}")))
         moved = add(Ref(f"state.{name}"), multiply(half, Ref(f"work.first_{name}")))
         ops.append(Assign(f"work.at_{name}", moved))
     ops += at_time(field, half)
     ops.append(Run(f"rates_{mode}"))
-    for name in field.states:
+    for name in moving:
         ops.append(Assign(f"work.middle_{name}", Ref(f"work.rate_{name}")))
         moved = add(Ref(f"state.{name}"), multiply(h, Ref(f"work.middle_{name}")))
         ops.append(Assign(f"work.end_{name}", moved))
-    return tuple(ops)
+    return (*ops, *at_rest(field, moving))
 
 
-def _series(field: Field) -> Block:
+def _quadratics(states: Sequence[str]) -> Block:
     """x0 + s k1 + s^2 (k2 - k1)/h."""
     ops: list[Op] = []
-    for name in field.states:
+    for name in states:
         first, middle = Ref(f"work.first_{name}"), Ref(f"work.middle_{name}")
         series = f"work.series_{name}"
         ops.append(Store(series, whole(0), first))

@@ -8,12 +8,12 @@ the bracket on the polynomial; the upper end is kept, so the guard is true where
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 
 from language.field import Field, any_guard, at_time
-from language.look import look_block, point_block
+from language.look import Path, look_block
 from language.model import Mode
 from language.number import DIGITS, NumberType
 from language.operation import (
@@ -27,12 +27,14 @@ from language.operation import (
     Op,
     Ref,
     Run,
+    Store,
     Unary,
     Value,
     add,
     multiply,
     real,
     subtract,
+    whole,
 )
 from language.program import Constant, Variable
 from language.region import slots
@@ -47,17 +49,41 @@ FLOW_HALVINGS: Mapping[NumberType, int] = {"float64": 44, "float32": 24}
 float32 the times within a step have 24 bits: from then on the middle is one of the two ends."""
 
 Armed = Mapping[str, str]
+Moves = Mapping[str, tuple[str, ...]]
+"""The states that move in each mode: where one rests, nothing of it is computed."""
 
 
 @dataclass(frozen=True)
 class Method:
-    """A method of integration for one field; `norms` are |A h| of each mode, where it has them."""
+    """A method of integration for one field; `norms` are |A h| of each mode, where it has them.
+
+    `resting` are the states that move in no mode: they have no polynomial.
+    """
 
     blocks: dict[str, Block]
     terms: int
     constants: tuple[Constant, ...]
     variables: tuple[Variable, ...]
     norms: Mapping[str, float] = field(default_factory=dict)
+    resting: frozenset[str] = frozenset()
+
+
+def resting(field: Field, moves: Moves) -> frozenset[str]:
+    """Return the states that move in no mode."""
+    return frozenset(field.states).difference(*moves.values())
+
+
+def at_rest(field: Field, moving: Sequence[str]) -> list[Op]:
+    """Return the ends of a step of the states that do not move in it."""
+    still = [name for name in field.states if name not in moving]
+    return [Assign(f"work.end_{name}", Ref(f"state.{name}")) for name in still]
+
+
+def flat(field: Field, moves: Moves, mode: str, terms: int) -> list[Op]:
+    """Return the polynomials of a mode's step of the states that rest in this mode, not in all."""
+    never = resting(field, moves)
+    still = [name for name in field.states if name not in moves[mode] and name not in never]
+    return [Store(f"work.series_{n}", whole(k), real(0.0)) for n in still for k in range(terms)]
 
 
 def merge_time(number: NumberType, step: Fraction, time: Fraction = Fraction(0)) -> float:
@@ -85,9 +111,10 @@ def motion_blocks(
     gives a mode's guards as they were; `is_wait` is whether a wait ends with the step: what
     crosses just after it is at that instant.
     """
-    blocks = {"point": point_block(field.states, method.terms)}
+    path = Path(method.terms, method.resting)
+    blocks = {"point": path.at(field.states)}
     for mode in field.automaton.modes.values():
-        blocks[f"look_{mode.name}"] = look_block(field, mode, method.terms, flows)
+        blocks[f"look_{mode.name}"] = look_block(field, mode, path, flows)
         crossed = any_guard(field, mode, armed(mode))
         blocks[f"locate_{mode.name}"] = _locate(field, mode, crossed, halvings, merge)
         blocks[f"move_{mode.name}"] = _move(field, mode, crossed, merge, is_wait)
@@ -114,6 +141,8 @@ def motion_variables(field: Field, method: Method) -> list[Variable]:
         dimension = state.unit.dimension
         unit, rate = str(dimension), str(per_second(dimension))
         found.append(Variable(f"work.end_{name}", "real", unit, about="at the end of the step"))
+        if name in method.resting:
+            continue
         found.append(Variable(f"work.sum_{name}", "real", rate))
         about = "factor of s; those of s^2, s^3, ... have one more 1/s each"
         found.append(Variable(f"work.series_{name}", "real", rate, about=about, size=method.terms))

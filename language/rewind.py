@@ -52,6 +52,7 @@ from language.past import (
 )
 from language.program import Variable
 from language.region import closure, sources
+from language.resting import moving
 from language.run import run_block
 from language.wiring import equation_variables
 
@@ -179,8 +180,13 @@ def _located(rewinding: Rewinding) -> Block:
     now = (*states_as_now(automaton, "after"), *inputs_as_now(automaton, "after"))
     ops: list[Op] = [Branch(Compare("==", BACK, whole(1)), now, ring)]
     ops += _along(rewinding) if rewinding.flow else _tick_after(automaton)
+    moves = moving(automaton.model, rewinding.flow) if automaton.model and rewinding.flow else ()
     for name in taken_back(automaton):
-        ops += stored(automaton, name, Ref(f"work.at_{name}"))
+        there = Ref(f"work.at_{name}")
+        if name in moves:
+            ops += stored(automaton, name, there)
+        else:  # what it was at a tick, in its range
+            ops.append(Assign(f"state.{name}", there))
     return tuple(ops)
 
 

@@ -5,8 +5,10 @@ Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.1 table 1
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from language.field import Field, at_state, at_time
-from language.motion import Method
+from language.motion import Method, Moves, at_rest, flat, resting
 from language.operation import (
     Assign,
     Block,
@@ -30,51 +32,68 @@ STAGES = (1, 2, 3, 4)
 CUBIC = "cubic"
 
 
-def rk4(field: Field) -> Method:
-    """Return the method for a field. Where that `is_staged`, what all modes do alike is a block of
-    its own: an ECU that computes in software has the values of one stage on its stack, not of all.
+def rk4(field: Field, moves: Moves) -> Method:
+    """Return the method for a field, for the states that move in each mode.
+
+    Where the field `is_staged`, what all modes do alike is a block of its own: an ECU that computes
+    in software has the values of one stage on its stack, not of all.
     """
+    alike = _alike(field, moves)
     blocks: dict[str, Block] = {}
-    stages = {f"stage_{stage}": tuple(_stage(field, stage)) for stage in STAGES}
-    alike = {**stages, CUBIC: tuple(_cubic(field))} if field.is_staged else {}
-    blocks.update(alike)
-    for name in field.automaton.modes:
-        blocks[f"step_{name}"] = _step(field, name)
-        blocks[f"series_{name}"] = _series(field, name)
+    if alike:
+        blocks.update({f"stage_{stage}": tuple(_stage(alike, stage)) for stage in STAGES})
+        blocks[CUBIC] = tuple(_cubic(alike))
+    for mode in moves:
+        blocks[f"step_{mode}"] = _step(field, moves[mode], alike, mode)
+        blocks[f"series_{mode}"] = (
+            *_series(field, moves[mode], alike, mode),
+            *flat(field, moves, mode, TERMS),
+        )
+    units = {name: per_second(s.unit.dimension) for name, s in field.automaton.states.items()}
     variables = [
-        Variable(f"work.k{stage}_{name}", "real", str(per_second(state.unit.dimension)))
-        for stage in STAGES
-        for name, state in field.automaton.states.items()
+        Variable(f"work.{what}_{name}", "real", str(unit))
+        for what in (*(f"k{stage}" for stage in STAGES), "slope")
+        for name, unit in units.items()
     ]
-    slopes = [
-        Variable(f"work.slope_{name}", "real", str(per_second(state.unit.dimension)))
-        for name, state in field.automaton.states.items()
-    ]
-    return Method(blocks, TERMS, (), (*variables, *slopes))
+    return Method(blocks, TERMS, (), tuple(variables), resting=resting(field, moves))
 
 
-def _step(field: Field, mode: str) -> Block:
+def _alike(field: Field, moves: Moves) -> tuple[str, ...]:
+    """Return the states that stages of their own move: those that move in one mode at least. Where
+    one rests its rate is 0, and its end and its polynomial are written over.
+    """
+    if not field.is_staged:
+        return ()
+    never = resting(field, moves)
+    return tuple(name for name in field.states if name not in never)
+
+
+def _step(field: Field, moving: Sequence[str], alike: Sequence[str], mode: str) -> Block:
     ops: list[Op] = [*at_state(field), *at_time(field, real(0.0))]
+    own = () if alike else moving
     for stage in STAGES:
         ops.append(Run(f"rates_{mode}"))
-        ops += [Run(f"stage_{stage}")] if field.is_staged else _stage(field, stage)
-    return tuple(ops)
+        ops += [Run(f"stage_{stage}")] if alike else []
+        ops += _stage(own, stage)
+        ops += at_time(field, _part(stage)) if stage != STAGES[-1] else []
+    return (*ops, *at_rest(field, moving))
 
 
-def _stage(field: Field, stage: int) -> list[Op]:
+def _stage(states: Sequence[str], stage: int) -> list[Op]:
     """Keep the rates; go to where the next ones are taken, or to the end."""
-    h = Ref("work.h")
-    ops: list[Op] = [
-        Assign(f"work.k{stage}_{name}", Ref(f"work.rate_{name}")) for name in field.states
-    ]
+    ops: list[Op] = [Assign(f"work.k{stage}_{n}", Ref(f"work.rate_{n}")) for n in states]
     if stage == STAGES[-1]:
-        return ops + [Assign(f"work.end_{name}", _end(name)) for name in field.states]
-    part = h if stage == STAGES[-2] else multiply(real(0.5), h)
-    ops += at_time(field, part)
-    for name in field.states:
-        moved = add(Ref(f"state.{name}"), multiply(part, Ref(f"work.k{stage}_{name}")))
+        return ops + [Assign(f"work.end_{name}", _end(name)) for name in states]
+    for name in states:
+        moved = add(Ref(f"state.{name}"), multiply(_part(stage), Ref(f"work.k{stage}_{name}")))
         ops.append(Assign(f"work.at_{name}", moved))
     return ops
+
+
+def _part(stage: int) -> Expr:
+    """Return how far into the step the rates after a stage are taken."""
+    h = Ref("work.h")
+    return h if stage == STAGES[-2] else multiply(real(0.5), h)
 
 
 def _end(name: str) -> Expr:
@@ -84,19 +103,22 @@ def _end(name: str) -> Expr:
     return add(Ref(f"state.{name}"), multiply(divide(Ref("work.h"), real(6.0)), inner))
 
 
-def _series(field: Field, mode: str) -> Block:
-    ops: list[Op] = [Assign(f"work.at_{name}", Ref(f"work.end_{name}")) for name in field.states]
-    ops += at_time(field, Ref("work.h"))
-    ops.append(Run(f"rates_{mode}"))
-    ops += [Run(CUBIC)] if field.is_staged else _cubic(field)
-    return tuple(ops)
+def _series(field: Field, moving: Sequence[str], alike: Sequence[str], mode: str) -> Block:
+    own = () if alike else moving
+    return (
+        *(Assign(f"work.at_{name}", Ref(f"work.end_{name}")) for name in field.states),
+        *at_time(field, Ref("work.h")),
+        Run(f"rates_{mode}"),
+        *((Run(CUBIC),) if alike else ()),
+        *_cubic(own),
+    )
 
 
-def _cubic(field: Field) -> list[Op]:
+def _cubic(states: Sequence[str]) -> list[Op]:
     """The cubic through both ends with the rates f0 = k1 at the start and f1 at the end."""
     h = Ref("work.h")
     ops: list[Op] = []
-    for name in field.states:
+    for name in states:
         f0, f1 = Ref(f"work.k1_{name}"), Ref(f"work.rate_{name}")
         slope, series = Ref(f"work.slope_{name}"), f"work.series_{name}"
         rise = subtract(Ref(f"work.end_{name}"), Ref(f"state.{name}"))

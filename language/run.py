@@ -51,6 +51,7 @@ from language.parameter import constant_names, typed
 from language.problem import Problems
 from language.program import Constant, MotionInfo, Variable, mode_variable
 from language.region import by_priority
+from language.resting import movable
 from language.syntax import form
 from language.wiring import enter_initial
 
@@ -81,6 +82,7 @@ def run_motion(
     """Return the motion of the model inside a tick; `values` are those of the constants."""
     model = automaton.model
     assert model and automaton.period is not None
+    held = tuple(kept(automaton, movable(model))[1])
     first = runs[0]
     _require_one_way(runs, problems)
     point = Point(automaton, values, {})
@@ -109,7 +111,6 @@ def run_motion(
         **motion_blocks(field, method, blocks, merge, RUN_HALVINGS, lambda mode: None),
     }
     made.update(_switches(field, problems))
-    held = tuple(kept(automaton, model.states)[1])
     made.update({HOLD: held} if first.method in DIVIDING and held else {})
     variables = (*_own_variables(model), *field_variables(field), *motion_variables(field, method))
     return Motion(made, variables, method.constants, dataclasses.replace(info, events=events))
@@ -148,7 +149,7 @@ def run_block(automaton: Automaton, run: ModelRun, rest: Expr | None = None) -> 
     assert model and automaton.period is not None
     field = Field(model, {}, {}, MODE, "")
     length = real(automaton.period / run.substeps) if rest is None else rest
-    before, after = kept(automaton, model.states)
+    before, after = kept(automaton, movable(model))
     held: Block = (Run(HOLD),) if run.method in DIVIDING and after else tuple(after)
     inside, outside = (held, ()) if run.follow and run.method in DIVIDING else ((), held)
     if run.follow:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import io
 import logging
 import os
@@ -50,12 +49,11 @@ from modewright.commands.trace import trace
 from modewright.console import configure
 from modewright.exits import EXIT_CODES, INTERRUPTED, exit_code
 from modewright.files import require_writable
+from modewright.garbage import look_rarely
 from modewright.spread import spread
 
 COMPLETION = "_MODEWRIGHT_COMPLETE"
 """Set by a shell that asks for completions; its words are elsewhere."""
-YOUNG_OBJECTS = 1_000_000
-"""New objects after which garbage is looked for: trees of expressions have no circles."""
 COMMANDS = (
     new, check, test, trace, diagnose, fit, effects, simulate, sweep, sensitivity,
     lockstep, replay, plot, compare, graph, generate, a2l, dbc, fmu, metrics, prove, fuzz, mcdc,
@@ -115,7 +113,7 @@ app = application()
 
 def main() -> None:
     """Run the command line and leave with its exit code."""
-    gc.set_threshold(YOUNG_OBJECTS, *gc.get_threshold()[1:])
+    look_rarely()
     logging.raiseExceptions = False  # a log that cannot be written is no reason to stop
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:

@@ -28,6 +28,7 @@ from language.model import Automaton
 from language.project import Project, expanded, read_document, shown
 from modewright.apart import require_apart
 from modewright.files import OutputError, make_folder, remove_files, write_files
+from modewright.garbage import rarely_looked
 from modewright.recordings import CheckedRecordings, check_recordings, held_out_findings
 from modewright.threads import OneThread
 
@@ -73,6 +74,7 @@ class _Budget:
 
 
 @OneThread()
+@rarely_looked()
 def diagnose(
     spec: str,
     train: Sequence[str | Path],

@@ -99,14 +99,14 @@ def test_a_point_of_a_design_follows_from_its_number_alone() -> None:
 
 
 def test_indices_are_made_from_a_store_of_each_point_of_the_grid(tmp_path: Path) -> None:
-    made = designed("saltelli: 8")
+    made = designed("saltelli: 4")
     run_study(made, tmp_path / "a", Backwards(), block=7)
-    assert len(content(read_store(tmp_path / "a"))) == made.count == 15 * 32
+    assert len(content(read_store(tmp_path / "a"))) == made.count == 15 * 16
     found = sensitivity_of(read_store(tmp_path / "a"))
     assert (found.method, len(found.indices)) == ("saltelli", 15 * 2 * 6)
     some = [i for i in found.indices if i.measure == "final"]
     assert {i.name for i in some} == {"x_1", "inputs.push.steps.1"}
-    assert all(i.used == i.count == 8 and set(i.group) == {"w", "d"} for i in some)
+    assert all(i.used == i.count == 4 and set(i.group) == {"w", "d"} for i in some)
     assert found.csv().splitlines()[0].startswith("w,d,measure,unit,name,first,total,first_from,")
     assert len(found.csv().splitlines()) == 1 + len(found.indices)
 
