@@ -21,7 +21,8 @@ ALWAYS = ("hold", "rows_", "columns_")
 """Blocks that are apart in any number type: a covariance is more than there are registers."""
 
 BESIDE = frozenset({"latch"})
-"""Blocks that are apart where one of those is: what their comparisons need would lie below it."""
+"""Blocks that are apart where one of those is: what holds the inputs compares in software, too; put
+into the step itself, what it saves of registers would lie below a covariance (decision 0087)."""
 
 
 def apart(program: Program) -> frozenset[str]:

@@ -17,22 +17,17 @@ from language.field import Field
 from language.linear import Point
 from language.midpoint import midpoint
 from language.model import Automaton
-from language.motion import Method, Moves
+from language.motion import Method
 from language.number import rounded
 from language.operation import Assign, Block
 from language.parameter import tunables_of
 from language.problem import Problems, Span
 from language.program import MotionInfo, MotionLimit
-from language.resting import moving
 from language.rk4 import rk4
 from language.stability import check_step, limit_of
 from language.working import working
 
-STAGES: Mapping[str, Callable[[Field, Moves], Method]] = {
-    "euler": euler,
-    "midpoint": midpoint,
-    "rk4": rk4,
-}
+STAGES: Mapping[str, Callable[[Field], Method]] = {"euler": euler, "midpoint": midpoint, "rk4": rk4}
 SOLVED: Mapping[str, Callable[[Field, Solved, Span, Problems], Method]] = {
     "exponential": exponential,
     "exact": exact,
@@ -72,11 +67,7 @@ def method_of(
             check_step(limit, name, step, span, problems)
             value = limit.eigenvalue
             limits.append(MotionLimit(mode, limit.step, value, limit.term, limit.state))
-    if name in STAGES:
-        moves = {mode: moving(field.automaton, mode) for mode in field.automaton.modes}
-        made = STAGES[name](field, moves)
-    else:
-        made = SOLVED[name](field, solved, span, problems)
+    made = STAGES[name](field) if name in STAGES else SOLVED[name](field, solved, span, problems)
     return made, MotionInfo(
         name, step, made.terms, dict(made.norms), tuple(limits), len(field.states)
     )

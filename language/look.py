@@ -39,7 +39,7 @@ GUARD, AT = "work.guard_", "work.at_"
 
 
 @dataclass(frozen=True)
-class Path:
+class Polynomials:
     """The polynomials of a step with their number of `terms`; what is `resting` has none."""
 
     terms: int
@@ -77,7 +77,7 @@ def _written_out(name: str, terms: int) -> Assign:
     return Assign(f"work.at_{name}", add(Ref(f"state.{name}"), multiply(s, total)))
 
 
-def look_block(field: Field, mode: Mode, path: Path, flows: Mapping[str, Block]) -> Block:
+def look_block(field: Field, mode: Mode, paths: Polynomials, flows: Mapping[str, Block]) -> Block:
     """Return what reads the guards of a mode at `work.s`; `flows` are the blocks of the field."""
     guards = f"guards_{mode.name}"
     read = _read(guards, flows)
@@ -88,10 +88,10 @@ def look_block(field: Field, mode: Mode, path: Path, flows: Mapping[str, Block])
         rest = [name for name in needed if name not in first]
         if rest:
             closed = [Assign(op.target, Value(False)) for op in _guards(flows[guards])]
-            opened: Block = (*path.at(rest), Run(guards))
-            return (*path.at(first), Branch(gate, opened, tuple(closed)))
+            opened: Block = (*paths.at(rest), Run(guards))
+            return (*paths.at(first), Branch(gate, opened, tuple(closed)))
     is_all = len(needed) == len(field.states)
-    point: Block = (Run("point"),) if is_all else path.at(needed)
+    point: Block = (Run("point"),) if is_all else paths.at(needed)
     return (*point, Run(guards))
 
 

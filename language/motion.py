@@ -8,12 +8,12 @@ the bracket on the polynomial; the upper end is kept, so the guard is true where
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 
 from language.field import Field, any_guard, at_time
-from language.look import Path, look_block
+from language.look import Polynomials, look_block
 from language.model import Mode
 from language.number import DIGITS, NumberType
 from language.operation import (
@@ -38,6 +38,7 @@ from language.operation import (
 )
 from language.program import Constant, Variable
 from language.region import slots
+from language.resting import movable, resting
 from language.units import per_second
 
 MERGE_ULPS = 4096
@@ -49,8 +50,6 @@ FLOW_HALVINGS: Mapping[NumberType, int] = {"float64": 44, "float32": 24}
 float32 the times within a step have 24 bits: from then on the middle is one of the two ends."""
 
 Armed = Mapping[str, str]
-Moves = Mapping[str, tuple[str, ...]]
-"""The states that move in each mode: where one rests, nothing of it is computed."""
 
 
 @dataclass(frozen=True)
@@ -68,22 +67,17 @@ class Method:
     resting: frozenset[str] = frozenset()
 
 
-def resting(field: Field, moves: Moves) -> frozenset[str]:
-    """Return the states that move in no mode."""
-    return frozenset(field.states).difference(*moves.values())
+def at_rest(field: Field, mode: str) -> list[Op]:
+    """Return the ends of a step of the states that rest in a mode."""
+    still = resting(field.automaton.modes[mode])
+    return [Assign(f"work.end_{n}", Ref(f"state.{n}")) for n in field.states if n in still]
 
 
-def at_rest(field: Field, moving: Sequence[str]) -> list[Op]:
-    """Return the ends of a step of the states that do not move in it."""
-    still = [name for name in field.states if name not in moving]
-    return [Assign(f"work.end_{name}", Ref(f"state.{name}")) for name in still]
-
-
-def flat(field: Field, moves: Moves, mode: str, terms: int) -> list[Op]:
+def flat(field: Field, mode: str, terms: int) -> list[Op]:
     """Return the polynomials of a mode's step of the states that rest in this mode, not in all."""
-    never = resting(field, moves)
-    still = [name for name in field.states if name not in moves[mode] and name not in never]
-    return [Store(f"work.series_{n}", whole(k), real(0.0)) for n in still for k in range(terms)]
+    still = resting(field.automaton.modes[mode])
+    names = [name for name in movable(field.automaton) if name in still]
+    return [Store(f"work.series_{n}", whole(k), real(0.0)) for n in names for k in range(terms)]
 
 
 def merge_time(number: NumberType, step: Fraction, time: Fraction = Fraction(0)) -> float:
@@ -111,10 +105,10 @@ def motion_blocks(
     gives a mode's guards as they were; `is_wait` is whether a wait ends with the step: what
     crosses just after it is at that instant.
     """
-    path = Path(method.terms, method.resting)
-    blocks = {"point": path.at(field.states)}
+    paths = Polynomials(method.terms, method.resting)
+    blocks = {"point": paths.at(field.states)}
     for mode in field.automaton.modes.values():
-        blocks[f"look_{mode.name}"] = look_block(field, mode, path, flows)
+        blocks[f"look_{mode.name}"] = look_block(field, mode, paths, flows)
         crossed = any_guard(field, mode, armed(mode))
         blocks[f"locate_{mode.name}"] = _locate(field, mode, crossed, halvings, merge)
         blocks[f"move_{mode.name}"] = _move(field, mode, crossed, merge, is_wait)

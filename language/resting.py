@@ -30,6 +30,17 @@ def movable(automaton: Automaton) -> tuple[str, ...]:
     return tuple(name for name in automaton.states if name not in still)
 
 
+def never_moving(automaton: Automaton) -> frozenset[str]:
+    """Return the states that rest in all modes."""
+    return frozenset(automaton.states).difference(movable(automaton))
+
+
+def carried_on(automaton: Automaton) -> tuple[str, ...]:
+    """Return the states that a run writes: those that move, and those that a transition resets."""
+    reset = {n for mode in automaton.all_modes for one in mode.transitions for n in one.reset}
+    return tuple(n for n in automaton.states if n in movable(automaton) or n in reset)
+
+
 def _is_zero(mode: Mode, tree: Tree) -> bool:
     match tree:
         case Number(value):

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from language.field import Field, at_state, at_time
-from language.motion import Method, Moves, at_rest, flat, resting
+from language.motion import Method, at_rest, flat
 from language.operation import (
     Assign,
     Block,
@@ -25,6 +25,7 @@ from language.operation import (
     whole,
 )
 from language.program import Variable
+from language.resting import movable, moving, never_moving
 from language.units import per_second
 
 TERMS = 3
@@ -32,51 +33,41 @@ STAGES = (1, 2, 3, 4)
 CUBIC = "cubic"
 
 
-def rk4(field: Field, moves: Moves) -> Method:
+def rk4(field: Field) -> Method:
     """Return the method for a field, for the states that move in each mode.
 
     Where the field `is_staged`, what all modes do alike is a block of its own: an ECU that computes
     in software has the values of one stage on its stack, not of all.
     """
-    alike = _alike(field, moves)
+    alike = movable(field.automaton)
     blocks: dict[str, Block] = {}
-    if alike:
+    if field.is_staged:
         blocks.update({f"stage_{stage}": tuple(_stage(alike, stage)) for stage in STAGES})
         blocks[CUBIC] = tuple(_cubic(alike))
-    for mode in moves:
-        blocks[f"step_{mode}"] = _step(field, moves[mode], alike, mode)
-        blocks[f"series_{mode}"] = (
-            *_series(field, moves[mode], alike, mode),
-            *flat(field, moves, mode, TERMS),
-        )
+    for mode in field.automaton.modes:
+        own = () if field.is_staged else moving(field.automaton, mode)
+        blocks[f"step_{mode}"] = _step(field, own, mode)
+        blocks[f"series_{mode}"] = (*_series(field, own, mode), *flat(field, mode, TERMS))
     units = {name: per_second(s.unit.dimension) for name, s in field.automaton.states.items()}
     variables = [
         Variable(f"work.{what}_{name}", "real", str(unit))
         for what in (*(f"k{stage}" for stage in STAGES), "slope")
         for name, unit in units.items()
     ]
-    return Method(blocks, TERMS, (), tuple(variables), resting=resting(field, moves))
+    return Method(blocks, TERMS, (), tuple(variables), resting=never_moving(field.automaton))
 
 
-def _alike(field: Field, moves: Moves) -> tuple[str, ...]:
-    """Return the states that stages of their own move: those that move in one mode at least. Where
-    one rests its rate is 0, and its end and its polynomial are written over.
+def _step(field: Field, own: Sequence[str], mode: str) -> Block:
+    """Move what is its `own`; stages that are alike in all modes move the rest, also what rests in
+    this one: its rate is 0, and its end is written over.
     """
-    if not field.is_staged:
-        return ()
-    never = resting(field, moves)
-    return tuple(name for name in field.states if name not in never)
-
-
-def _step(field: Field, moving: Sequence[str], alike: Sequence[str], mode: str) -> Block:
     ops: list[Op] = [*at_state(field), *at_time(field, real(0.0))]
-    own = () if alike else moving
     for stage in STAGES:
         ops.append(Run(f"rates_{mode}"))
-        ops += [Run(f"stage_{stage}")] if alike else []
+        ops += [Run(f"stage_{stage}")] if field.is_staged else []
         ops += _stage(own, stage)
         ops += at_time(field, _part(stage)) if stage != STAGES[-1] else []
-    return (*ops, *at_rest(field, moving))
+    return (*ops, *at_rest(field, mode))
 
 
 def _stage(states: Sequence[str], stage: int) -> list[Op]:
@@ -103,13 +94,12 @@ def _end(name: str) -> Expr:
     return add(Ref(f"state.{name}"), multiply(divide(Ref("work.h"), real(6.0)), inner))
 
 
-def _series(field: Field, moving: Sequence[str], alike: Sequence[str], mode: str) -> Block:
-    own = () if alike else moving
+def _series(field: Field, own: Sequence[str], mode: str) -> Block:
     return (
         *(Assign(f"work.at_{name}", Ref(f"work.end_{name}")) for name in field.states),
         *at_time(field, Ref("work.h")),
         Run(f"rates_{mode}"),
-        *((Run(CUBIC),) if alike else ()),
+        *((Run(CUBIC),) if field.is_staged else ()),
         *_cubic(own),
     )
 

@@ -51,7 +51,7 @@ from language.parameter import constant_names, typed
 from language.problem import Problems
 from language.program import Constant, MotionInfo, Variable, mode_variable
 from language.region import by_priority
-from language.resting import movable
+from language.resting import carried_on
 from language.syntax import form
 from language.wiring import enter_initial
 
@@ -82,7 +82,7 @@ def run_motion(
     """Return the motion of the model inside a tick; `values` are those of the constants."""
     model = automaton.model
     assert model and automaton.period is not None
-    held = tuple(kept(automaton, movable(model))[1])
+    held = tuple(kept(automaton, carried_on(model))[1])
     first = runs[0]
     _require_one_way(runs, problems)
     point = Point(automaton, values, {})
@@ -149,7 +149,7 @@ def run_block(automaton: Automaton, run: ModelRun, rest: Expr | None = None) -> 
     assert model and automaton.period is not None
     field = Field(model, {}, {}, MODE, "")
     length = real(automaton.period / run.substeps) if rest is None else rest
-    before, after = kept(automaton, movable(model))
+    before, after = kept(automaton, carried_on(model))
     held: Block = (Run(HOLD),) if run.method in DIVIDING and after else tuple(after)
     inside, outside = (held, ()) if run.follow and run.method in DIVIDING else ((), held)
     if run.follow:

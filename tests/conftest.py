@@ -10,8 +10,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-OLD_OBJECTS = 50_000
-"""Objects that are made before a collector looks at them: what tests import is never garbage."""
+from modewright.garbage import look_rarely
 
 settings.register_profile("ci", derandomize=True, max_examples=30, deadline=None)
 settings.register_profile("verify", max_examples=1000, deadline=None)
@@ -28,7 +27,7 @@ def pytest_collection_finish() -> None:
     """Leave what was imported out of every later search for garbage."""
     gc.collect()
     gc.freeze()
-    gc.set_threshold(OLD_OBJECTS, 20, 100)
+    look_rarely()
 
 
 @pytest.fixture(scope="session", autouse=True)

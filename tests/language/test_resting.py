@@ -9,7 +9,7 @@ import pytest
 from engine.interpreter import Interpreter
 from language.operation import Assign, Ref
 from language.program import Program
-from language.resting import movable, moving
+from language.resting import carried_on, movable, moving
 from language.traversal import block_writes, reached
 from tests.language.making import automaton, program, project_of, shipped
 
@@ -132,6 +132,22 @@ def test_what_rests_stays_to_the_last_bit(tmp_path: Path, method: str) -> None:
         assert c == 0.7
         assert b == 0.3 if a < 1.5 else b == pytest.approx(a - 1.2, rel=1e-6)
     assert a > 3
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_what_rests_is_held_where_a_transition_resets_it(tmp_path: Path, method: str) -> None:
+    """The run writes it all the same: rule 18."""
+    reset = "both: {when: a > 1.5, reset: {c: 20}}"
+    cart = CART.replace("both: {when: a > 1.5}", reset)
+    made = program(CLOCK.format(method=method), project_of(tmp_path, cart=cart))
+    assert carried_on(automaton(cart)) == ("a", "b", "c")
+    inside = Interpreter(made)
+    inside.set("input.u", 1.0)
+    for _ in range(6):
+        inside.run("step")
+    assert inside.get("state.c") == 9
+    bit = made.faults.index("range_c")
+    assert int(inside.get("memory.faults")) >> bit & 1
 
 
 @pytest.mark.parametrize("method", METHODS)
