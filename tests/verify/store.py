@@ -14,7 +14,7 @@ from typing import Any
 ROOT = Path(__file__).resolve().parent.parent.parent
 CODE = ("language", "engine", "codegen", "expectation", "lockstep", "sweep", "modewright", "spec")
 DIAGNOSIS = 5
-"""The issue from which on figures depend on `diagnosis/` too."""
+"""The issue whose figures depend on `diagnosis/` too."""
 SUFFIXES = (".py", ".yaml", ".lark", ".jinja", ".txt", ".c", ".h", ".ld")
 Figure = dict[str, Any]
 
@@ -22,7 +22,7 @@ Figure = dict[str, Any]
 def measured(issue: int, figures: Mapping[str, Callable[[], Figure]]) -> int:
     """Measure what is not measured yet, keep and print all; return 0 if every bar is met."""
     path = ROOT / "docs" / "evidence" / f"{issue}.json"
-    digest = code_digest((*CODE, "diagnosis") if issue >= DIAGNOSIS else CODE)
+    digest = code_digest((*CODE, "diagnosis") if issue == DIAGNOSIS else CODE)
     old = json.loads(path.read_text()) if path.exists() else {}
     kept: dict[str, Figure] = old.get("figures", {}) if old.get("code") == digest else {}
     for name, measure in figures.items():
