@@ -34,7 +34,7 @@ LARGE, MOST = 1000, 1000
 thousands of ticks each, take most of the time and show nothing more.
 """
 ANY = (-1e30, 1e30)
-CORPUS, WORDS = "corpus", "words.h"
+KNOWN, WORDS = "known", "words.h"
 
 
 def explored(
@@ -42,8 +42,8 @@ def explored(
 ) -> tuple[bytes, ...]:
     """Return ways that together show all that libFuzzer found in so many runs from each seed.
 
-    Later seeds go on from what earlier ones found. `ranges` are those of inputs by name. Raises
-    ToolMissing, BuildError.
+    Later seeds go on from what earlier ones found; what they are given has one order, so that they
+    find the same each time. `ranges` are those of inputs by name. Raises ToolMissing, BuildError.
     """
     with tempfile.TemporaryDirectory(prefix="modewright-") as name:
         folder = Path(name)
@@ -51,14 +51,19 @@ def explored(
         flags = [flag for flag in FLAGS if flag != "-O2"]
         command = [FUZZER, *flags, "-O1", "-fsanitize=fuzzer", *map(str, sources)]
         output_of([*command, "-o", APP, "-lm"], folder)
-        (folder / CORPUS).mkdir()
-        limits = [f"-runs={runs}", f"-max_len={longest(program)}", "-len_control=0"]
-        rest = [f"-timeout={STUCK}", "-use_value_profile=1", CORPUS]
+        limits = [f"-runs={runs}", f"-max_len={longest(program)}", "-len_control=0", "-reload=0"]
+        rest = [f"-timeout={STUCK}", "-use_value_profile=1"]
+        found: list[Path] = []
         for seed in seeds:
-            done = ran(folder / APP, [*limits, f"-seed={seed}", *rest])
+            corpus = folder / f"corpus_{seed}"
+            corpus.mkdir()
+            (folder / KNOWN).write_text(",".join(map(str, found)))
+            known = [f"-seed_inputs=@{KNOWN}"] if found else []
+            done = ran(folder / APP, [*limits, f"-seed={seed}", *rest, *known, corpus.name])
             if done.found:
                 raise BuildError(done.found[0])
-        return tuple(path.read_bytes() for path in sorted((folder / CORPUS).iterdir()))
+            found = sorted([*found, *corpus.iterdir()], key=lambda path: path.name)
+        return tuple(path.read_bytes() for path in found)
 
 
 def records(

@@ -10,7 +10,6 @@ is set.
 
 from __future__ import annotations
 
-from language.limit import stored
 from language.lower import Names, equations, expression
 from language.model import Automaton, Mode
 from language.motion import RUN_HALVINGS
@@ -53,7 +52,7 @@ from language.past import (
 from language.program import Variable
 from language.region import closure, sources
 from language.resting import moving
-from language.run import run_block
+from language.run import holding, run_block
 from language.wiring import equation_variables
 
 REWIND_LIMIT = "rewind_limit"
@@ -179,15 +178,21 @@ def _located(rewinding: Rewinding) -> Block:
     )
     now = (*states_as_now(automaton, "after"), *inputs_as_now(automaton, "after"))
     ops: list[Op] = [Branch(Compare("==", BACK, whole(1)), now, ring)]
-    ops += _along(rewinding) if rewinding.flow else _tick_after(automaton)
-    moves = moving(automaton.model, rewinding.flow) if automaton.model and rewinding.flow else ()
-    for name in taken_back(automaton):
-        there = Ref(f"work.at_{name}")
-        if name in moves:
-            ops += stored(automaton, name, there)
-        else:  # what it was at a tick, in its range
-            ops.append(Assign(f"state.{name}", there))
-    return tuple(ops)
+    there = [Assign(f"state.{name}", Ref(f"work.at_{name}")) for name in taken_back(automaton)]
+    if rewinding.flow is None:
+        return (*ops, *_tick_after(automaton), *there)
+    before, held = _held_there(rewinding, rewinding.flow)
+    return (*ops, *_along(rewinding), *before, *there, *held)
+
+
+def _held_there(rewinding: Rewinding, flow: str) -> tuple[Block, Block]:
+    """Return what stands before and after the states are put at the crossing: what moves there is
+    held as after a segment of a run (rule 18), what rests is what it was at a tick.
+    """
+    automaton = rewinding.automaton
+    run = automaton.target(rewinding.transition).run
+    assert automaton.model and run
+    return holding(automaton, run.method, moving(automaton.model, flow))
 
 
 def _tick_after(automaton: Automaton) -> list[Op]:

@@ -7,7 +7,7 @@ mode of ours that runs, `run_<mode>`: the period, segment by segment, at most `e
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -149,8 +149,7 @@ def run_block(automaton: Automaton, run: ModelRun, rest: Expr | None = None) -> 
     assert model and automaton.period is not None
     field = Field(model, {}, {}, MODE, "")
     length = real(automaton.period / run.substeps) if rest is None else rest
-    before, after = kept(automaton, carried_on(model))
-    held: Block = (Run(HOLD),) if run.method in DIVIDING and after else tuple(after)
+    before, held = holding(automaton, run.method, carried_on(model))
     inside, outside = (held, ()) if run.follow and run.method in DIVIDING else ((), held)
     if run.follow:
         body = _through_events(automaton, field, run, length, inside)
@@ -158,6 +157,16 @@ def run_block(automaton: Automaton, run: ModelRun, rest: Expr | None = None) -> 
         body = _one_flow(automaton, field, run, length)
     moved: Block = body if run.substeps == 1 else (Loop(run.substeps, "work.substep", body),)
     return (*before, *moved, *outside)
+
+
+def holding(automaton: Automaton, method: str, names: Sequence[str]) -> tuple[Block, Block]:
+    """Return what stands before and after operations that move some states of the model: they are
+    held in their ranges, by the block of all runs where there is one.
+    """
+    assert automaton.model
+    is_shared = method in DIVIDING
+    before, after = kept(automaton, carried_on(automaton.model) if is_shared else names)
+    return tuple(before), (Run(HOLD),) if is_shared and after else tuple(after)
 
 
 def _through_events(
