@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from codegen.build import compiler, optimised
+from codegen.build import compiler, compiler_version, optimised
 from codegen.harness import write_harness
+from codegen.objects import is_shared, object_of
 from language.program import Program
 from lockstep.compare import Tape, Verdict, judged
 
@@ -72,6 +73,8 @@ def _sources(program: Program, folder: Path) -> list[Path]:
 
 
 def _compiled(source: Path) -> Path:
+    if is_shared(source):
+        return object_of(source, [*compiler(), *FLAGS], compiler_version(), source.parent / "room")
     target = source.with_suffix(".o")
     _done([*compiler(), *FLAGS, "-c", str(source), "-o", str(target)])
     return target
