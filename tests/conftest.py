@@ -30,6 +30,12 @@ def pytest_collection_finish() -> None:
     look_rarely()
 
 
+def pytest_sessionfinish() -> None:
+    """Look for garbage once more: pytest does five times, which finds nothing then."""
+    gc.collect()
+    gc.freeze()
+
+
 @pytest.fixture(scope="session", autouse=True)
 def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """Keep compiled programs in a folder of the tests, one for all workers, not in the home."""
