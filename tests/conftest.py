@@ -12,8 +12,15 @@ import pytest
 import typer
 from hypothesis import settings
 
+from language import load
 from modewright.garbage import look_rarely
+from tests.once import lowered_once, shipped_once
 
+load.program_of = lowered_once(load.program_of)  # before it is imported by name
+from modewright import api  # noqa: E402
+
+for name in ("load", "program"):
+    setattr(api, name, shipped_once(getattr(api, name)))
 settings.register_profile("ci", derandomize=True, max_examples=30, deadline=None)
 settings.register_profile("verify", max_examples=1000, deadline=None)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
