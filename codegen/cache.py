@@ -12,7 +12,7 @@ import os
 import stat
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
 
@@ -49,23 +49,38 @@ def cache_fault(folder: Path) -> str:
     return ""
 
 
-def key_of(sources: Sequence[Path], command: Sequence[str], version: str) -> str:
-    """Return the key of a program: what is compiled, all in one folder, by what, and how."""
+def key_of(
+    sources: Sequence[Path],
+    command: Sequence[str],
+    version: str,
+    read: Iterable[Path] | None = None,
+) -> str:
+    """Return the key of a program: what is compiled, all in one folder, by what, and how.
+
+    `read` are the files of that folder that it follows from, if not all of them.
+    """
     digest = hashlib.sha256()
     for text in (*command, version, *(path.name for path in sources)):
         digest.update(text.encode() + b"\0")
     folder = sources[0].parent
-    for path in sorted(path for path in folder.rglob("*") if path.is_file()):
+    found = folder.rglob("*") if read is None else read
+    for path in sorted(path for path in found if path.is_file()):
         name = path.relative_to(folder).as_posix()
         digest.update(name.encode() + b"\0" + path.read_bytes() + b"\0")
     return digest.hexdigest()
 
 
-def stored(key: str, make: Callable[[Path], None], spare: Path) -> Path:
-    """Return the program of a key, made by `make` if it is not kept; in `spare` without a cache."""
+def stored(key: str, make: Callable[[Path], None], spare: Path, part: str = "") -> Path:
+    """Return the program of a key, made by `make` if it is not kept; in `spare` without a cache.
+
+    `part` is the folder inside the cache where others than programs are kept.
+    """
     try:
         folder = cache_folder()
         fault = cache_fault(folder)
+        if part and not fault:
+            folder /= part
+            fault = cache_fault(folder)
     except (OSError, RuntimeError) as error:  # no home folder
         folder, fault = spare, str(error)
     if fault:

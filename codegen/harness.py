@@ -13,6 +13,7 @@ from codegen.build import FLAGS, WARNINGS, compiler_version, linked
 from codegen.cache import key_of, stored
 from codegen.machine import HOST, Machine, harness_file
 from codegen.names import REAL, CNames, c_member, c_type
+from codegen.objects import with_objects
 from codegen.rendering import render
 from codegen.source import c_files, stepped
 from language.program import Constant, Program, Variable
@@ -111,9 +112,14 @@ def executable(
         sources = write_harness(program, folder, machine, main)
         command, link = machine.command(named), machine.link(folder / "harness")
         version = compiler_version(command[0])
-        key = key_of(sources, [*command, *flags, *WARNINGS, *machine.link(Path())], version)
-        words = [*command, *flags, *WARNINGS, *map(str, sources), *link]
-        yield stored(key, lambda target: linked(words, target), folder)
+        words = [*command, *flags, *WARNINGS]
+        key = key_of(sources, [*words, *machine.link(Path())], version)
+
+        def make(target: Path) -> None:
+            parts = with_objects(sources, words, version, folder / "objects")
+            linked([*words, *map(str, parts), *link], target)
+
+        yield stored(key, make, folder)
 
 
 def _context(program: Program) -> Mapping[str, object]:

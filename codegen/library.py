@@ -17,6 +17,7 @@ from typing import Any
 from codegen.abreast import LANES
 from codegen.build import FLAGS, SECONDS, BuildError, compiler, compiler_version
 from codegen.cache import cache_folder, key_of, stored
+from codegen.objects import is_shared, object_of
 from codegen.run_places import column_places, row_width
 from codegen.run_source import run_files
 from language.assembly import Assembly
@@ -222,20 +223,23 @@ def build_library(
 ) -> None:
     """Compile the sources side by side, and link them."""
     command = compiler(named)
-    objects = [source.with_suffix(".o") for source in sources]
+    words = [*command, *flags, "-fPIC"]
+    version, room = compiler_version(named), sources[0].parent / "objects"
+    shared = [object_of(s, words, version, room) for s in sources if is_shared(s)]
+    objects = [source.with_suffix(".o") for source in sources if not is_shared(source)]
     running = [
         subprocess.Popen(
-            [*command, *flags, "-fPIC", "-c", str(source), "-o", str(made)],
+            [*words, "-c", str(made.with_suffix(".c")), "-o", str(made)],
             stderr=subprocess.PIPE,
             text=True,
         )
-        for source, made in zip(sources, objects, strict=True)
+        for made in objects
     ]
     for process in running:
         _, told = process.communicate(timeout=SECONDS)
         if process.returncode != 0:
             raise BuildError(told.strip())
-    link = [*command, "-shared", *map(str, objects), "-lm", "-o", str(target)]
+    link = [*command, "-shared", *map(str, objects + shared), "-lm", "-o", str(target)]
     done = subprocess.run(link, capture_output=True, text=True, timeout=SECONDS, check=False)
     if done.returncode != 0:
         raise BuildError(done.stderr.strip())

@@ -10,7 +10,7 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,6 +29,8 @@ from sweep.table import Reals, Table
 REPLICATES = 500
 """Of the bootstrap: the ends of an interval at 95 % stand on a dozen of them each."""
 SEED = 1
+AT_ONCE = 1 << 17
+"""Numbers that are drawn again at once: as many as a cache holds."""
 FEWEST = 4
 """Complete blocks or paths below which nothing is told."""
 NAMES = {"saltelli": ("first", "total"), "morris": ("mu_star", "mu", "sigma")}
@@ -86,6 +88,15 @@ class Sensitivity:
         return text.getvalue()
 
 
+@dataclass(frozen=True)
+class Group:
+    """What has a design of its own: its names, its variants (n_variants,), and what moved there."""
+
+    named: Mapping[str, str]
+    chosen: NDArray[np.bool_]
+    moved: frozenset[str]
+
+
 def sensitivity_of(store: Store) -> Sensitivity:
     """Return the indices of what a store holds so far. Raises SpecError, ToolMissing."""
     manifest, design = store.manifest, store.manifest.design
@@ -94,11 +105,12 @@ def sensitivity_of(store: Store) -> Sensitivity:
         hint = "draw them by `sampling: {saltelli: 256, seed: 1}`, or fewer by `{morris: 50}`"
         raise refused(store.folder, "store", label, hint)
     table = Table(store)
+    groups = list(_groups(table, design))
     found = [
         index
         for column in manifest.measures
         if column.type != "list"
-        for index in _of_measure(table, design, column)
+        for index in _of_measure(table, design, column, groups)
     ]
     return Sensitivity(
         study=manifest.study,
@@ -112,23 +124,23 @@ def sensitivity_of(store: Store) -> Sensitivity:
 
 
 def sobol_indices(results: Reals) -> dict[str, Reals]:
-    """Return indices (d,) of results (n, d + 2) at A, B and A with a column of B."""
-    a, b, mixed = results[:, :1], results[:, 1:2], results[:, 2:]
+    """Return indices (..., d) of results (..., n, d + 2) at A, B and A with a column of B."""
+    a, b, mixed = results[..., :1], results[..., 1:2], results[..., 2:]
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        variance = np.var(results[:, :2])
-        mean = np.mean(results[:, :2])
-        first = np.mean((b - mean) * (mixed - a), axis=0) / variance
-        total = 0.5 * np.mean((a - mixed) ** 2, axis=0) / variance
+        variance = np.var(results[..., :2], axis=(-2, -1))[..., None]
+        mean = np.mean(results[..., :2], axis=(-2, -1), keepdims=True)
+        first = np.mean((b - mean) * (mixed - a), axis=-2) / variance
+        total = 0.5 * np.mean((a - mixed) ** 2, axis=-2) / variance
     return {"first": first, "total": total}
 
 
 def morris_indices(effects: Reals) -> dict[str, Reals]:
-    """Return indices (d,) of elementary effects (n, d)."""
+    """Return indices (..., d) of elementary effects (..., n, d)."""
     with np.errstate(over="ignore", invalid="ignore"):  # what is too large is no number: not told
         return {
-            "mu_star": np.mean(np.abs(effects), axis=0),
-            "mu": np.mean(effects, axis=0),
-            "sigma": np.std(effects, axis=0, ddof=1),
+            "mu_star": np.mean(np.abs(effects), axis=-2),
+            "mu": np.mean(effects, axis=-2),
+            "sigma": np.std(effects, axis=-2, ddof=1),
         }
 
 
@@ -148,13 +160,16 @@ def elementary_effects(results: Reals, shares: Reals) -> Reals:
     return found
 
 
-def _of_measure(table: Table, design: Design, column: Column) -> Iterator[Index]:
+def _of_measure(
+    table: Table, design: Design, column: Column, groups: Iterable[Group]
+) -> Iterator[Index]:
     """Yield the indices of a measure in each group: variant, scenario, point of the grid."""
     size = len(design.names)
     samples = table.reals("sample").astype(np.int64)
     values = np.where(table.is_done, table.reals(column.name), np.nan)
     confidence = table.store.manifest.presentation.confidence
-    for group, chosen in _groups(table, design):
+    for group in groups:
+        chosen = group.chosen
         results = _at(samples[chosen], values[chosen], design)
         fine = np.flatnonzero(~np.isnan(results).any(axis=1))
         used, _ = scaled(results[fine])  # shares of a variance have no unit
@@ -172,12 +187,14 @@ def _of_measure(table: Table, design: Design, column: Column) -> Iterator[Index]
         for place, name in enumerate(design.names):
             own: dict[str, float] = dict.fromkeys(found, np.nan)
             sure: dict[str, Interval] = dict.fromkeys(found)
-            if _has_moved(table.reals(name)[chosen]):
+            if name in group.moved:
                 own = {key: float(numbers[place]) for key, numbers in found.items()}
                 sure |= {
                     key: _interval(low[place], high[place]) for key, (low, high) in ends.items()
                 }
-            yield Index(group, column.name, column.unit, name, own, sure, len(used), design.planned)
+            yield Index(
+                group.named, column.name, column.unit, name, own, sure, len(used), design.planned
+            )
 
 
 def _has_moved(drawn: Reals) -> bool:
@@ -198,8 +215,16 @@ def _at(samples: NDArray[np.int64], values: Reals, design: Design) -> Reals:
     return np.asarray(means.reshape(-1, design.each))
 
 
-def _groups(table: Table, design: Design) -> Iterator[tuple[dict[str, str], NDArray[np.bool_]]]:
+def _groups(table: Table, design: Design) -> Iterator[Group]:
     """Yield what has a design of its own: told by name where there are several."""
+    drawn = {name: table.reals(name) for name in design.names}
+    for named, chosen in _chosen(table, design):
+        moved = {name for name, values in drawn.items() if _has_moved(values[chosen])}
+        yield Group(named, chosen, frozenset(moved))
+
+
+def _chosen(table: Table, design: Design) -> Iterator[tuple[dict[str, str], NDArray[np.bool_]]]:
+    """Yield the names of each group, and which variants (n_variants,) are its own."""
     axes = [c.name for c in table.store.manifest.varied if c.name not in design.names]
     keys = {name: group_values(table, name) for name in ("variant", "scenario", *axes)}
     keys = {name: key for name, key in keys.items() if len(key[1]) > 1}
@@ -216,12 +241,17 @@ def _intervals(
     used: Reals, estimate: Callable[[Reals], dict[str, Reals]], confidence: float
 ) -> dict[str, tuple[Reals, Reals]]:
     """Return the ends (d,) of the intervals of indices: whole blocks or paths are drawn again."""
-    source = np.random.default_rng(SEED)
-    drawn = [estimate(used[source.integers(0, len(used), len(used))]) for _ in range(REPLICATES)]
+    source, count = np.random.default_rng(SEED), len(used)
+    size = max(1, AT_ONCE // used.size)
+    drawn = [
+        estimate(used[source.integers(0, count, (min(size, REPLICATES - first), count))])
+        for first in range(0, REPLICATES, size)
+    ]
     rest = (1.0 - confidence) / 2.0
     found = {}
     for key in drawn[0]:
+        replicates = np.concatenate([some[key] for some in drawn])
         with np.errstate(invalid="ignore"):  # of a measure that is the same everywhere
-            low, high = np.quantile([one[key] for one in drawn], (rest, 1.0 - rest), axis=0)
+            low, high = np.quantile(replicates, (rest, 1.0 - rest), axis=0)
         found[key] = (low, high)
     return found

@@ -5,13 +5,22 @@ from __future__ import annotations
 import gc
 import os
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
+import typer
 from hypothesis import settings
 
+from language import load
 from modewright.garbage import look_rarely
+from tests.once import lowered_once, shipped_once
 
+load.program_of = lowered_once(load.program_of)  # before it is imported by name
+from modewright import api  # noqa: E402
+
+for name in ("load", "program"):
+    setattr(api, name, shipped_once(getattr(api, name)))
 settings.register_profile("ci", derandomize=True, max_examples=30, deadline=None)
 settings.register_profile("verify", max_examples=1000, deadline=None)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
@@ -30,6 +39,12 @@ def pytest_collection_finish() -> None:
     look_rarely()
 
 
+def pytest_sessionfinish() -> None:
+    """Look for garbage once more: pytest does five times, which finds nothing then."""
+    gc.collect()
+    gc.freeze()
+
+
 @pytest.fixture(scope="session", autouse=True)
 def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """Keep compiled programs in a folder of the tests, one for all workers, not in the home."""
@@ -38,6 +53,14 @@ def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     folder.mkdir(mode=0o700, exist_ok=True)
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("MODEWRIGHT_CACHE", str(folder))
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _commands_are_made_once() -> Iterator[None]:
+    """A command line looks at the parameters of its thirty commands when it is called."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(typer.main, "get_command", cache(typer.main.get_command))
         yield
 
 

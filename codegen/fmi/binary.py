@@ -8,8 +8,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from codegen.build import FLAGS, WARNINGS, BuildError, compiler, linked
+from codegen.build import FLAGS, WARNINGS, BuildError, compiler, compiler_version, linked
 from codegen.fmi.variable import Version
+from codegen.objects import with_objects
 
 SHARED = ("-shared", "-fPIC", "-fvisibility=hidden", "-s")
 """Only what the standard names is seen; without symbols, so that bytes do not tell of folders."""
@@ -52,8 +53,9 @@ def binary(files: Mapping[str, bytes], headers: Mapping[str, bytes]) -> bytes:
         for path, data in files.items():
             folder = standard if Path(path).name in headers else ours
             (folder / Path(path).name).write_bytes(data)
-        sources = sorted(str(path) for path in ours.glob("*.c"))
-        command = [*compiler(), *FLAGS, *WARNINGS, *SHARED, "-isystem", str(standard), *sources]
+        words = [*compiler(), *FLAGS, *WARNINGS, *SHARED]
+        room = Path(name) / "objects"
+        parts = with_objects(sorted(ours.glob("*.c")), words, compiler_version(), room)
         target = Path(name) / "library"
-        linked([*command, "-lm"], target)
+        linked([*words, "-isystem", str(standard), *map(str, parts), "-lm"], target)
         return target.read_bytes()

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 from pathlib import Path
 
 import pytest
 
 from codegen import cache, harness
-from codegen.build import FLAGS, linked, run_executable
+from codegen.build import FLAGS, compiler, linked, run_executable
 from codegen.harness import executable
+from codegen.objects import object_of
 from lockstep.compare import compare
 from tests.lockstep.heater import heater, heater_tape
+
+PARTS = ["ha_math.c", "stdio.c"]
+"""What does not follow from a Program."""
 
 
 @pytest.fixture
@@ -32,6 +37,10 @@ def compiled(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
 
     monkeypatch.setattr(harness, "linked", counting)
     return made
+
+
+def files(folder: Path) -> list[Path]:
+    return [path for path in folder.iterdir() if path.is_file()]
 
 
 def programs(folder: Path) -> list[Path]:
@@ -145,7 +154,54 @@ def test_the_oldest_programs_go_after_a_day(folder: Path, monkeypatch: pytest.Mo
     os.utime(old, (1.0, 1.0))
     with executable(heater(), (*FLAGS, "-O1")) as new:
         assert programs(folder) == [new]
-    assert len(list(folder.iterdir())) == 2, "its seal has gone too"
+    assert len(files(folder)) == 2, "its seal has gone too"
+
+
+@pytest.fixture
+def objects(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The sources that were compiled to an object, call by call."""
+    made: list[str] = []
+
+    def counting(command: list[str], target: Path) -> None:
+        made.append(Path(command[-1]).name)
+        linked(command, target)
+
+    monkeypatch.setattr("codegen.objects.linked", counting)
+    return made
+
+
+def test_what_is_the_same_in_many_programs_is_compiled_once(
+    folder: Path, compiled: list[Path], objects: list[str]
+) -> None:
+    for name in ("room", "other"):
+        with executable(dataclasses.replace(heater(), name=name)):
+            pass
+    assert (len(compiled), objects) == (2, PARTS)
+    with executable(heater(), (*FLAGS, "-O1")):
+        pass
+    assert (len(compiled), objects) == (3, PARTS * 2)
+    assert (folder / "objects").stat().st_mode & 0o777 == 0o700
+
+
+def test_a_damaged_object_is_compiled_anew(folder: Path, objects: list[str]) -> None:
+    assert compare(heater_tape()).is_equal
+    for target in programs(folder / "objects"):
+        target.write_bytes(target.read_bytes()[:100])
+    (program,) = programs(folder)
+    program.unlink()
+    assert compare(heater_tape()).is_equal
+    assert objects == PARTS * 2
+
+
+def test_an_object_follows_from_what_is_read(tmp_path: Path, objects: list[str]) -> None:
+    """The mathematics have one header; what is beside them is of one program."""
+    source, header = tmp_path / "ha_math.c", tmp_path / "ha_math.h"
+    source.write_text('#include "ha_math.h"\nint ha_one(void)\n{\n    return ONE;\n}\n')
+    for one, beside, count in ((1, "a", 1), (1, "b", 1), (2, "b", 2)):
+        header.write_text(f"#define ONE {one}\nint ha_one(void);\n")
+        (tmp_path / "beside.h").write_text(beside)
+        object_of(source, [*compiler(), *FLAGS], "here", tmp_path / "room")
+        assert objects == ["ha_math.c"] * count
 
 
 def test_the_cache_is_below_the_users_cache_folder(

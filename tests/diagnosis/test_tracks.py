@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from codegen import predictor as predictor_module
 from codegen.predictor import Predictor
 from codegen.runs import Prediction, Recorded
+from diagnosis import recipe
 from diagnosis.bench import Bench, balance_drifts
 from diagnosis.candidate import Candidate
 from diagnosis.layers import fitting, shipped_effects
 from diagnosis.series import Series
 from language.load import automaton_of
 from language.project import Project, expanded, read_document
+from tests.diagnosis.conftest import SOON
 from tests.diagnosis.test_estimation import PERIOD, SEEN
 from tests.language.making import ROOT
 
@@ -40,6 +44,11 @@ LAID = {
     "tyre_slip@vehicle": True,
 }
 """Effects on the blind driveline: whether recordings go side by side."""
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _predictors_are_compiled_soon() -> None:
+    """Not those of these tests: what goes side by side is in vectors, as a user has it."""
 
 
 @pytest.fixture(scope="module")
@@ -119,6 +128,29 @@ def test_side_by_side_they_have_the_bits_of_one(effect: str, bench: Bench) -> No
         assert np.array_equal(whole[r].modes[: run.done], run.modes[: run.done])
     assert done[0].tolist() == [150, 60, 211, 40, 171]
     assert len({int(mode) for one in whole for mode in one.modes}) > 1
+
+
+@pytest.mark.parametrize("effect", ["", "torque_ripple@T_em", "backlash@half_shaft"])
+def test_other_tests_follow_with_the_same_bits(
+    effect: str, bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """They compile sooner: see conftest.py."""
+    found: list[tuple[Reals, NDArray[np.int64]]] = []
+    for flags in (predictor_module.LIBRARY_FLAGS, SOON):
+        monkeypatch.setattr(predictor_module, "LIBRARY_FLAGS", flags)
+        folder = tmp_path / str(len(found))
+        folder.mkdir()
+        monkeypatch.setattr(recipe, "_folder", lambda folder=folder: folder)
+        predictor = candidate_of(dataclasses.replace(bench, _made={}), effect).predictor
+        given, draw = recorded(predictor, 3), np.random.default_rng(5)
+        pages = np.tile(list(predictor.page.values()), (1, len(COUNTS), 1))
+        first, steady = (gains_of(predictor, draw, n) for n in (FIRST, len(predictor.modes)))
+        found.append(predictor.predict_points(pages, given, first, steady, 2))
+    (mine, done), (theirs, other) = found
+    assert_same(mine, theirs)
+    assert np.array_equal(done, other)
+    plain, soon = (path.read_bytes() for path in sorted(tmp_path.glob("*/*.so")))
+    assert plain != soon
 
 
 @pytest.mark.parametrize("effect", LAID)

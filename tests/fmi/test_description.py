@@ -5,12 +5,15 @@ from __future__ import annotations
 import io
 import zipfile
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 from fmpy import read_model_description
 from fmpy.validation import validate_fmu
+from lark import Lark
 
 from codegen.fmi.archive import fmu
 from codegen.fmi.content import HEADERS, fmu_files
@@ -46,6 +49,12 @@ NAMES = ("EOF", "stdin", "BUFSIZ", "RAND_MAX", "COUNT", "PERIOD", "STEPPING", "v
 """Words of C and of our own templates that a spec may use."""
 
 
+@cache
+def grammar(text: str, start: str) -> SimpleNamespace:
+    """A grammar as FMPy has it, that remembers which names it has found to be legal."""
+    return SimpleNamespace(parse=cache(Lark(text, start=start).parse))
+
+
 def described(packed: bytes) -> dict[str, Any]:
     """Return the variables of an FMU by name, as FMPy reads them."""
     description = read_model_description(io.BytesIO(packed))
@@ -56,7 +65,9 @@ def validated(packed: bytes, folder: Path) -> list[str]:
     """Return the problems that FMPy finds in an FMU."""
     path = folder / "packed.fmu"
     path.write_bytes(packed)
-    found: list[str] = validate_fmu(str(path))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("lark.Lark", grammar)  # it parses each name letter by letter
+        found: list[str] = validate_fmu(str(path))
     return found
 
 
@@ -94,6 +105,14 @@ def test_a_wrong_description_is_found(
     problems = validated(wrong, tmp_path)
     assert problems
     assert told in " ".join(problems)
+
+
+def test_a_name_that_is_not_legal_is_found_each_time(version: Version, tmp_path: Path) -> None:
+    packed = fmu(program("contactor"), version, is_source_only=True)
+    old, new = b'name="command"', b'name="7 commands"'
+    wrong = altered(packed, "modelDescription.xml", lambda data: data.replace(old, new))
+    for _ in range(2):
+        assert "is not a legal variable name" in " ".join(validated(wrong, tmp_path))
 
 
 def test_modes_and_words_are_enumerations_with_their_numbers(version: Version) -> None:

@@ -5,14 +5,18 @@ from __future__ import annotations
 import subprocess
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 
-from codegen.build import compiler, optimised
+from codegen.build import compiler, compiler_version, optimised
 from codegen.harness import write_harness
+from codegen.objects import is_shared, object_of
 from language.program import Program
 from lockstep.compare import Tape, Verdict, judged
 
 FLAGS = (*optimised("O1"), "-w")
+QUICK = (*optimised("O0"), "-w")
+"""Where a difference has to be seen that an optimiser has no part in."""
 SECONDS = 300
 MAIN = "int main(void)"
 DISPATCH = """\
@@ -32,7 +36,9 @@ int main(int count, char **words)
 class Batch:
     """Compiles once, then runs any of its Programs on records of inputs."""
 
-    def __init__(self, programs: Sequence[Program], folder: Path) -> None:
+    def __init__(
+        self, programs: Sequence[Program], folder: Path, flags: Sequence[str] = FLAGS
+    ) -> None:
         """Write and compile the C of the Programs; two compilers run side by side."""
         folder.mkdir(parents=True, exist_ok=True)
         names = [program.name for program in programs]
@@ -43,7 +49,7 @@ class Batch:
         (folder / "main.c").write_text(DISPATCH % (declared, "\n".join(pieces)))
         unique = list(dict.fromkeys([*sources, folder / "main.c"]))
         with ThreadPoolExecutor(2) as pool:
-            objects = list(pool.map(_compiled, unique))
+            objects = list(pool.map(partial(_compiled, flags), unique))
         self._target = folder / "batch"
         _done([*compiler(), *map(str, objects), "-lm", "-o", str(self._target)])
 
@@ -71,9 +77,11 @@ def _sources(program: Program, folder: Path) -> list[Path]:
     return [unit, *(path for path in written if path.name not in own)]
 
 
-def _compiled(source: Path) -> Path:
+def _compiled(flags: Sequence[str], source: Path) -> Path:
+    if is_shared(source):
+        return object_of(source, [*compiler(), *flags], compiler_version(), source.parent / "room")
     target = source.with_suffix(".o")
-    _done([*compiler(), *FLAGS, "-c", str(source), "-o", str(target)])
+    _done([*compiler(), *flags, "-c", str(source), "-o", str(target)])
     return target
 
 

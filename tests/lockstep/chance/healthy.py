@@ -11,7 +11,7 @@ from engine.closures import Compiler
 from language.number import NUMBERS
 from language.program import Program
 from lockstep.compare import Tape, Verdict, judged
-from tests.lockstep.chance.batch import Batch
+from tests.lockstep.chance.batch import QUICK, Batch
 from tests.lockstep.chance.kinds import chance
 from tests.lockstep.chance.mutant import Mutant
 from tests.lockstep.chance.running import taped
@@ -57,7 +57,7 @@ def killed_by(
         some = specs[start : start + AT_ONCE * len(NUMBERS)]
         with patch.context() as patched:
             mutant.patch(patched)
-            batch = Batch([one.program for one in some], folder / str(start))
+            batch = Batch([one.program for one in some], folder / str(start), QUICK)
         for one in some:
             if not batch.verdict(one.tape).is_equal:
                 return one.program.name
