@@ -206,9 +206,13 @@ class ChartContract:
     def _selected(self) -> dict[str, Node]:
         """The region that a part of `select_transitions` chooses in."""
         regions = {self.words.mode(r.region): r for r in self.charting.chart.regions}
-        ops = self._ops(SELECT)
-        found = {name: op for name, op in ops.items() if isinstance(op, Choose)}
-        return {name: regions[op.selector] for name, op in found.items()}
+        found = {name: _inner(op) for name, op in self._ops(SELECT).items()}
+        return {name: regions[op.selector] for name, op in found.items() if isinstance(op, Choose)}
+
+
+def _inner(op: Op) -> Op:
+    """Return the choice of a region, also where it is made only if no fault happened."""
+    return op.other[0] if isinstance(op, Branch) and not op.then and op.other else op
 
 
 def _is_choice(op: Op) -> bool:
