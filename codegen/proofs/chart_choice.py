@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from codegen.proofs.chart_fault import ChartFault, is_of_fault
-from codegen.proofs.configuration import Configuration, all_of
+from codegen.proofs.configuration import Configuration, all_of, any_of
 from language.activation import Edge, edges_by_mode, guard_names, value_of
 from language.activity import is_complete
 from language.chart import Node
@@ -52,6 +52,12 @@ class Choice:
             yield f"ensures ({here} ==> {self._wished(region, leaf)});"
         known = " || ".join(f"{words.now(mode)} == {leaf.number}" for leaf in leaves)
         yield f"ensures ({known}) || {words.now(name)} == 0;"
+        sources = [f"{words.now(name)} == 0"]
+        for transition, way in words.charting.ways_in(region.region):
+            own = words.is_one(name, [words.number(transition)], words.now)
+            source = words.is_active(words.charting.chart.nodes[way.source], words.now)
+            sources.append(f"({own} && {source})")
+        yield f"ensures {any_of(sources)};"
         for node in words.charting.chart.nodes:
             if node.region == region.region and words.charting.ways_of(node):
                 active = words.is_active(node, words.now)

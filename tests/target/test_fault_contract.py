@@ -123,6 +123,23 @@ MISTAKES = {
         "        self->mode_safe_s_r = guarded_safe_s_r_inactive;\n"
         "        self->mode = guarded_MODE_safe_t;",
     ),
+    "a micro-step is done past the bound": (
+        "micro_step_3",
+        "        if (work->is_over) {",
+        "        if (!work->is_over) {",
+    ),
+    "the bound is another": (
+        "micro_step_3",
+        "work->is_over = work->steps == 3;",
+        "work->is_over = work->steps == 4;",
+    ),
+    "a tick goes on when nothing is taken": (
+        "micro_step",
+        "    } else {\n        work->is_busy = false;\n    }\n    work->is_first",
+        "    } else {\n        work->is_busy = true;\n    }\n    work->is_first",
+    ),
+    "a tick ends with something left to do": ("jump", "turn < 5;", "turn < 3;"),
+    "a tick counts on from the one before": ("jump", "    work->steps = 0;\n", ""),
 }
 
 
@@ -157,6 +174,7 @@ LOWERED: dict[str, tuple[str, object, str]] = {
     ),
 }
 """What is exchanged, for what, and the function whose contract does not hold then."""
+WHOLE = ("select_transitions", "hear", "commit", "micro_step_1", "micro_step_2")
 
 
 @pytest.mark.parametrize("order", ["outer_first", "inner_first"])
@@ -166,7 +184,7 @@ def test_that_the_fault_mode_is_entered_from_anywhere_is_proven(order: str, tmp_
     functions |= {function for _, _, function in LOWERED.values()}
     made, files = lowered(order)
     names = set(written(made, files, tmp_path))
-    whole = names & {*functions, "select_transitions", "hear", "commit"}
+    whole = names & {*functions, *WHOLE}
     found = proven_of(NAME, sorted(whole), tmp_path)
     assert found.open == ()
     assert found.proven == found.asked > 100
