@@ -136,14 +136,13 @@ def _wish(charting: Charting, region: Node, blocks: dict[str, Block]) -> Block:
     found: Block = (Choose(mode_variable("memory.mode", region.region), tuple(cases)),)
     if not cases:
         return ()
-    if charting.automaton.fault_mode and region.path != CHART and _is_of_chart(charting, region):
-        return (Branch(Ref(HAPPENED), (), found),)
-    return found
+    return (Branch(Ref(HAPPENED), (), found),) if _yields(charting, region) else found
 
 
-def _is_of_chart(charting: Charting, region: Node) -> bool:
-    *_, root = charting.chart.outer(region)
-    return root.path == CHART
+def _yields(charting: Charting, region: Node) -> bool:
+    """Tell whether a fault leaves a region: the mode of the chart that holds it has a way out."""
+    holding = [leaf for leaf in charting.chart.leaves(CHART) if leaf.holds(region.index)]
+    return any(way.priority == FAULT_FIRST for leaf in holding for way in charting.ways_of(leaf))
 
 
 def _wish_in(charting: Charting, leaf: Node, blocks: dict[str, Block]) -> Block:

@@ -2,15 +2,17 @@
 
 A region wishes for the first enabled transition, by priority, of the outermost or innermost of its
 active modes that has one; a wait is over when its guard was true in one tick more than it takes.
+When a fault happened it wishes for the fault mode, or for nothing (`chart_fault.py`).
 """
 
 from __future__ import annotations
 
 from collections import ChainMap
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
-from codegen.proofs.configuration import Configuration, all_of
+from codegen.proofs.chart_fault import ChartFault, is_of_fault
+from codegen.proofs.configuration import Configuration, all_of, any_of
 from language.activation import Edge, edges_by_mode, guard_names, value_of
 from language.activity import is_complete
 from language.chart import Node
@@ -32,7 +34,8 @@ class Choice:
     def of_mode(self, node: Node) -> Iterator[str]:
         """Yield what `choose_<mode>` leaves. Raises Unsaid."""
         name = wish(node.region)
-        yield f"ensures {self.words.now(name)} == {self._chain([node], self.words.before(name))};"
+        found = self._first(self._ordered([node]), self.words.before(name))
+        yield f"ensures {self.words.now(name)} == {found};"
 
     def counted(self, node: Node) -> Iterator[str]:
         """Yield what `count_<mode>` leaves. Raises Unsaid."""
@@ -40,36 +43,67 @@ class Choice:
 
     def of_region(self, region: Node) -> Iterator[str]:
         """Yield what is wished for in a region, and what its modes count. Raises Unsaid."""
-        chart, words = self.words.charting.chart, self.words
+        words = self.words
         name, mode = wish(region.region), words.mode(region.region)
-        wishes = []
-        for leaf in chart.leaves(region.region):
-            chain = [n for n in chart.chain(leaf) if words.charting.ways_of(n)]
-            ordered = chain if chart.order == "inner_first" else chain[::-1]
+        leaves = words.charting.chart.leaves(region.region)
+        for leaf in leaves:
             assert leaf.number is not None
             here = f"{words.now(mode)} == {words.place.whole(mode, leaf.number)}"
-            wishes.append(f"({here} ==> {words.now(name)} == {self._chain(ordered, '0')})")
-        for said in wishes:
-            yield f"ensures {said};"
-        known = " || ".join(
-            f"{words.now(mode)} == {leaf.number}" for leaf in chart.leaves(region.region)
-        )
+            yield f"ensures ({here} ==> {self._wished(region, leaf)});"
+        known = " || ".join(f"{words.now(mode)} == {leaf.number}" for leaf in leaves)
         yield f"ensures ({known}) || {words.now(name)} == 0;"
-        for node in chart.nodes:
+        sources = [f"{words.now(name)} == 0"]
+        for transition, way in words.charting.ways_in(region.region):
+            own = words.is_one(name, [words.number(transition)], words.now)
+            source = words.is_active(words.charting.chart.nodes[way.source], words.now)
+            sources.append(f"({own} && {source})")
+        yield f"ensures {any_of(sources)};"
+        for node in words.charting.chart.nodes:
             if node.region == region.region and words.charting.ways_of(node):
-                yield from self._counts(node, words.is_active(node, words.now))
+                active = words.is_active(node, words.now)
+                yield from self._counts(node, self._unless_left(region, active))
 
-    def _chain(self, nodes: list[Node], none: str) -> str:
+    def _wished(self, region: Node, leaf: Node) -> str:
+        """Return what a region wishes for in an innermost mode, or that a fault decides it."""
+        charting, fault = self.words.charting, self._fault
+        name = self.words.now(wish(region.region))
+        chain = [n for n in charting.chart.chain(leaf) if charting.ways_of(n)]
+        ordered = chain if charting.chart.order == "inner_first" else chain[::-1]
+        ways = [(n, way) for n, way in self._ordered(ordered) if not is_of_fault(way)]
+        usual = f"{name} == {self._first(ways, '0')}"
+        if leaf in fault.outside:
+            asked = self.words.is_one(wish(region.region), fault.numbers(leaf), self.words.now)
+        elif fault.leaves(region):
+            asked = f"{name} == 0"
+        else:
+            return usual
+        return f"({fault.happened} ? {asked} : {usual})"
+
+    def _unless_left(self, region: Node, active: str) -> str:
+        """Return when a mode counts: while it is active, and no fault leaves what is around it."""
+        if not self._fault.leaves(region):
+            return active
+        return all_of([active, f"!{self._fault.happened}"])
+
+    @property
+    def _fault(self) -> ChartFault:
+        return ChartFault(self.words)
+
+    def _ordered(self, nodes: Iterable[Node]) -> Iterator[tuple[Node, Transition]]:
+        """Yield the transitions of some modes, each mode's by priority."""
+        for node in nodes:
+            ways = enumerate(self.words.charting.ways_of(node))
+            ordered = sorted(ways, key=lambda pair: (pair[1].priority or 0, pair[0]))
+            yield from ((node, transition) for _, transition in ordered)
+
+    def _first(self, ways: Iterable[tuple[Node, Transition]], none: str) -> str:
         """Return the number of the first transition that is enabled."""
         found = none
-        for node in reversed(nodes):
-            ways = self.words.charting.ways_of(node)
-            ordered = sorted(enumerate(ways), key=lambda pair: (pair[1].priority or 0, pair[0]))
-            for _, transition in reversed(ordered):
-                info = self.words.charting.info(transition)
-                test = self._due(info) if info.timer else self._enabled(node, transition)
-                number = self.words.place.whole(wish(node.region), info.number)
-                found = f"(({test}) ? {number} : {found})"
+        for node, transition in reversed(list(ways)):
+            info = self.words.charting.info(transition)
+            test = self._due(info) if info.timer else self._enabled(node, transition)
+            number = self.words.place.whole(wish(node.region), info.number)
+            found = f"(({test}) ? {number} : {found})"
         return found
 
     def _due(self, info: TransitionInfo) -> str:

@@ -12,6 +12,7 @@ from itertools import combinations, product
 from typing import TypeAlias
 
 from codegen.proofs.chart_entry import modes_after, outcomes
+from codegen.proofs.chart_hearing import Hearing
 from codegen.proofs.configuration import Configuration, all_of, any_of
 from language.activation import begin, edges_by_mode
 from language.chart import Chart, Node, Way
@@ -32,24 +33,41 @@ class Commit:
 
     def ensured(self) -> Iterator[str]:
         """Yield what `commit` leaves."""
-        for part in (self._fired, self._modes, self._facts, self._raised):
+        for part in (self._fired, self._modes, self._facts, self._raised, self.grown):
             yield from (f"ensures {said};" for said in part())
 
     def required(self) -> Iterator[str]:
-        """Yield what is asked before: a transition is taken from a mode that is active."""
+        """Yield what is asked before."""
+        yield from self.takeable()
+        yield from self._counted()
+
+    def takeable(self) -> Iterator[str]:
+        """Yield that modes fit together, and that what is taken leaves active modes, each once."""
         words = self.words
+        yield from words.valid(words.now)
+        yield from Hearing(words).consistent(words.now)
         for region in words.charting.chart.regions:
-            none = f"{words.now(words.chosen(region.region))} == 0"
-            taken = [none]
+            taken = [f"{words.now(words.chosen(region.region))} == 0"]
             for transition, way in words.charting.ways_in(region.region):
                 source = words.is_active(words.charting.chart.nodes[way.source], words.now)
                 number = words.number(transition)
                 own = words.is_one(words.chosen(region.region), [number], words.now)
                 taken.append(f"({own} && {source})")
             yield any_of(taken)
-        counted = [LOGGED] if words.charting.several else []
-        counted += [TAIL.name] if any(t.raises for t, _ in words.charting.all_ways) else []
-        yield from (f"0 <= {words.now(name)}" for name in counted)
+
+    def grown(self) -> Iterator[str]:
+        """Yield that places of the log and of the queue are places; the queue gets no shorter."""
+        words = self.words
+        yield from self._counted()
+        if any(transition.raises for transition, _ in words.charting.all_ways):
+            yield f"{words.before(TAIL.name)} <= {words.now(TAIL.name)}"
+
+    def _counted(self) -> Iterator[str]:
+        words, charting = self.words, self.words.charting
+        if charting.several:
+            yield f"0 <= {words.now(LOGGED)}"
+        if any(transition.raises for transition, _ in charting.all_ways):
+            yield f"0 <= {words.now(TAIL.name)} <= {charting.size}"
 
     def _fired(self) -> Iterator[str]:
         words = self.words

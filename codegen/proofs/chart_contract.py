@@ -18,26 +18,42 @@ from codegen.proofs.acsl import Unsaid
 from codegen.proofs.chart_choice import Choice
 from codegen.proofs.chart_commit import Commit
 from codegen.proofs.chart_hearing import Hearing
+from codegen.proofs.chart_step import Jump, Step
 from codegen.proofs.configuration import Configuration
-from codegen.proofs.outline import Function, function_of, outlined, part_name
+from codegen.proofs.effect import assigned, contract_text, with_turns
+from codegen.proofs.outline import Function, function_of, outlined, outlined_at, part_name
 from codegen.proofs.pointers import is_inside, required
 from codegen.proofs.summary import Summary
 from codegen.proofs.wp import Asked, asked, detected, pure
 from codegen.usage import locals_of
 from language.chart import Node
 from language.charting import Charting, ident, wish
-from language.operation import Assign, Block, Branch, Choose, Count, Loop, Op, Ref, Select, Store
+from language.operation import (
+    Assign,
+    Block,
+    Branch,
+    Choose,
+    Count,
+    Loop,
+    Op,
+    Ref,
+    Run,
+    Select,
+    Store,
+)
 from language.program import Program
 from language.traversal import block_writes, reached, walk
 
 SELECT, HEAR, COMMIT = "select_transitions", "hear", "commit"
+STEP, JUMP = "micro_step", "jump"
 MODEL = ("-wp-model", "Typed+real")
 """Reals are numbers without rounding, of which guards are comparisons. Accesses and sums are looked
 at by the value analysis (values.py).
 """
 OF_PARTS = (*MODEL, "-wp-split")
 OF_CHART = MODEL
-"""`select_transitions`, `hear` and `commit`, in which functions are run one after the other."""
+"""Functions in which others are run one after the other."""
+ONE_BY_ONE = (SELECT, HEAR, COMMIT, JUMP, *(f"{name}_{k}" for name in (STEP, JUMP) for k in (1, 2)))
 OWN_TYPE = r"\b(u?)int(?:16|32)_t (?={}\[)"
 
 
@@ -54,7 +70,7 @@ def written(made: ChartContract, files: Mapping[str, str], folder: Path) -> list
 def proven_of(name: str, functions: Sequence[str], folder: Path) -> Asked:
     """Prove the contracts of functions of a module. Raises ToolMissing, BuildError."""
     detected(folder)
-    chart = [one for one in functions if one in (SELECT, HEAR, COMMIT)]
+    chart = [one for one in functions if one in ONE_BY_ONE]
     parts = [one for one in functions if one not in chart]
     found = Asked(0, 0, ())
     for own, options in ((parts, OF_PARTS), (chart, OF_CHART)):
@@ -77,8 +93,7 @@ class ChartContract:
     @property
     def functions(self) -> list[str]:
         """The functions of a micro-step."""
-        starts = [name for name in (SELECT, HEAR, COMMIT) if name in self.made.blocks]
-        found = {name for start in starts for name in reached(start, self.made.blocks)}
+        found = reached(JUMP, self.made.blocks)
         return [name for name in self.made.blocks if name in found]
 
     @property
@@ -94,11 +109,17 @@ class ChartContract:
         work_is_inside = is_inside(text)
         for name in self.functions:
             function = function_of(text, name)
-            parts = outlined(function)
+            parts = self._parts(function)
             proven += [part.name for part in parts]
             made = "\n".join(self._contract(name, part, work_is_inside) for part in parts)
             text = text[: function.start] + made + text[function.end :]
         return text, proven
+
+    def _parts(self, function: Function) -> list[Function]:
+        """Return the functions that a function is in the copy that is proven, itself at last."""
+        if function.name == self._stepping:
+            return outlined_at(function, (SELECT, COMMIT))
+        return [function] if function.name == JUMP else outlined(function)
 
     def with_apart(self, text: str) -> str:
         """Return a header in which arrays of whole numbers are of a type of their own: what is
@@ -110,12 +131,40 @@ class ChartContract:
         return text
 
     def _contract(self, block: str, part: Function, work_is_inside: bool) -> str:
-        op = self._ops(block).get(part.name)
-        own = (op,) if op else self.made.blocks[block]
+        own = self._own(block, part.name)
         lines = [*required(part.parameters, work_is_inside), *self._required(block, part.name, own)]
-        lines += [f"assigns {self._assigned(block, own)};", *self._ensured(block, part.name, own)]
-        lines.append("exits \\false;")
-        return "/*@\n  " + "\n  ".join(lines) + "\n*/\n" + part.text
+        places = self._assigned(block, own)
+        lines += [assigned(places), *self._ensured(block, part.name, own), "exits \\false;"]
+        held = Jump(self.words).turns() if block == JUMP else ()
+        return contract_text(lines) + with_turns(part, places, held)
+
+    def _own(self, block: str, part: str) -> Block:
+        """Return the operations of a part of a function, or of all of it."""
+        if part in self._steps:
+            return self._steps[part][0]
+        op = self._ops(block).get(part)
+        return (op,) if op else self.made.blocks[block]
+
+    @property
+    def _stepping(self) -> str:
+        """The function that does one micro-step."""
+        return STEP if STEP in self.made.blocks else JUMP
+
+    @cached_property
+    def _steps(self) -> dict[str, tuple[Block, Sequence[str], Sequence[str]]]:
+        """The parts of that function: operations, what is asked before, and what they leave."""
+        step, blocks = Step(self.words), self.made.blocks
+        names = [part_name(self._stepping, number) for number in range(3)]
+        choosing = tuple(Run(name) for name in (SELECT, HEAR) if name in blocks)
+        valid = list(self.words.valid(self.words.now))
+        found: dict[str, tuple[Block, Sequence[str], Sequence[str]]] = {
+            names[0]: (choosing, valid, list(step.chosen())),
+            names[1]: ((Run(COMMIT),), list(Commit(self.words).required()), list(step.committed())),
+        }
+        if STEP in blocks:
+            done = next(op.then for op in blocks[STEP] if isinstance(op, Branch))
+            found[names[2]] = (done, list(step.taking()), list(step.moved()))
+        return found
 
     def _ops(self, block: str) -> dict[str, Op]:
         """Return the operations of a block that are choices, by the part that they are in C."""
@@ -126,8 +175,13 @@ class ChartContract:
         said: Iterable[str] = ()
         words = self.words
         if block == COMMIT and part == block:
-            before = Hearing(words).consistent(words.now)
-            said = (*words.valid(words.now), *before, *Commit(words).required())
+            said = Commit(words).required()
+        elif part in self._steps:
+            said = self._steps[part][1]
+        elif block == STEP:
+            said = Step(words).required()
+        elif block == JUMP:
+            said = Jump(words).required()
         elif block == SELECT and (region := self._selected.get(part)):
             said = (f"{words.now(wish(region.region))} == 0",)
         yield from (f"requires {one};" for one in said)
@@ -155,12 +209,17 @@ class ChartContract:
             own = self._selected.get(part)
             for region in self.charting.chart.regions if part == block else [own] if own else []:
                 yield from Choice(words).of_region(region)
-        elif part != block:
+        elif part != block and part not in self._steps:
             return
         elif block == HEAR:
             yield from Hearing(words).ensured()
         elif block == COMMIT:
             yield from Commit(words).ensured()
+        elif part in self._steps:
+            yield from (f"ensures {said};" for said in self._steps[part][2])
+        elif block in (STEP, JUMP):
+            made = Step(words) if block == STEP else Jump(words)
+            yield from (f"ensures {said};" for said in made.ensured())
 
     def _lemmas(self, block: str, own: Block) -> Iterator[str]:
         silent = {v.name for v in self.made.variables if v.size}
@@ -173,7 +232,7 @@ class ChartContract:
     def _locals(self) -> Mapping[str, frozenset[str]]:
         return locals_of(self.made)
 
-    def _assigned(self, block: str, own: Block) -> str:
+    def _assigned(self, block: str, own: Block) -> list[str]:
         blocks = {**self.made.blocks, "": own}
         names: set[str] = set()
         for name in reached("", blocks):
@@ -181,8 +240,7 @@ class ChartContract:
             written = set(block_writes(blocks[name]))
             names |= written - local
         sizes = {v.name: f"[0 .. {v.size - 1}]" for v in self.made.variables if v.size}
-        said = sorted(self.words.place(name) + sizes.get(name, "") for name in names)
-        return ", ".join(said) or "\\nothing"
+        return sorted(self.words.place(name) + sizes.get(name, "") for name in names)
 
     def _places(self, own: Block) -> Iterator[str]:
         """Yield that places at which a part of a function stores something are none before 0."""
@@ -206,9 +264,13 @@ class ChartContract:
     def _selected(self) -> dict[str, Node]:
         """The region that a part of `select_transitions` chooses in."""
         regions = {self.words.mode(r.region): r for r in self.charting.chart.regions}
-        ops = self._ops(SELECT)
-        found = {name: op for name, op in ops.items() if isinstance(op, Choose)}
-        return {name: regions[op.selector] for name, op in found.items()}
+        found = {name: _inner(op) for name, op in self._ops(SELECT).items()}
+        return {name: regions[op.selector] for name, op in found.items() if isinstance(op, Choose)}
+
+
+def _inner(op: Op) -> Op:
+    """Return the choice of a region, also where it is made only if no fault happened."""
+    return op.other[0] if isinstance(op, Branch) and not op.then and op.other else op
 
 
 def _is_choice(op: Op) -> bool:

@@ -35,6 +35,7 @@ from codegen.proofs.proof import Proof, version_of
 from codegen.proofs.wp import Asked, asked, detected, pure
 from codegen.source import c_files, c_program
 from codegen.usage import locals_of
+from language.fault import with_fault_transitions
 from language.model import Automaton
 from language.operation import Count
 from language.program import ModeInfo, Program, TransitionInfo
@@ -58,17 +59,17 @@ def contract(automaton: Automaton, program: Program, folder: Path) -> Proof:
     tool = f"Frama-C {version_of('frama-c', folder)} WP"
     modes = [mode for mode in program.modes if f"jump_{mode.name}" in made.blocks]
     files = c_files(program, by_amount=False)
-    charting = charting_of(automaton, program.transitions) if automaton.is_sampled else None
-    if charting and automaton.fault_mode is None:
+    charting = None
+    if automaton.is_sampled:
+        charting = charting_of(with_fault_transitions(automaton), program.transitions)
+    if charting:
         chart = ChartContract(charting, made)
         names = written(chart, files, folder)
         what = f"{len(names)} functions"
         what += f", of {', '.join(chart.unsaid)} lemmas alone" if chart.unsaid else ""
         return _told(tool, proven_of(program.name, names, folder), what)
     if program.period is None or program.regions or not modes:
-        about = (
-            "one region of a sampled automaton, and a chart without a fault mode, have contracts"
-        )
+        about = "one region of a sampled automaton, and a chart, have contracts"
         return Proof("contract", tool, about, is_asked=False)
     asking = written_of(program, files, folder)
     run = sum(len(names) for names, options in asking if options == OF_CALLED)

@@ -74,14 +74,17 @@ def contract_text(lines: Iterable[str]) -> str:
     return "\n  ".join(["/*@", *lines]) + "\n*/\n"
 
 
-def with_turns(function: Function, places: Iterable[str]) -> str:
-    """Return a function as C with what each turn of its loops may write: what it may itself."""
-    own = LOCAL.findall(function.body)
+def with_turns(function: Function, places: Iterable[str], held: Iterable[str] = ()) -> str:
+    """Return a function as C with what each turn of its loops may write: what it may itself, and
+    with what is `held` before each.
+    """
+    own, more = LOCAL.findall(function.body), [f"loop invariant {said};" for said in held]
 
     def told(found: re.Match[str]) -> str:
         indent, index, count = found.groups()
         lines = [
             f"loop invariant 0 <= {index} <= {count};",
+            *more,
             f"loop {assigned((index, *own, *places))}",
             f"loop variant {count} - {index};",
         ]

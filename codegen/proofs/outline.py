@@ -14,6 +14,8 @@ from codegen.source import STATIC
 
 CHOICE = re.compile(r"^    (?:if|switch|for) \(.*?^    }\n", re.M | re.S)
 INNER = re.compile(r"^( +)(?:if|switch|for) \(.*?^\1}\n", re.M | re.S)
+CHOSEN = re.compile(r"^    if \((?:.*\n)*?.*\) \{\n((?: {8}.*\n)+)", re.M)
+"""What the first choice does where its condition is true."""
 DECLARED = re.compile(r"^    (?:const )?\w+ \w+(?: =|;)", re.M)
 
 
@@ -70,6 +72,20 @@ def outlined_but(function: Function, kept: Sequence[str]) -> list[Function]:
     return _taken_out(function, list(_without(function.body, kept)))
 
 
+def outlined_at(function: Function, calls: Sequence[str]) -> list[Function]:
+    """Return the parts of a function, then what is left of it: some calls and what follows each in
+    its block, up to a choice; at last what its first choice does, if there is a choice in that.
+    """
+    text = "|".join(calls)
+    part = re.compile(rf"^( +)(?:{text})\((?:.*\n(?=\1(?!if |switch |for |}})))*.*\n", re.M)
+    spans = [found.span() for found in part.finditer(function.body)]
+    *parts, rest = _taken_out(function, spans)
+    chosen = CHOSEN.search(rest.body)
+    if chosen is None or not INNER.search(chosen[1]):
+        return [*parts, rest]
+    return [*parts, *_taken_out(rest, [chosen.span(1)], len(parts))]
+
+
 def _without(body: str, kept: Sequence[str]) -> Iterator[tuple[int, int]]:
     place = 0
     while found := INNER.search(body, place):
@@ -79,12 +95,14 @@ def _without(body: str, kept: Sequence[str]) -> Iterator[tuple[int, int]]:
         place = body.index("\n", found.start()) + 1 if writes else found.end()
 
 
-def _taken_out(function: Function, spans: Sequence[tuple[int, int]]) -> list[Function]:
+def _taken_out(
+    function: Function, spans: Sequence[tuple[int, int]], first: int = 0
+) -> list[Function]:
     taken = ", ".join(re.findall(r"\*(\w+)", function.parameters))
     parts: list[Function] = []
     body, place = "", 0
     for start, end in spans:
-        name = part_name(function.name, len(parts))
+        name = part_name(function.name, first + len(parts))
         where = (function.start, function.start, function.keyword, name, function.parameters)
         parts.append(Function(*where, function.body[start:end]))
         indent = re.match(" *", function.body[start:end])

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import shlex
+import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +23,9 @@ KERNEL = (
 )
 """Whether reals stay finite is asked by the value analysis (values.py)."""
 OPTIONS = ("-wp", "-wp-prover", PROVER, "-wp-timeout", str(SECONDS))
+SEARCH = "auto_config=false smt.mbqi=false"
+"""How z3 looks for a proof: by instances of axioms that the goal names, never by models."""
+CONFIG = ".why3.conf"
 PROVED = re.compile(r"Proved goals: +(\d+) / (\d+)")
 OPEN = re.compile(r"^\[wp\] \[[^]]*\] Goal (\S+)(?! : Valid)(?: : |$)", re.M)
 PURE = re.compile(r"^(?=(?:static inline )?(?:double|float|bool|int32_t) ha_\w+\()", re.M)
@@ -43,9 +48,18 @@ class Asked:
 
 
 def detected(folder: Path) -> None:
-    """Tell why3 which provers there are. Raises ToolMissing."""
-    needed(PROVER)
+    """Tell why3 which provers there are. Raises ToolMissing.
+
+    It gets z3 by a script: beside what a function does a goal has axioms of memory, and to look
+    for models of these (z3's MBQI) takes all the time that there is.
+    """
+    found = shutil.which(needed(PROVER)) or PROVER
     told(["why3", "config", "detect"], folder, {"HOME": str(folder)})
+    script, config = folder / f"{PROVER}.sh", folder / CONFIG
+    script.write_text(f'#!/bin/sh\nexec {shlex.quote(found)} {SEARCH} "$@"\n')
+    script.chmod(0o700)
+    text = config.read_text()
+    config.write_text(text.replace(f'path = "{found}"', f'path = "{script.resolve()}"'))
 
 
 def pure(text: str) -> str:
