@@ -7,7 +7,7 @@ from fractions import Fraction
 from typing import cast
 
 from language.chart_reader import CHART_KEYS, ChartReader, ReadModes, is_chart
-from language.chart_target import mode_paths
+from language.chart_target import fault_modes
 from language.document import Document, Entry, Node, Scalar, Table, require_kind
 from language.element import ElementReader
 from language.event import event_inputs
@@ -145,7 +145,7 @@ class _AutomatonReader(Reader):
         own = ParameterReader(self.problems, tree).parameters()
         modes = self._modes()
         main, *beside = modes.regions
-        places = mode_paths(modes.tree) if modes.tree else main.modes
+        places = fault_modes(modes.tree) if modes.tree else main.modes
         laid_on = ElementReader(self.problems)
         variables = VariableReader(self.problems, model, self.sampled, tree, places)
         outputs = laid_on.outputs(tree.get("outputs"))

@@ -70,6 +70,11 @@ def mode_paths(chart: Chart) -> dict[str, Node]:
     return found
 
 
+def fault_modes(chart: Chart) -> dict[str, Node]:
+    """Return the modes that a fault may enter: those of the chart, of none of its regions."""
+    return {name: node for name, node in mode_paths(chart).items() if node.region == CHART}
+
+
 def _is_of_chart(chart: Chart, node: Node) -> bool:
     *_, region = chart.outer(node)
     return region.name == CHART

@@ -42,7 +42,7 @@ class VariableReader(Reader):
         if node is not None:
             self.fault_mode = self.text(node, "fault_mode", node.span).removeprefix("chart.")
             if self.fault_mode not in modes:
-                label = f"there is no mode `{self.fault_mode}`"
+                label = f"there is no mode `{self.fault_mode}` of the chart"
                 self.problems.error("name", node.span, label, nearest(self.fault_mode, modes))
 
     def inputs(self, node: Node | None) -> dict[str, Input]:
