@@ -22,6 +22,10 @@ ROOT = Path(__file__).resolve().parent.parent
 UV = ROOT / ".tools" / "uv"
 VENV = ROOT / ".venv"
 STAMP = VENV / ".set-up"
+OWN = (
+    *("language", "engine", "codegen", "diagnosis", "sweep", "expectation", "lockstep"),
+    *("modewright", "tests"),
+)
 INPUTS = ("pyproject.toml", "uv.lock", "tools/set_up.py")
 
 # Of the surrounding shell: these would aim uv or Python at another environment.
@@ -97,7 +101,8 @@ def install(environ: dict[str, str]) -> int:
         pinned = f"{folder}/requirements.txt"
         steps: list[list[str]] = [
             ["export", "--frozen", "--no-emit-project", "--no-header", "--output-file", pinned],
-            ["pip", "sync", "--require-hashes", *index_options(environ), pinned],
+            # Bytecode is made here, by all cores, and not by the first who import a package.
+            ["pip", "sync", "--compile-bytecode", *index_options(environ), pinned],
             # The build backend is in the lock, too: nothing is fetched for building.
             ["pip", "install", "--no-deps", "--no-build-isolation", "--editable", "."],
         ]
@@ -112,13 +117,16 @@ def install(environ: dict[str, str]) -> int:
                 stop = f"set-up stopped at `uv {step[0]} {step[1]}`, see above"
                 print(f"{stop}; for want of a package, {ADVICE}", file=sys.stderr)
                 return OUT_OF_REACH
+    compiling = ["-m", "compileall", "-q", "-j", "0", *(str(ROOT / name) for name in OWN)]
+    subprocess.run([VENV / "bin" / "python", *compiling], check=False)
     return 0
 
 
 def index_options(environ: dict[str, str]) -> list[str]:
-    """The options for which uv has no variable, or another default than pip."""
+    """The options on indexes for which uv has no variable, or another default than pip."""
     # Every file must have the hash of the lock, so it may come from any of the indexes.
-    options = ["--index-strategy", environ.get("UV_INDEX_STRATEGY", "unsafe-best-match")]
+    strategy = environ.get("UV_INDEX_STRATEGY", "unsafe-best-match")
+    options = ["--require-hashes", "--index-strategy", strategy]
     return [*options, "--no-index"] if environ.get("UV_NO_INDEX") else options
 
 
