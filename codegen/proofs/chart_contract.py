@@ -21,7 +21,14 @@ from codegen.proofs.chart_hearing import Hearing
 from codegen.proofs.chart_step import Jump, Step
 from codegen.proofs.configuration import Configuration
 from codegen.proofs.effect import assigned, contract_text, with_turns
-from codegen.proofs.outline import Function, function_of, outlined, outlined_at, part_name
+from codegen.proofs.outline import (
+    Function,
+    function_of,
+    outlined,
+    outlined_at,
+    part_name,
+    with_scratch_outside,
+)
 from codegen.proofs.pointers import is_inside, required
 from codegen.proofs.summary import Summary
 from codegen.proofs.wp import Asked, asked, detected, pure
@@ -107,6 +114,7 @@ class ChartContract:
         """Return C with contracts before its functions, and the names of these."""
         proven: list[str] = []
         work_is_inside = is_inside(text)
+        text = with_scratch_outside(text, JUMP)
         for name in self.functions:
             function = function_of(text, name)
             parts = self._parts(function)

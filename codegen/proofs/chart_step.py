@@ -39,7 +39,7 @@ class Step:
     def ensured(self) -> Iterator[str]:
         """Yield what a micro-step leaves."""
         yield from self.moved()
-        if self.words.charting.several:
+        if self.words.charting.several and self.words.knows(FIRST.name):
             yield f"!{self.words.now(FIRST.name)}"
 
     def moved(self) -> Iterator[str]:

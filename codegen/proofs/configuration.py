@@ -42,6 +42,10 @@ class Configuration:
         names = [variable.name for variable in self.made.variables]
         return frozenset((*names, *(constant.name for constant in self.made.constants)))
 
+    def knows(self, name: str) -> bool:
+        """Tell whether a variable is in C: one that nothing reads is not."""
+        return name in self._known
+
     def now(self, name: str) -> str:
         """Return the value of a variable at the end of a function. Raises Unsaid: not in C."""
         array, _, index = name.partition(" ")

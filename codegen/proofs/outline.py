@@ -16,6 +16,8 @@ CHOICE = re.compile(r"^    (?:if|switch|for) \(.*?^    }\n", re.M | re.S)
 INNER = re.compile(r"^( +)(?:if|switch|for) \(.*?^\1}\n", re.M | re.S)
 CHOSEN = re.compile(r"^    if \((?:.*\n)*?.*\) \{\n((?: {8}.*\n)+)", re.M)
 """What the first choice does where its condition is true."""
+SCRATCH = re.compile(r"    (\w+) scratch;\n    \1 \*const work = &scratch;\n\n?")
+"""The scratch of a function, at its beginning."""
 DECLARED = re.compile(r"^    (?:const )?\w+ \w+(?: =|;)", re.M)
 
 
@@ -51,6 +53,22 @@ def function_of(text: str, name: str) -> Function:
     found = re.search(head, text, re.M | re.S)
     assert found, name
     return Function(*found.span(), found[1], name, found[2], found[3])
+
+
+def with_scratch_outside(text: str, name: str) -> str:
+    """Return a module in which a function takes the scratch that it has of its own: what it leaves
+    there can be said of it, and of its parts.
+    """
+    function = function_of(text, name)
+    found = SCRATCH.match(function.body)
+    if found is None:
+        return text
+    given = f"{function.parameters}, {found[1]} *work"
+    made = replace(function, parameters=given, body=function.body[found.end() :])
+    text = text[: function.start] + made.text + text[function.end :]
+    call = re.compile(rf"^( +){name}\(((?!.*work).*)\);\n", re.M)
+    block = rf"\1{{\n\1    {found[1]} scratch;\n\n\1    {name}(\2, &scratch);\n\1}}\n"
+    return call.sub(block, text)
 
 
 def outlined(function: Function) -> list[Function]:

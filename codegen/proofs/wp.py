@@ -28,6 +28,8 @@ SEARCH = "auto_config=false smt.mbqi=false"
 CONFIG = ".why3.conf"
 PROVED = re.compile(r"Proved goals: +(\d+) / (\d+)")
 OPEN = re.compile(r"^\[wp\] \[[^]]*\] Goal (\S+)(?! : Valid)(?: : |$)", re.M)
+REFUSED = re.compile(r"^\[kernel[^]]*\] (\S+:\d+: .*(?:\n  .*)*)", re.M)
+"""What Frama-C says of a line that it cannot read."""
 PURE = re.compile(r"^(?=(?:static inline )?(?:double|float|bool|int32_t) ha_\w+\()", re.M)
 NOTHING = "/*@ assigns \\nothing; exits \\false; */\n"
 """Functions of ha_math write nothing, and return."""
@@ -73,8 +75,9 @@ def asked(folder: Path, file: str, functions: Sequence[str], more: Sequence[str]
     done = told(["frama-c", *words], folder, {"HOME": str(folder)})
     counts = PROVED.search(done.stdout)
     if done.returncode or counts is None:
-        last = (done.stdout + done.stderr).strip().splitlines()[-1:]
-        return Asked(0, 0, tuple(last) or ("no result",))
+        said = done.stdout + done.stderr
+        why = REFUSED.findall(said)[:1] or said.strip().splitlines()[-1:]
+        return Asked(0, 0, tuple(" ".join(one.split()) for one in why) or ("no result",))
     proven, goals = int(counts[1]), int(counts[2])
     found = OPEN.findall(done.stdout)
     if proven < goals and not found:

@@ -1,0 +1,66 @@
+"""Contracts of small charts under Frama-C's WP: each has less in its C than a large one."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from codegen.proofs.contract import contract
+from codegen.proofs.outline import function_of, with_scratch_outside
+from codegen.source import c_files
+from codegen.tool import PACKAGES
+from language.load import program_of
+from tests.language.making import automaton
+
+pytestmark = pytest.mark.skipif(
+    not all(map(shutil.which, PACKAGES)), reason="a tool is missing: make system-packages"
+)
+CHART = """\
+language: 1
+automaton: small
+period: 1 ms
+numbers: float64
+{keys}
+inputs: {{u: {{unit: m, range: [-9, 9]{on_range}}}}}
+initial: p
+modes:
+  p:
+    initial: a
+    transitions: {{q: {{when: u < -5 m}}}}
+    modes: {{a: {{transitions: {{b: {{when: u > 1 m}}}}}}, b: {{}}}}
+  q: {{transitions: {{p: {{when: u > 0 m}}}}}}
+outputs: [mode]
+"""
+FAULT = ", on_range: fault"
+
+
+@pytest.mark.usefixtures("impatient")
+@pytest.mark.parametrize(
+    ("keys", "on_range"),
+    [
+        ("order: outer_first", ""),  # the scratch of a tick is the jump's own
+        ("micro_steps: 3", ""),  # nothing waits: nobody asks for the first micro-step
+        ("micro_steps: 3\nfault_mode: q", FAULT),
+        ("fault_mode: q", FAULT),
+    ],
+)
+def test_all_that_a_small_chart_asks_is_proven(keys: str, on_range: str, tmp_path: Path) -> None:
+    text = CHART.format(keys=keys, on_range=on_range)
+    made = automaton(text)
+    found = contract(made, program_of(made), tmp_path)
+    assert found.findings == ()
+    proven, _, asked, *_ = found.about.split()
+    assert int(proven) == int(asked) > 100
+    assert "lemmas alone" not in found.about
+
+
+def test_the_scratch_of_a_jump_is_given_to_it_in_the_copy_that_is_proven() -> None:
+    made = automaton(CHART.format(keys="order: outer_first", on_range=""))
+    text = c_files(program_of(made), by_amount=False)["small.c"]
+    assert function_of(text, "jump").parameters == "small_Self *self"
+    lifted = with_scratch_outside(text, "jump")
+    assert function_of(lifted, "jump").parameters == "small_Self *self, Work *work"
+    assert "        Work scratch;\n\n        jump(self, &scratch);\n" in lifted
+    assert with_scratch_outside(lifted, "jump") == lifted
