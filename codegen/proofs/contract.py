@@ -2,8 +2,9 @@
 
 `jump_<mode>` of a sampled automaton: nothing fires and the mode stays, or one of its transitions
 fires and the mode is that transition's target; one that waits fires in the tick in which its
-counter is full, and a full counter fires or starts anew; no counter passes its end; nothing else
-is written than what its actions set; no access, shift or sum is undefined. Taken for granted:
+counter is full, and a full counter fires or starts anew; no counter passes its end; whole numbers
+stay in their ranges; nothing else is written than what its actions set; no access, shift or sum is
+undefined. Taken for granted:
 functions of ha_math write nothing. Ranges are two comparisons here, as in `values.py`. Where a
 transition runs functions they have contracts too (`effect.py`), choices that set no mode stand in
 functions of their own (`outline.py`), and what `values.py` asks is not asked again. Where modes
@@ -40,7 +41,7 @@ from language.model import Automaton
 from language.operation import Count
 from language.program import ModeInfo, Program, TransitionInfo
 from language.situation import charting_of
-from language.traversal import walk
+from language.traversal import block_reads, block_writes, walk
 
 PARTS = (("-wp-rte", "-wp-prop=@ensures", "-wp-split"), ("-wp-rte", "-wp-prop=-@ensures"))
 """Outcomes of a mode with many ranges are proven way by way only."""
@@ -49,6 +50,8 @@ OF_CALLED = MODEL
 OF_CALLING = (*MODEL, "-wp-split")
 """Modes whose transitions run functions."""
 MODE, FIRED = "self->mode", "self->fired"
+Wholes: TypeAlias = Mapping[str, tuple[int, int]]
+NOTHING_KEPT: Wholes = {}
 Asking: TypeAlias = tuple[list[str], tuple[str, ...]]
 """Functions, and how WP is asked for their contracts."""
 
@@ -71,23 +74,34 @@ def contract(automaton: Automaton, program: Program, folder: Path) -> Proof:
     if program.period is None or program.regions or not modes:
         about = "one region of a sampled automaton, and a chart, have contracts"
         return Proof("contract", tool, about, is_asked=False)
-    asking = written_of(program, files, folder)
+    asking = written_of(program, files, folder, wholes_of(automaton))
     run = sum(len(names) for names, options in asking if options == OF_CALLED)
     also = f", {run} functions that they run" if run else ""
     found = proven_with(folder, f"{program.name}.c", asking)
     return _told(tool, found, f"{len(modes)} modes{also}")
 
 
-def written_of(program: Program, files: Mapping[str, str], folder: Path) -> list[Asking]:
+def wholes_of(automaton: Automaton) -> Wholes:
+    """Return the ranges of whole numbers that an automaton keeps, by their names in a Program."""
+    return {
+        f"discrete.{name}": (int(one.range[0]), int(one.range[1]))
+        for name, one in automaton.discrete.items()
+        if one.type == "int" and one.range
+    }
+
+
+def written_of(
+    program: Program, files: Mapping[str, str], folder: Path, wholes: Wholes = NOTHING_KEPT
+) -> list[Asking]:
     """Write C with its contracts into a folder; return what is to be proven: of modes and their
-    parts, and of the functions that these run.
+    parts, and of the functions that these run. `wholes` are ranges of whole numbers that are kept.
     """
     made, file = c_program(program, by_amount=False), f"{program.name}.c"
     modes = [mode for mode in program.modes if f"jump_{mode.name}" in made.blocks]
     called = called_by(made, [f"jump_{mode.name}" for mode in modes])
     text, functions = with_effects(made, files[file], called), []
     for mode in modes:
-        text, names = _Mode(program, made, mode).annotated(text, in_parts=bool(called))
+        text, names = _Mode(program, made, mode, wholes).annotated(text, in_parts=bool(called))
         functions += names
     for name, own in {**files, file: text}.items():
         (folder / name).write_text(pure(own))
@@ -115,6 +129,7 @@ class _Mode:
     program: Program
     made: Program
     mode: ModeInfo
+    wholes: Wholes
 
     @property
     def block(self) -> str:
@@ -161,6 +176,14 @@ class _Mode:
         yield f"requires {MODE} == {mode} && {FIRED} == 0;"
         for count in self._counts():
             yield f"requires {self.place(count.timer)} <= {count.limit - 1};"
+        for name in sorted(self.wholes.keys() & set(self._touched)):
+            low, high = self.wholes[name]
+            yield f"requires {low} <= {self.place(name)} <= {high};"
+
+    @cached_property
+    def _touched(self) -> frozenset[str]:
+        block = self.made.blocks[self.block]
+        return frozenset((*block_reads(block), *block_writes(block)))
 
     def _counts(self) -> list[Count]:
         return [op for op in walk(self.made.blocks[self.block]) if isinstance(op, Count)]
@@ -176,6 +199,9 @@ class _Mode:
             target = mode_constant(self.program, info.target)
             outcomes.append(f"({FIRED} == {info.number} && {MODE} == {target})")
         yield f"ensures {' || '.join(outcomes)};"
+        for name in sorted(self.wholes.keys() & set(self._touched)):
+            low, high = self.wholes[name]
+            yield f"ensures {low} <= {self.place(name)} <= {high};"
         for count in self._counts():
             timer, most = self.place(count.timer), count.limit - 1
             yield f"ensures {timer} <= {most};"

@@ -64,3 +64,28 @@ def test_the_scratch_of_a_jump_is_given_to_it_in_the_copy_that_is_proven() -> No
     assert function_of(lifted, "jump").parameters == "small_Self *self, Work *work"
     assert "        Work scratch;\n\n        jump(self, &scratch);\n" in lifted
     assert with_scratch_outside(lifted, "jump") == lifted
+
+
+COUNTING = """\
+language: 1
+automaton: counting
+period: 1 ms
+numbers: float64
+inputs: {u: {type: bool}}
+discrete: {k: {type: int, initial: 0, range: [0, 5]}}
+initial: a
+modes:
+  a: {transitions: {b: {when: u, reset: {k: k + 1}}}}
+  b: {transitions: {a: {when: not u}}}
+outputs: [mode, k]
+"""
+
+
+@pytest.mark.usefixtures("impatient")
+def test_a_whole_number_stays_in_its_range_and_no_sum_of_it_is_too_large(tmp_path: Path) -> None:
+    made = automaton(COUNTING)
+    found = contract(made, program_of(made), tmp_path)
+    assert found.findings == ()
+    text = (tmp_path / "counting.c").read_text()
+    assert text.count("requires 0 <= self->discrete.k <= 5;") == 1  # read in `jump_a` alone
+    assert text.count("ensures 0 <= self->discrete.k <= 5;") == 1
