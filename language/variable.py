@@ -41,7 +41,7 @@ class VariableReader(Reader):
         node = tree.get("fault_mode")
         if node is not None:
             self.fault_mode = self.text(node, "fault_mode", node.span).removeprefix("chart.")
-            if self.fault_mode not in modes:
+            if isinstance(node, Scalar) and self.fault_mode not in modes:
                 label = f"there is no mode `{self.fault_mode}` of the chart"
                 self.problems.error("name", node.span, label, nearest(self.fault_mode, modes))
 

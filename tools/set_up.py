@@ -22,10 +22,6 @@ ROOT = Path(__file__).resolve().parent.parent
 UV = ROOT / ".tools" / "uv"
 VENV = ROOT / ".venv"
 STAMP = VENV / ".set-up"
-OWN = (
-    *("language", "engine", "codegen", "diagnosis", "sweep", "expectation", "lockstep"),
-    *("modewright", "tests"),
-)
 INPUTS = ("pyproject.toml", "uv.lock", "tools/set_up.py")
 
 # Of the surrounding shell: these would aim uv or Python at another environment.
@@ -117,8 +113,10 @@ def install(environ: dict[str, str]) -> int:
                 stop = f"set-up stopped at `uv {step[0]} {step[1]}`, see above"
                 print(f"{stop}; for want of a package, {ADVICE}", file=sys.stderr)
                 return OUT_OF_REACH
-    compiling = ["-m", "compileall", "-q", "-j", "0", *(str(ROOT / name) for name in OWN)]
-    subprocess.run([VENV / "bin" / "python", *compiling], check=False)
+    own = [ROOT / "tests", *sorted(path.parent for path in ROOT.glob("*/__init__.py"))]
+    # What cannot be compiled is told where it is imported.
+    compiling = [VENV / "bin" / "python", "-m", "compileall", "-qq", "-j", "0", *own]
+    subprocess.run(compiling, check=False)
     return 0
 
 

@@ -4,11 +4,11 @@
 fires and the mode is that transition's target; one that waits fires in the tick in which its
 counter is full, and a full counter fires or starts anew; no counter passes its end; whole numbers
 stay in their ranges; nothing else is written than what its actions set; no access, shift or sum is
-undefined. Taken for granted:
-functions of ha_math write nothing. Ranges are two comparisons here, as in `values.py`. Where a
-transition runs functions they have contracts too (`effect.py`), choices that set no mode stand in
-functions of their own (`outline.py`), and what `values.py` asks is not asked again. Where modes
-stand inside modes the contracts are those of `chart_contract.py`.
+undefined. Taken for granted: functions of ha_math write nothing, whole numbers begin in their
+ranges. Ranges are two comparisons here, as in `values.py`. Where a transition runs functions they
+have contracts too (`effect.py`), choices that set no mode stand in functions of their own
+(`outline.py`), and what `values.py` asks is not asked again. Where modes stand inside modes the
+contracts are those of `chart_contract.py`.
 """
 
 from __future__ import annotations
@@ -176,14 +176,14 @@ class _Mode:
         yield f"requires {MODE} == {mode} && {FIRED} == 0;"
         for count in self._counts():
             yield f"requires {self.place(count.timer)} <= {count.limit - 1};"
-        for name in sorted(self.wholes.keys() & set(self._touched)):
-            low, high = self.wholes[name]
-            yield f"requires {low} <= {self.place(name)} <= {high};"
+        yield from (f"requires {said};" for said in self._kept())
 
-    @cached_property
-    def _touched(self) -> frozenset[str]:
+    def _kept(self) -> Iterator[str]:
+        """Yield the ranges of the whole numbers that it reads or writes."""
         block = self.made.blocks[self.block]
-        return frozenset((*block_reads(block), *block_writes(block)))
+        for name in sorted(self.wholes.keys() & {*block_reads(block), *block_writes(block)}):
+            low, high = self.wholes[name]
+            yield f"{low} <= {self.place(name)} <= {high}"
 
     def _counts(self) -> list[Count]:
         return [op for op in walk(self.made.blocks[self.block]) if isinstance(op, Count)]
@@ -199,9 +199,7 @@ class _Mode:
             target = mode_constant(self.program, info.target)
             outcomes.append(f"({FIRED} == {info.number} && {MODE} == {target})")
         yield f"ensures {' || '.join(outcomes)};"
-        for name in sorted(self.wholes.keys() & set(self._touched)):
-            low, high = self.wholes[name]
-            yield f"ensures {low} <= {self.place(name)} <= {high};"
+        yield from (f"ensures {said};" for said in self._kept())
         for count in self._counts():
             timer, most = self.place(count.timer), count.limit - 1
             yield f"ensures {timer} <= {most};"

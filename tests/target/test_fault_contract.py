@@ -11,7 +11,6 @@ from pathlib import Path
 import pytest
 
 from codegen.proofs.chart_contract import ChartContract, proven_of, written
-from codegen.proofs.contract import contract
 from codegen.source import c_files, c_program
 from codegen.tool import PACKAGES
 from language import fault
@@ -55,23 +54,6 @@ modes:
           r: {initial: x, modes: {x: {transitions: {w: {when: u > 4 m, wait: 2 ms}}}, w: {}}}
       t: {}
     transitions: {busy: {when: u < -3 m}}
-outputs: [mode, faults]
-"""
-SMALL = """\
-language: 1
-automaton: small
-period: 1 ms
-numbers: float64
-fault_mode: safe
-inputs: {u: {unit: m, range: [-9, 9], on_range: fault}}
-initial: busy
-modes:
-  busy:
-    initial: a
-    transitions: {rest: {when: u < -5 m}}
-    modes: {a: {transitions: {b: {when: u > 1 m}}}, b: {}}
-  rest: {transitions: {busy: {when: u > 0 m}}}
-  safe: {transitions: {busy: {when: u < -3 m}}}
 outputs: [mode, faults]
 """
 ASKED = """\
@@ -189,15 +171,6 @@ def test_that_the_fault_mode_is_entered_from_anywhere_is_proven(order: str, tmp_
     assert found.open == ()
     assert found.proven == found.asked > 100
     assert made.unsaid == ()
-
-
-@pytest.mark.usefixtures("impatient")
-def test_a_chart_with_a_fault_mode_is_asked_whole(tmp_path: Path) -> None:
-    whole = automaton(SMALL)
-    found = contract(whole, program_of(whole), tmp_path)
-    assert found.is_asked
-    assert found.findings == ()
-    assert int(found.about.split()[0]) > 100
 
 
 @pytest.mark.usefixtures("impatient")

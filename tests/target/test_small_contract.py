@@ -50,6 +50,7 @@ def test_all_that_a_small_chart_asks_is_proven(keys: str, on_range: str, tmp_pat
     text = CHART.format(keys=keys, on_range=on_range)
     made = automaton(text)
     found = contract(made, program_of(made), tmp_path)
+    assert found.is_asked
     assert found.findings == ()
     proven, _, asked, *_ = found.about.split()
     assert int(proven) == int(asked) > 100
