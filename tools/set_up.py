@@ -115,8 +115,8 @@ def install(environ: dict[str, str]) -> int:
                 return OUT_OF_REACH
     own = [ROOT / "tests", *sorted(path.parent for path in ROOT.glob("*/__init__.py"))]
     # What cannot be compiled is told where it is imported.
-    compiling = [VENV / "bin" / "python", "-m", "compileall", "-qq", "-j", "0", *own]
-    subprocess.run(compiling, check=False)
+    compiling = [str(VENV / "bin" / "python"), "-m", "compileall", "-qq", "-j", "0"]
+    subprocess.run([*compiling, *map(str, own)], check=False)
     return 0
 
 
