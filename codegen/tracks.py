@@ -19,16 +19,19 @@ from codegen.names import CNames, c_member
 from codegen.source import c_program, module_context, stepped
 from codegen.statement import wrapped
 from language.functions import FUNCTIONS
-from language.operation import Assign, Block, Branch, Call, Expr, Op, Ref
+from language.operation import Assign, Binary, Block, Branch, Call, Expr, Op, Ref, Select
 from language.program import ModeInfo, Program
 from language.substitution import with_expressions, with_parts
-from language.traversal import block_writes
+from language.traversal import block_writes, parts
 
 PAGE = ("derived.", "calibration.")
 """What stays in all steps."""
 REAL_OF = "real_of "
 """Before the name of a whole number: that as a real."""
 WIDTH = 96
+FEW = 8
+"""Values in which steps of two modes may differ to be one: both ends of a gap are alike but for a
+guard."""
 OVER_VECTORS = ("abs", "min", "max", "clip", "sign", "pow2")
 """Operations that the template has for all lanes at once."""
 TRUTH: Mapping[Kind, str] = {"real": "Reals", "truth": "Truths"}
@@ -55,7 +58,7 @@ def tracks(program: Program, columns: tuple[str, ...], seen: tuple[str, ...]) ->
     kinds |= {REAL_OF + name: "real" for name, kind in types.items() if kind == "whole"}
     fixed = frozenset(name for name in kinds if name.startswith("constant."))
     lanes = Lanes(made, kinds, fixed)
-    leaps = [leap for mode in made.modes for leap in _leaps(lanes, mode)]
+    leaps = _together([leap for mode in made.modes for leap in _leaps(lanes, mode)])
     try:
         return _context(lanes, leaps, columns, seen) | records if leaps else None
     except NotAbreast:
@@ -126,18 +129,59 @@ def _places(lanes: Lanes, names: list[str]) -> list[tuple[str, Kind, str]]:
 
 @dataclass
 class _Leap:
-    """The step of a mode in `lines`; the lanes of which `quiet` is true end at `ends`."""
+    """The step of modes, by their numbers and names, in `values`: name, kind and text of each. The
+    lanes of which `quiet` is true end at `ends`.
+    """
 
-    number: int
-    name: str
-    lines: list[str] = field(default_factory=list)
+    modes: dict[int, str]
+    values: list[tuple[str, Kind, str]] = field(default_factory=list)
     quiet: list[str] = field(default_factory=list)
     ends: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def lines(self) -> list[str]:
+        """The values as they are printed."""
+        return [line for value in self.values for line in _set(*value)]
 
     @property
     def commits(self) -> list[tuple[str, str, str]]:
         """What is written where nothing happened: member, its value, and how one is chosen."""
         return [(flat(name), *end.split(" ")) for name, end in self.ends.items()]  # type: ignore[misc]
+
+
+def _together(leaps: list[_Leap]) -> list[_Leap]:
+    """Return steps, those of modes that differ in few values as one: lanes in either take it at
+    once.
+    """
+    found: list[_Leap] = []
+    for leap in leaps:
+        same = next((k for k, one in enumerate(found) if _is_alike(one, leap)), None)
+        if same is None:
+            found.append(leap)
+        else:
+            found[same] = _joined(found[same], leap)
+    return found
+
+
+def _is_alike(first: _Leap, second: _Leap) -> bool:
+    if [v[:2] for v in first.values] != [v[:2] for v in second.values]:
+        return False
+    differing = sum(a != b for a, b in zip(first.values, second.values, strict=True))
+    return differing <= FEW and (first.quiet, first.ends) == (second.quiet, second.ends)
+
+
+def _joined(first: _Leap, second: _Leap) -> _Leap:
+    """Return the step of the modes of two, each lane with the values of its own mode."""
+    there = " | ".join(f"(all->mode == {number})" for number in second.modes)
+    values = [
+        (name, kind, text if text == other else f"{_chooser(kind)}({there}, {other}, {text})")
+        for (name, kind, text), (_, _, other) in zip(first.values, second.values, strict=True)
+    ]
+    return _Leap(first.modes | second.modes, values, first.quiet, first.ends)
+
+
+def _chooser(kind: Kind) -> str:
+    return "CHOSEN" if kind == "real" else "CHOSEN_TRUTH"
 
 
 def _leaps(lanes: Lanes, mode: ModeInfo) -> Iterator[_Leap]:
@@ -147,7 +191,7 @@ def _leaps(lanes: Lanes, mode: ModeInfo) -> Iterator[_Leap]:
         return
     block = with_expressions(block, _real)
     lanes.named.clear()
-    leap, touched = _Leap(mode.number, c_member(f"mode.{mode.name}")), dict(lanes.touched)
+    leap, touched = _Leap({mode.number: c_member(f"mode.{mode.name}")}), dict(lanes.touched)
     try:
         _follow(lanes, leap, block)
     except NotAbreast:
@@ -172,16 +216,16 @@ def _follow(lanes: Lanes, leap: _Leap, ops: Block) -> None:
                 continue
             case Assign(target, value) if lanes.kind(Ref(target)) == lanes.kind(value):
                 is_local = target.startswith("work.")
-                name = c_member(target) if is_local else f"end_{len(leap.lines)}_{flat(target)}"
+                name = c_member(target) if is_local else f"end_{len(leap.values)}_{flat(target)}"
                 kind = lanes.kind(value)
-                leap.lines += _set(name, kind, lanes.text(value))
+                leap.values.append((name, kind, lanes.text(value)))
                 lanes.named[target] = name, kind
                 if not is_local:
                     lanes.touched.setdefault(target, kind)
-                    leap.ends[target] = f"{name} CHOSEN{'_TRUTH' if kind == 'truth' else ''}"
+                    leap.ends[target] = f"{name} {_chooser(kind)}"
             case Branch(condition, then, other) if _is_plain(then) or _is_plain(other):
                 name, sign = f"is_quiet_{len(leap.quiet)}", "" if _is_plain(then) else "~"
-                leap.lines += _set(name, "truth", f"{sign}{lanes.text(condition)}")
+                leap.values.append((name, "truth", f"{sign}{lanes.text(condition)}"))
                 leap.quiet.append(name)
                 _follow(lanes, leap, other if sign else then)
             case _:
@@ -214,8 +258,28 @@ def _functions(lanes: Lanes) -> Iterator[tuple[str, tuple[tuple[str, ...], list[
             for op in function.body:
                 assert isinstance(op, Assign)
                 local, kind = op.target.partition(".")[2], lanes.kind(op.value)
-                lines += _set(local, kind, lanes.text(op.value))
+                lines += _value(lanes, local, kind, op.value)
                 lanes.named[op.target] = local, kind
         except NotAbreast:
             continue
         yield name, (tuple(function.parameters), lines)
+
+
+
+def _value(lanes: Lanes, name: str, kind: Kind, value: Expr) -> list[str]:
+    """Print a value; of two that take a division, each only where a lane asks for it."""
+    if not (isinstance(value, Select) and _divides(value.then) and _divides(value.other)):
+        return _set(name, kind, lanes.text(value))
+    then, other, chosen = f"{name}_then", f"{name}_other", f"is_{name}_then"
+    sides = (then, value.then, chosen), (other, value.other, f"~{chosen}")
+    lines = _set(chosen, "truth", lanes.text(value.condition))
+    for side, arm, where in sides:
+        lines.append(f"    {TRUTH[kind]} {side} = {{0}};")
+        lines.append(f"    if (has_any({where})) {{")
+        lines += [f"        {line}" for line in wrapped(f"{side} = ", lanes.text(arm), "", WIDTH)]
+        lines.append("    }")
+    return [*lines, *_set(name, kind, f"{_chooser(kind)}({chosen}, {then}, {other})")]
+
+
+def _divides(expr: Expr) -> bool:
+    return any(isinstance(part, Binary) and part.operator == "/" for part in parts(expr))

@@ -30,8 +30,7 @@ lag or a delay alone has 0.01 (one of thirty had 0.03): nothing beside it makes 
 def differs(model: Estimate, tried: Tried, series: Sequence[Series], is_alone: bool) -> bool:
     """Tell whether they differ so much that the effect is another one."""
     part = LATE_PART if is_alone and comes_late(tried.layer) else OTHER_PART
-    gained = tried.evidence.train if tried.evidence else 0.0
-    return variation(model, tried.layer, series) > max(VARIED, part * gained)
+    return variation(model, tried.layer, series) > max(VARIED, part * tried.gained)
 
 
 def comes_late(layer: Layer) -> bool:
@@ -51,8 +50,7 @@ def _is_absent_time(parameter: Table) -> bool:
 
 def varies(model: Estimate, tried: Tried, series: Sequence[Series]) -> bool:
     """Tell whether the parameters of an effect that a model holds are not the same in each."""
-    gained = tried.evidence.train if tried.evidence else 0.0
-    return variation(model, tried.layer, series) > max(VARIED, VARIED_PART * gained)
+    return variation(model, tried.layer, series) > max(VARIED, VARIED_PART * tried.gained)
 
 
 def variation(model: Estimate, layer: Layer, series: Sequence[Series]) -> float:

@@ -35,6 +35,7 @@ from diagnosis.locus import Locus
 from diagnosis.naming import verdict_id
 from diagnosis.place_sentence import place_sentence
 from diagnosis.plainer import may_be_plainer, plainer_ones
+from diagnosis.pressed import is_opposed
 from diagnosis.search import Tell
 from diagnosis.selection import Selection, selected
 from diagnosis.series import Series
@@ -142,6 +143,8 @@ def _why_not(selection: Selection, bench: Bench) -> str:
         return "the first is at the end of a range"
     if differs(selection.model, first, bench.series, len(selection.accepted) == 1):
         return "the parameters of the first differ from recording to recording"
+    if is_opposed(selection.model, first.layer, bench.automaton):
+        return "the first is more than what its balance can give up for it"
     if piles_up(selection):
         return "two at one place gain alike"
     if remembers_mostly(bench, selection):

@@ -28,6 +28,8 @@ MOST_ON_ALL = 10
 the others alone may show."""
 HINT = 2.0
 """Nats that a candidate gains at least, if it is to be looked at further."""
+LOST = 100.0
+"""Nats: a start that loses as much on some recordings gains nothing on all."""
 STARTS, STARTS_BESIDE = 2, 1
 """Starts of a candidate from which steps are made, the best ones: alone, and beside what was
 accepted, where a second one was hardly ever better."""
@@ -160,10 +162,9 @@ def _hinted(bench: Bench, some: Part, begun: Estimate, base: Estimate, least: fl
     if gain >= least or some.bench is bench:
         return _Hint(found, point, gain * len(bench.series) / len(some.rows))
     first = extended(candidate, base.candidate, base.point, starts_of(candidate, base.values(0))[0])
-    ends = [
-        seen_at(found, bench.series, point),
-        looked_like(candidate, bench.series, base.noises, first, base),
-    ]
+    ends = [seen_at(found, bench.series, point)]
+    if seen_at(found, some.bench.series, some.point(first)).cost < some.base.cost + LOST:
+        ends.append(looked_like(candidate, bench.series, base.noises, first, base))
     best = min(ends, key=lambda one: one.cost)
     return _Hint(found, best.point, base.cost - best.cost, is_seen=False)
 

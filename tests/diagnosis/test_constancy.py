@@ -50,3 +50,17 @@ def test_what_comes_late_alone_is_the_same_in_each_recording(
     tried = dataclasses.replace(known, layer=layer(bench, effect), evidence=gained)
     monkeypatch.setattr("diagnosis.constancy.variation", lambda *of: part * 10_000.0)
     assert differs(selection.model, tried, rubbing.series, is_alone) is is_other
+
+
+def test_what_an_effect_gains_beside_the_others_counts_where_that_is_more(
+    bench: Bench, rubbing: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Found while a delay was missing too, a tyre gained 1500 nats of 25 000."""
+    selection = accepting(bench, rubbing, FRICTION)
+    (known,) = selection.accepted
+    assert known.evidence is not None
+    tried = dataclasses.replace(known, evidence=dataclasses.replace(known.evidence, train=1500.0))
+    monkeypatch.setattr("diagnosis.constancy.variation", lambda *of: 400.0)
+    assert differs(selection.model, tried, rubbing.series, False)
+    beside = dataclasses.replace(tried, beside=25_000.0)
+    assert not differs(selection.model, beside, rubbing.series, False)
