@@ -265,7 +265,6 @@ def _functions(lanes: Lanes) -> Iterator[tuple[str, tuple[tuple[str, ...], list[
         yield name, (tuple(function.parameters), lines)
 
 
-
 def _value(lanes: Lanes, name: str, kind: Kind, value: Expr) -> list[str]:
     """Print a value; of two that take a division, each only where a lane asks for it."""
     if not (isinstance(value, Select) and _divides(value.then) and _divides(value.other)):

@@ -61,9 +61,8 @@ class Evidence:
         return self.train + self.left_out
 
 
-_kept: OrderedDict[
-    tuple[int, tuple[int, ...]], tuple[Estimate, Sequence[Series], Reals]
-] = OrderedDict()
+Key = tuple[int, tuple[int, ...]]
+_kept: OrderedDict[Key, tuple[Estimate, Sequence[Series], Reals]] = OrderedDict()
 
 
 def evidence(model: Estimate, base: Estimate, series: Sequence[Series]) -> Evidence:
