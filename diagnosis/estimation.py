@@ -36,16 +36,12 @@ WORTH_ANEW = 1.0
 """Steps that gain more [nats] once slopes were looked for anew have them looked for again."""
 COMPLETIONS = 12
 """How often they are at most: a tyre's mode had not come to rest after three."""
-NOTHING = 0.3
+NOTHING = 0.05
 """A step that is foreseen to gain less than this [nats] is not tried."""
 LITTLE = 1.0
 """The same while candidates are screened."""
 FIRST_DAMPING = 1e-3
 LARGEST_DAMPING = 1e5
-GROWTH = 10.0
-"""By which damping grows where a step does no good, and by as much more where it does not again
-(Nielsen 1999): nine trials in a row hardly ever found one.
-"""
 SCREENED_ROUNDS, ROUNDS_OF_ONE = 8, 4
 """Most rounds while candidates are screened, and those after which, on a single recording, which
 cannot tell chance from physics, a further one has to gain much."""
@@ -174,11 +170,10 @@ def improved(
     A step that is foreseen to gain less than the `least` [nats] is not tried.
     """
     assert now.normal is not None
-    growth = GROWTH
     while damping < LARGEST_DAMPING:
         point = stepped(now.candidate, now.point, now.normal, damping, own_only)
         if foreseen(now.candidate, now.point, now.normal, point) < least:
-            damping *= growth
+            damping *= 10.0
             continue
         gains = gains_there(now, series, point)
         outcome = run_at(now.candidate, series, point, gains, now.noises)
@@ -187,7 +182,6 @@ def improved(
             noises = noises_at(now.candidate, point, now.noises)
             better = Estimate(now.candidate, point, cost, outcome, gains, noises)
             better = dataclasses.replace(better, normal=now.normal, columns=now.columns)
-            return better, max(damping / GROWTH, 1e-9)
-        damping *= growth
-        growth *= GROWTH
+            return better, max(damping / 10.0, 1e-9)
+        damping *= 10.0
     return None, damping
