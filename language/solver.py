@@ -2,12 +2,14 @@
 
 Functions without a theory (sin, exp, tables) are any functions within their bounds: what cannot be
 for any of them cannot be. The effort is counted by z3 itself, not by a clock: so the answers are
-the same on every machine. z3 is loaded with the first question.
+the same on every machine. z3 is loaded with the first question. All that it makes is in one
+context, in which one thread may work at a time: candidates are made side by side.
 """
 
 from __future__ import annotations
 
 import math
+import threading
 from collections.abc import Mapping
 from fractions import Fraction
 from functools import cached_property
@@ -43,7 +45,11 @@ class Unknown(Exception):
 
 
 class Solver:
-    """Answers questions; each stands for itself."""
+    """Answers questions; each stands for itself, and waits for those of other threads."""
+
+    def __init__(self) -> None:
+        """Nothing is asked yet."""
+        self._one_at_a_time = threading.Lock()
 
     @cached_property
     def z3(self) -> Any:
@@ -59,6 +65,11 @@ class Solver:
 
     def ask(self, question: Question, effort: int = EFFORT) -> Point | Verdict:
         """Return values that z3 takes for a witness, "never", or "open" where it does not know."""
+        with self._one_at_a_time:
+            return self._answer(question, effort)
+
+    def _answer(self, question: Question, effort: int) -> Point | Verdict:
+        """Return an answer; its terms are given back to z3 before another thread has its turn."""
         solver = self.z3.Solver()
         solver.set("rlimit", effort)
         try:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from fractions import Fraction
 from typing import Any
 
@@ -79,6 +80,20 @@ def test_what_is_found_holds_by_our_own_arithmetic(texts: tuple[str, ...]) -> No
     found = SOLVER.ask(asked)
     assert not isinstance(found, str)
     assert asked.holds_at(found)
+
+
+def test_threads_ask_side_by_side() -> None:
+    """z3 gives terms of other sorts, or ends the process, where two threads are in its context."""
+    together = Solver()
+    many = [*NEVER, *SOMETIMES] * 20
+    with ThreadPoolExecutor(8) as pool:
+        answers = list(pool.map(lambda texts: together.ask(question(*texts)), many))
+    wrong = {
+        texts
+        for texts, found in zip(many, answers, strict=True)
+        if (found == "never") != (texts in NEVER)
+    }
+    assert not wrong
 
 
 def test_functions_without_a_theory_are_any_within_their_bounds() -> None:
