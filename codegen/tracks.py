@@ -29,9 +29,6 @@ PAGE = ("derived.", "calibration.")
 REAL_OF = "real_of "
 """Before the name of a whole number: that as a real."""
 WIDTH = 96
-FEW = 8
-"""Values in which steps of two modes may differ to be one: both ends of a gap are alike but for a
-guard."""
 OVER_VECTORS = ("abs", "min", "max", "clip", "sign", "pow2")
 """Operations that the template has for all lanes at once."""
 TRUTH: Mapping[Kind, str] = {"real": "Reals", "truth": "Truths"}
@@ -150,9 +147,7 @@ class _Leap:
 
 
 def _together(leaps: list[_Leap]) -> list[_Leap]:
-    """Return steps, those of modes that differ in few values as one: lanes in either take it at
-    once.
-    """
+    """Return steps, those of modes that flow alike as one: lanes in either take it at once."""
     found: list[_Leap] = []
     for leap in leaps:
         same = next((k for k, one in enumerate(found) if _is_alike(one, leap)), None)
@@ -164,17 +159,18 @@ def _together(leaps: list[_Leap]) -> list[_Leap]:
 
 
 def _is_alike(first: _Leap, second: _Leap) -> bool:
-    if [v[:2] for v in first.values] != [v[:2] for v in second.values]:
-        return False
-    differing = sum(a != b for a, b in zip(first.values, second.values, strict=True))
-    return differing <= FEW and (first.quiet, first.ends) == (second.quiet, second.ends)
+    """Tell whether steps differ in truths alone, as the guards at both ends of a gap do."""
+    reals = [[value for value in leap.values if value[1] == "real"] for leap in (first, second)]
+    names = [[name for name, _, _ in leap.values] for leap in (first, second)]
+    kept = [(leap.quiet, leap.ends) for leap in (first, second)]
+    return all(one == other for one, other in (reals, names, kept))
 
 
 def _joined(first: _Leap, second: _Leap) -> _Leap:
-    """Return the step of the modes of two, each lane with the values of its own mode."""
+    """Return the step of the modes of two, each lane with the truths of its own mode."""
     there = " | ".join(f"(all->mode == {number})" for number in second.modes)
     values = [
-        (name, kind, text if text == other else f"{_chooser(kind)}({there}, {other}, {text})")
+        (name, kind, text if text == other else f"CHOSEN_TRUTH({there}, {other}, {text})")
         for (name, kind, text), (_, _, other) in zip(first.values, second.values, strict=True)
     ]
     return _Leap(first.modes | second.modes, values, first.quiet, first.ends)

@@ -134,17 +134,17 @@ def _adequate(
 def _why_not(selection: Selection, bench: Bench) -> str:
     """Return why accepted effects are something else; nothing where they seem to be right.
 
-    What is left is not looked at beside a hidden input, which takes up anything at all.
+    Beside a hidden input, which takes up anything at all, only ends of ranges are looked at.
     """
     first = selection.accepted[0]
-    if is_strained(selection.model, selection.accepted):
-        return "they are pulled out of their ranges"
     if is_at_limit(selection.model, first.layer):
         return "the first is at the end of a range"
-    if differs(selection.model, first, bench.series, len(selection.accepted) == 1):
-        return "the parameters of the first differ from recording to recording"
     if selection.has_hidden:
         return ""
+    if is_strained(selection.model, selection.accepted):
+        return "they are pulled out of their ranges"
+    if differs(selection.model, first, bench.series, len(selection.accepted) == 1):
+        return "the parameters of the first differ from recording to recording"
     if is_opposed(selection.model, first.layer, bench.automaton):
         return "the first is more than what its balance can give up for it"
     if piles_up(selection):

@@ -91,12 +91,20 @@ def test_a_first_name_that_ends_at_a_limit_is_none(
     assert _why_not(beside, rubbing) == why
 
 
+@pytest.mark.parametrize(
+    ("rule", "why"),
+    [
+        ("is_strained", "they are pulled out of their ranges"),
+        ("differs", "the parameters of the first differ from recording to recording"),
+        ("remembers_mostly", "most recordings remember what is left"),
+    ],
+)
 def test_beside_a_hidden_input_what_is_left_does_not_count(
-    bench: Bench, rubbing: Bench, monkeypatch: pytest.MonkeyPatch
+    bench: Bench, rubbing: Bench, monkeypatch: pytest.MonkeyPatch, rule: str, why: str
 ) -> None:
     """It takes up anything at all: its own form is never quite right."""
-    monkeypatch.setattr("diagnosis.judgement.remembers_mostly", lambda *of: True)
+    monkeypatch.setattr(f"diagnosis.judgement.{rule}", lambda *of: True)
     alone = accepting(bench, rubbing, FRICTION)
-    assert _why_not(alone, rubbing) == "most recordings remember what is left"
+    assert _why_not(alone, rubbing) == why
     hidden = Tried(layer(bench, "unknown_input@w_w"), 0.0, alone.model, alone.accepted[0].evidence)
     assert _why_not(dataclasses.replace(alone, accepted=(*alone.accepted, hidden)), rubbing) == ""

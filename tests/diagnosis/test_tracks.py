@@ -10,14 +10,16 @@ import pytest
 from numpy.typing import NDArray
 
 from codegen import predictor as predictor_module
-from codegen.predictor import Predictor
+from codegen.lean import lean
+from codegen.predictor import Predictor, columns_of
 from codegen.runs import Prediction, Recorded
+from codegen.tracks import tracks
 from diagnosis import recipe
 from diagnosis.bench import Bench, balance_drifts
 from diagnosis.candidate import Candidate
 from diagnosis.layers import fitting, shipped_effects
 from diagnosis.series import Series
-from language.load import automaton_of
+from language.load import automaton_of, program_of
 from language.project import Project, expanded, read_document
 from tests.diagnosis.conftest import SOON
 from tests.diagnosis.test_estimation import PERIOD, SEEN
@@ -191,3 +193,14 @@ def test_between_samples_inputs_are_held_or_run_straight(substeps: int, bench: B
     for r, (low, high) in enumerate(zip(given.starts[:-1], given.starts[1:], strict=True)):
         run = alone(predictor, pages[0, r], given, r, (gains[:0], gains), substeps)
         assert_same(innovations[0, low:high], run.innovations)
+
+
+def test_both_sides_of_a_gap_take_a_step_at_once(bench: Bench) -> None:
+    """They differ in a guard; the gap flows in another way."""
+    program = lean(program_of(bench.automaton))
+    columns = columns_of(program, SEEN)
+    found = tracks(program, columns.states, columns.seen)
+    assert [sorted(leap.modes.values()) for leap in found["leaps"]] == [
+        ["coast_contact", "drive_contact"],
+        ["no_contact"],
+    ]
