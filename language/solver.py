@@ -2,8 +2,8 @@
 
 Functions without a theory (sin, exp, tables) are any functions within their bounds: what cannot be
 for any of them cannot be. The effort is counted by z3 itself, not by a clock: so the answers are
-the same on every machine. z3 is loaded with the first question. All that it makes is in one
-context, in which one thread may work at a time: candidates are made side by side.
+the same on every machine. z3 is loaded with the first question. It keeps all terms in one context,
+which is not safe for threads: they take turns.
 """
 
 from __future__ import annotations
