@@ -12,6 +12,7 @@ from __future__ import annotations
 import dataclasses
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from typing import Literal
 
 from codegen.way import LEFT, PLACE, NotPlain, Way
 from language.operation import Assign, Block, Branch, Choose, Expr, Loop, Op, Ref, Run, Unary, Value
@@ -21,6 +22,9 @@ from language.substitution import own_expressions, with_expressions, with_parts
 from language.traversal import block_writes, expr_names, reads
 from language.wiring import finished
 
+Leaps = Literal["on", "anew", "off"]
+"""Whether there are leaps; `anew` computes all equations, for one whose states are set between its
+steps, as those of a predictor are: what they were when the step before ended does not count."""
 ENTRIES = ("init", "derive", "step")
 LEAP, DONE, RECORD, STARTED = "leap", "memory.is_leapt", "record", "memory.started"
 THROUGH = "through_events"
@@ -28,20 +32,22 @@ END = "work.end_"
 UNDONE = (Assign(DONE, Value(False)),)
 
 
-def leaping(program: Program) -> Program:
+def leaping(program: Program, leaps: Leaps = "on") -> Program:
     """Return a Program that takes a whole step at once where nothing happens in it: its own one if
-    it is continuous, else that of a model that it runs.
+    it is continuous, else that of a model that it runs; the Program itself where `leaps` are off.
 
     Modes that wait take the general path always; modes without a guard never do. A run in float64,
     which is software on an ECU that has float32 in hardware, stays as it is: its values would be
     on the stack.
     """
+    if leaps == "off":
+        return program
     if program.period is None:
-        return _stepping(program)
+        return _stepping(program, leaps)
     return _running(program) if program.number == "float32" else program
 
 
-def _stepping(program: Program) -> Program:
+def _stepping(program: Program, leaps: Leaps) -> Program:
     match program.blocks["step"]:
         case (Branch(started, flow, enter), *rest):
             pass
@@ -49,7 +55,7 @@ def _stepping(program: Program) -> Program:
             return program
     first = tuple(op for op in flow if op == Run(RECORD))
     flow = tuple(op for op in flow if op != Run(RECORD))
-    ways = dict(_ways(program, flow))
+    ways = dict(_ways(program, flow, leaps))
     once = (*first, Run(LEAP))
     if _are_sure(ways, program.modes):
         step: Block = (Branch(started, once, (*enter, *rest)),)
@@ -108,13 +114,13 @@ def _run_ways(program: Program, flow: Block, equations: Block) -> Iterator[tuple
         yield mode.number, way
 
 
-def _ways(program: Program, flow: Block) -> Iterator[tuple[int, Way]]:
+def _ways(program: Program, flow: Block, leaps: Leaps) -> Iterator[tuple[int, Way]]:
     """Yield the way through a step without a crossing of each mode that has one."""
     for mode in program.modes:
         way = Way(program, {MODE: Value(mode.number), STARTED: Value(True)})
-        equations = program.blocks.get(f"equations_{mode.name}", ())
+        known = program.blocks.get(f"equations_{mode.name}", ()) if leaps == "on" else ()
         try:
-            way.keep(equations, ("state.", "constant.", "before."))
+            way.keep(known, ("state.", "constant.", "before."))
             way.follow(flow)
             way.end()
         except NotPlain:

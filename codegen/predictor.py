@@ -24,6 +24,7 @@ from codegen.rendering import render
 from codegen.runs import Prediction, Recorded, Runs
 from codegen.source import c_files
 from codegen.tracks import tracks
+from codegen.vectors import has_vectors
 from language.program import Program, short
 
 Reals = NDArray[np.float64]
@@ -248,10 +249,11 @@ def built(program: Program, columns: Columns) -> Iterator[Path]:
     program = lean(program)
     with tempfile.TemporaryDirectory(prefix="modewright-") as name:
         folder = Path(name)
-        files = c_files(program)
+        abreast = tracks(program, columns.states, columns.seen) if has_vectors() else None
+        files = c_files(program, leaps="off" if abreast and not abreast["record"] else "anew")
         context = {
             **_context(columns),
-            "tracks": tracks(program, columns.states, columns.seen),
+            "tracks": abreast,
             "mathematics": next((f for f in files if MATHEMATICS.match(f)), ""),
         }
         files["predictor.c"] = render("predictor.c.jinja", context)

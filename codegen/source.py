@@ -10,7 +10,7 @@ from codegen.expression import SUFFIX, literal
 from codegen.fault import why_set
 from codegen.frame import apart
 from codegen.gate import LATCH_EACH, gated
-from codegen.leap import THROUGH, leaping
+from codegen.leap import THROUGH, Leaps, leaping
 from codegen.mathematics import math_files
 from codegen.member import CONSTANTS, PAGE, Page, field_of, members
 from codegen.names import (
@@ -56,16 +56,16 @@ STATIC = rf"static (?:{'|'.join(('inline', *NOT_INLINED))}) "
 INLINE = ("min", "max", "clip", "sign", "pow2", "whole", "within", "lookup", "lookup2")
 
 
-def c_files(program: Program, by_amount: bool = True) -> dict[str, str]:
+def c_files(program: Program, by_amount: bool = True, leaps: Leaps = "on") -> dict[str, str]:
     """Return the generated files of a Program by name: one that has a `step`.
 
-    `by_amount` as in `gated`. A continuous automaton has none where an input varies inside a step:
-    then ValueError.
+    `by_amount` as in `gated`, `leaps` as in `leaping`. A continuous automaton has none where an
+    input varies inside a step: then ValueError.
     """
     if "step" not in program.blocks:
         raise ValueError(f"inputs of {program.name} vary inside a step: it has no C")
     context = {
-        **module_context(c_program(program, by_amount), PAGE),
+        **module_context(c_program(program, by_amount, leaps), PAGE),
         "digest": digest(program),
     }
     files = {
@@ -78,9 +78,9 @@ def c_files(program: Program, by_amount: bool = True) -> dict[str, str]:
     return files
 
 
-def c_program(program: Program, by_amount: bool = True) -> Program:
+def c_program(program: Program, by_amount: bool = True, leaps: Leaps = "on") -> Program:
     """Return the Program that C is printed of: the same bits, in the way that suits C."""
-    return leaping(gated(without_unread(stepped(program), ("work.",)), by_amount))
+    return leaping(gated(without_unread(stepped(program), ("work.",)), by_amount), leaps)
 
 
 def stepped(program: Program) -> Program:

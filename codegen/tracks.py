@@ -41,7 +41,7 @@ def tracks(program: Program, columns: tuple[str, ...], seen: tuple[str, ...]) ->
     """
     if program.number != "float64" or len(program.mode_variables()) != 1:
         return None
-    made = leaping(stepped(program))
+    made = leaping(stepped(program), "anew")
     records = _records(program) if RECORD in made.blocks else {"record": ""}
     if records is None:
         return None
@@ -66,7 +66,7 @@ def _records(program: Program) -> dict[str, Any] | None:
     """Return how a lane records by itself what a delay reads, and goes through events behind that;
     None where the values of a step are not in the instance.
     """
-    context = module_context(c_program(program), MODULE_PAGE)
+    context = module_context(c_program(program, leaps="anew"), MODULE_PAGE)
     calls, scratch = context["calls"], context["scratch"]
     if THROUGH not in calls or not (scratch and scratch["is_in_instance"]):
         return None

@@ -94,9 +94,10 @@ class _Way:
 
     def _read(self, expr: Expr, done: Set) -> None:
         for part in subexpressions(expr):
-            if isinstance(part, Ref) and part.name in self.shared - done:
-                self.found.add(part.name)
-            if isinstance(part, Item) and part.name in self.shared:
+            if isinstance(part, Ref):
+                if part.name in self.shared and part.name not in done:
+                    self.found.add(part.name)
+            elif isinstance(part, Item) and part.name in self.shared:
                 elements = set(_elements(part, self.sizes[part.name], self.turn))
                 self.found.update({part.name} if elements - done else ())
 

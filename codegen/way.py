@@ -195,7 +195,10 @@ class Way:
         self._versions[name] += 1
         self._number_of.pop(name, None)
         self._named = {number: held for number, held in self._named.items() if held != name}
-        self.known = {n: held for n, held in self.known.items() if n != name and held != Ref(name)}
+        self.known.pop(name, None)
+        known = self.known.items()
+        for other in [n for n, held in known if isinstance(held, Ref) and held.name == name]:
+            del self.known[other]
 
     def _name(self, name: str, number: int | None) -> None:
         self._number_of[name] = number

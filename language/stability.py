@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cache
 
 from language.affine import Affine, matrix_of
 from language.eigen import eigenvalues, governing_entry
@@ -76,8 +77,15 @@ def limit_of(field: Field, mode: str, parts: Mapping[str, Affine], method: str) 
 
 def largest_step(method: str, eigenvalue: complex) -> float:
     """Return the largest h [s] with |R(h' lambda)| <= 1 for all h' up to h."""
-    growth, size = GROWTH[method], abs(eigenvalue)
+    size = abs(eigenvalue)
     turn = eigenvalue / size
+    return _reach(method, complex(turn.real, abs(turn.imag))) / size
+
+
+@cache
+def _reach(method: str, turn: complex) -> float:
+    """Return how far from 0 along a direction `turn` the values of |R| stay within 1."""
+    growth = GROWTH[method]
 
     def decays(z: float) -> bool:
         return abs(growth(z * turn)) <= 1.0 + ROUNDING
@@ -89,7 +97,7 @@ def largest_step(method: str, eigenvalue: complex) -> float:
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if decays(middle) else (low, middle)
-    return low / size
+    return low
 
 
 def check_step(limit: Limit, method: str, h: float, span: Span, problems: Problems) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Iterator
 
 from language.operation import (
@@ -28,38 +27,39 @@ Change = Callable[[Expr], Expr]
 
 def parts(expr: Expr) -> tuple[Expr, ...]:
     """Return the direct operands of an expression."""
-    match expr:
-        case Item(_, index):
-            return (index,)
-        case Unary(_, operand):
-            return (operand,)
-        case Binary(_, left, right) | Compare(_, left, right):
-            return left, right
-        case Select(condition, then, other):
-            return condition, then, other
-        case Call(_, arguments):
-            return arguments
-        case _:
-            return ()
+    if isinstance(expr, (Binary, Compare)):
+        return expr.left, expr.right
+    if isinstance(expr, Call):
+        return expr.arguments
+    if isinstance(expr, Unary):
+        return (expr.operand,)
+    if isinstance(expr, Select):
+        return expr.condition, expr.then, expr.other
+    return (expr.index,) if isinstance(expr, Item) else ()
 
 
 def with_parts(expr: Expr, change: Change) -> Expr:
-    """Return an expression with its direct operands changed."""
-    match expr:
-        case Item(name, index, whole):
-            return Item(name, change(index), whole)
-        case Unary(operator, operand):
-            return Unary(operator, change(operand))
-        case Binary(operator, left, right):
-            return Binary(operator, change(left), change(right))
-        case Compare(operator, left, right):
-            return Compare(operator, change(left), change(right))
-        case Select(condition, then, other):
-            return Select(change(condition), change(then), change(other))
-        case Call(function, arguments):
-            return Call(function, tuple(change(argument) for argument in arguments))
-        case _:
-            return expr
+    """Return an expression with its direct operands changed: itself where none is another one."""
+    if isinstance(expr, (Binary, Compare)):
+        left, right = change(expr.left), change(expr.right)
+        is_same = left is expr.left and right is expr.right
+        return expr if is_same else type(expr)(expr.operator, left, right)  # type: ignore[arg-type]
+    if isinstance(expr, Call):
+        arguments = tuple(change(argument) for argument in expr.arguments)
+        is_same = all(new is old for new, old in zip(arguments, expr.arguments, strict=True))
+        return expr if is_same else Call(expr.function, arguments)
+    if isinstance(expr, Unary):
+        operand = change(expr.operand)
+        return expr if operand is expr.operand else Unary(expr.operator, operand)
+    if isinstance(expr, Select):
+        condition, then, other = change(expr.condition), change(expr.then), change(expr.other)
+        old = expr.condition, expr.then, expr.other
+        is_same = condition is old[0] and then is old[1] and other is old[2]
+        return expr if is_same else Select(condition, then, other)
+    if isinstance(expr, Item):
+        index = change(expr.index)
+        return expr if index is expr.index else Item(expr.name, index, expr.whole)
+    return expr
 
 
 def with_expressions(block: Block, change: Change) -> Block:
@@ -89,10 +89,10 @@ def subexpressions(expr: Expr) -> Iterator[Expr]:
 
 def _op(op: Op, change: Change) -> Op:
     match op:
-        case Assign(_, value, _):
-            return dataclasses.replace(op, value=change(value))
-        case Store(_, index, value):
-            return dataclasses.replace(op, index=change(index), value=change(value))
+        case Assign(target, value, key):
+            return Assign(target, change(value), key)
+        case Store(array, index, value):
+            return Store(array, change(index), change(value))
         case Branch(condition, then, other):
             inner = (with_expressions(block, change) for block in (then, other))
             return Branch(change(condition), *inner)
@@ -100,7 +100,7 @@ def _op(op: Op, change: Change) -> Op:
             return Choose(selector, tuple((k, with_expressions(b, change)) for k, b in cases))
         case Loop(count, index, body):
             return Loop(count, index, with_expressions(body, change))
-        case Count(_, condition, _, _):
-            return dataclasses.replace(op, condition=change(condition))
+        case Count(timer, condition, limit, key):
+            return Count(timer, change(condition), limit, key)
         case _:
             return op

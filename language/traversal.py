@@ -1,4 +1,7 @@
-"""Traversal: every operation of a block, and the names that blocks read and write."""
+"""Traversal: every operation of a block, and the names that blocks read and write.
+
+Every pass asks for these again and again: what an operation is is asked one class at a time.
+"""
 
 from __future__ import annotations
 
@@ -33,79 +36,85 @@ def walk(block: Block) -> Iterator[Op]:
     while stack:
         op = stack.pop()
         yield op
-        match op:
-            case Branch(_, then, other):
-                stack += reversed(other)
-                stack += reversed(then)
-            case Choose(_, cases):
-                for _, case_block in reversed(cases):
-                    stack += reversed(case_block)
-            case Loop(_, _, body):
-                stack += reversed(body)
+        if isinstance(op, Branch):
+            stack += op.other[::-1]
+            stack += op.then[::-1]
+        elif isinstance(op, Choose):
+            for _, case_block in reversed(op.cases):
+                stack += case_block[::-1]
+        elif isinstance(op, Loop):
+            stack += op.body[::-1]
 
 
-def block_names(block: Block) -> Iterator[str]:
-    """Yield the variables and constants that a block reads or writes, and `call <function>`."""
-    yield from block_reads(block)
-    yield from block_writes(block)
+def block_names(block: Block) -> list[str]:
+    """Return the variables and constants that a block reads or writes, and `call <function>`."""
+    return block_reads(block) + block_writes(block)
 
 
-def block_reads(block: Block) -> Iterator[str]:
-    """Yield the variables that a block reads."""
+def block_reads(block: Block) -> list[str]:
+    """Return the variables that a block reads."""
+    found: list[str] = []
     for op in walk(block):
-        match op:
-            case Assign(_, value, _):
-                yield from expr_names(value)
-            case Store(_, index, value):
-                yield from expr_names(index)
-                yield from expr_names(value)
-            case Branch(condition, _, _) | Count(_, condition, _, _):
-                yield from expr_names(condition)
-            case Choose(selector, _):
-                yield selector
-            case _:
-                pass
+        if isinstance(op, Assign):
+            found += expr_names(op.value)
+        elif isinstance(op, (Branch, Count)):
+            found += expr_names(op.condition)
+        elif isinstance(op, Store):
+            found += expr_names(op.index)
+            found += expr_names(op.value)
+        elif isinstance(op, Choose):
+            found.append(op.selector)
+    return found
 
 
-def block_writes(block: Block) -> Iterator[str]:
-    """Yield the variables that a block writes."""
+def block_writes(block: Block) -> list[str]:
+    """Return the variables that a block writes."""
+    found: list[str] = []
     for op in walk(block):
-        match op:
-            case Assign(target, _, _):
-                yield target
-            case Store(array, _, _):
-                yield array
-            case Count(timer, _, _, _):
-                yield timer
-            case Loop(_, index, _):
-                yield index
-            case FaultBit():
-                yield "memory.faults"
-            case _:
-                pass
+        if isinstance(op, Assign):
+            found.append(op.target)
+        elif isinstance(op, Store):
+            found.append(op.array)
+        elif isinstance(op, Count):
+            found.append(op.timer)
+        elif isinstance(op, Loop):
+            found.append(op.index)
+        elif isinstance(op, FaultBit):
+            found.append("memory.faults")
+    return found
 
 
-def expr_names(expr: Expr) -> Iterator[str]:
-    """Yield the variables and constants that an expression reads, and `call <function>`."""
-    for part in parts(expr):
-        if isinstance(part, Ref | Item):
-            yield part.name
+def expr_names(expr: Expr) -> list[str]:
+    """Return the variables and constants that an expression reads, and `call <function>`."""
+    found: list[str] = []
+    stack: list[Expr] = [expr]
+    while stack:
+        part = stack.pop()
+        if isinstance(part, Ref):
+            found.append(part.name)
+        elif isinstance(part, (Binary, Compare)):
+            stack += (part.right, part.left)
         elif isinstance(part, Call):
-            yield f"call {part.function}"
+            found.append(f"call {part.function}")
+            stack += part.arguments[::-1]
+        elif isinstance(part, Unary):
+            stack.append(part.operand)
+        elif isinstance(part, Select):
+            stack += (part.other, part.then, part.condition)
+        elif isinstance(part, Item):
+            found.append(part.name)
+            stack.append(part.index)
+    return found
 
 
 def parts(expr: Expr) -> Sequence[Expr]:
     """Return every part of an expression, parents first."""
-    if isinstance(expr, Ref | Value):
-        return (expr,)
     stack: list[Expr] = [expr]
     found: list[Expr] = []
     while stack:
         part = stack.pop()
         found.append(part)
-        if isinstance(part, Ref | Value):
-            continue
-        if isinstance(part, Binary | Compare):
+        if isinstance(part, (Binary, Compare)):
             stack += (part.right, part.left)
         elif isinstance(part, Call):
             stack += part.arguments[::-1]
@@ -113,7 +122,7 @@ def parts(expr: Expr) -> Sequence[Expr]:
             stack.append(part.operand)
         elif isinstance(part, Select):
             stack += (part.other, part.then, part.condition)
-        else:
+        elif isinstance(part, Item):
             stack.append(part.index)
     return found
 
