@@ -8,13 +8,13 @@ import re
 
 import pytest
 
-from codegen.leap import leaping
+from codegen.leap import Leaps, leaping
 from codegen.source import c_files, stepped
 from engine.interpreter import Interpreter
 from language.number import NUMBERS, NumberType
 from language.operation import Branch
 from language.program import Program
-from language.traversal import reads, walk
+from language.traversal import block_reads, reads, walk
 from lockstep.compare import Tape, compare
 from modewright.api import program as shipped
 from tests.language.making import program
@@ -62,6 +62,9 @@ def inputs(count: int = 400) -> list[dict[str, float | bool]]:
         }
         for k in range(count)
     ]
+
+
+LEAPS: tuple[Leaps, ...] = ("on", "anew")
 
 
 def leaps(made: Program) -> set[str]:
@@ -181,3 +184,19 @@ def test_what_nobody_reads_is_not_computed() -> None:
             targets = [op.target for op in walk(block) if hasattr(op, "target")]
             made = {target for target in targets if target.startswith("work.")}
             assert made <= reads([block]) and len(made) > 10
+
+
+def test_of_states_that_are_set_between_steps_no_equation_is_older_than_they_are() -> None:
+    made = stepped(shipped("blind_driveline"))
+    older = {
+        one: {
+            name
+            for title, block in leaping(made, one).blocks.items()
+            for name in block_reads(block)
+            if title.startswith("leap_") and name.startswith("equation.")
+        }
+        for one in LEAPS
+    }
+    read = {f"equation.{name}" for name in ("T_hs", "T_v", "w_d", "w_free")}
+    assert older == {"on": read, "anew": set()}
+    assert leaping(made, "off") is made

@@ -42,6 +42,7 @@ LAID = {
     "mount_compliance@half_shaft": True,
     "second_gap@half_shaft": True,
     "sensor_lag@w_s": True,
+    "stiffness_hysteresis@half_shaft": True,
     "torque_ripple@T_em": True,
     "tyre_slip@vehicle": True,
 }
