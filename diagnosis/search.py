@@ -53,6 +53,19 @@ class Tried:
     beside: float = 0.0
 
     @property
+    def own(self) -> dict[str, float]:
+        """What the effect's own parameters are that all recordings share; none if not fitted."""
+        if self.estimate is None:
+            return {}
+        values, brought = self.estimate.values(0), brought_by(self.layer)
+        uncertain = self.estimate.candidate.uncertain
+        return {
+            one.name: values[one.name]
+            for one in uncertain
+            if one.name in brought and not one.per_recording
+        }
+
+    @property
     def gained(self) -> float:
         """What it gained [nats] when it was accepted, or gains beside the others where that is
         more: while something else is missing, the right one may gain little.
@@ -79,8 +92,11 @@ def searched(
     layers: Iterable[Layer],
     tell: Tell = lambda text: None,
     worth: float = WORTH,
+    alone: Iterable[Tried] = (),
 ) -> list[Tried]:
-    """Return the candidates that could be laid on the base's layers, best first."""
+    """Return the candidates that could be laid on the base's layers, best first; they start where
+    they were fitted `alone`, too.
+    """
     least = max(HINT, HINT_PART * worth)
     there = {layer.id for layer in base.candidate.layers}
     new = [layer for layer in layers if layer.id not in there]
@@ -88,7 +104,8 @@ def searched(
     known = [(layer, one) for layer, one in zip(new, made, strict=True) if one is not None]
     found: list[Tried] = []
     chances = _Chances(bench, base, worth)
-    for promise in promises(bench, base, known, least):
+    fits = {one.layer.id: one.own for one in alone if one.estimate}
+    for promise in promises(bench, base, known, least, fits):
         gain, layer, start = promise.gain, promise.layer, chances.start(promise, found)
         if start is None:
             found.append(Tried(layer, gain))
