@@ -1,6 +1,6 @@
 """Traversal: every operation of a block, and the names that blocks read and write.
 
-Every pass asks for these again and again: what an operation is is asked one class at a time.
+Every pass asks for these again and again: a kind of operation is asked for after the other.
 """
 
 from __future__ import annotations
@@ -87,23 +87,11 @@ def block_writes(block: Block) -> list[str]:
 def expr_names(expr: Expr) -> list[str]:
     """Return the variables and constants that an expression reads, and `call <function>`."""
     found: list[str] = []
-    stack: list[Expr] = [expr]
-    while stack:
-        part = stack.pop()
-        if isinstance(part, Ref):
+    for part in parts(expr):
+        if isinstance(part, (Ref, Item)):
             found.append(part.name)
-        elif isinstance(part, (Binary, Compare)):
-            stack += (part.right, part.left)
         elif isinstance(part, Call):
             found.append(f"call {part.function}")
-            stack += part.arguments[::-1]
-        elif isinstance(part, Unary):
-            stack.append(part.operand)
-        elif isinstance(part, Select):
-            stack += (part.other, part.then, part.condition)
-        elif isinstance(part, Item):
-            found.append(part.name)
-            stack.append(part.index)
     return found
 
 
