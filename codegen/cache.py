@@ -17,9 +17,14 @@ from contextlib import suppress
 from pathlib import Path
 
 VARIABLE = "MODEWRIGHT_CACHE"
+KEY_LENGTH = 64
 MOST_PROGRAMS = 200
 """Programs kept; beyond, those not used for a day go, the oldest first (100 kB each)."""
 DAY = 86400.0
+HOUR = 3600.0
+TIDIED = "tidied"
+"""A file whose age tells when its folder was looked through: not with each program, a look at
+thousands of them takes as long as a small program to compile."""
 log = logging.getLogger("modewright.cache")
 
 
@@ -97,7 +102,7 @@ def stored(key: str, make: Callable[[Path], None], spare: Path, part: str = "") 
     log.info("compiled: %s", target)
     try:
         _keep(spare / "program", target)
-        _tidy(folder)
+        tidy(folder)
     except OSError as error:
         log.warning("not kept: %s", error)
         return spare / "program"
@@ -138,12 +143,27 @@ def _seal(target: Path) -> Path:
     return target.with_name(target.name + ".sha256")
 
 
-def _tidy(folder: Path) -> None:
-    programs = [path for path in folder.iterdir() if len(path.name) == 64]
-    if len(programs) <= MOST_PROGRAMS:
-        return
-    ages = sorted((time.time() - path.stat().st_mtime, path) for path in programs)
-    for age, path in ages[MOST_PROGRAMS:]:
-        if age > DAY:
-            path.unlink(missing_ok=True)
-            _seal(path).unlink(missing_ok=True)
+def tidy(folder: Path) -> None:
+    """Remove the oldest of what is kept in a folder; look for them once an hour at most.
+
+    What belongs together begins with the same key. Reading counts as use where the system tells it.
+    """
+    stamp = folder / TIDIED
+    with suppress(OSError):
+        if abs(time.time() - stamp.stat().st_mtime) < HOUR:
+            return
+    stamp.touch(mode=0o600)
+    used: dict[str, float] = {}
+    files: dict[str, list[Path]] = {}
+    for path in folder.iterdir():
+        key = path.name[:KEY_LENGTH]
+        if len(key) == KEY_LENGTH:
+            with suppress(OSError):  # another process may have removed it
+                found = path.stat()
+                used[key] = max(used.get(key, 0.0), found.st_mtime, found.st_atime)
+                files.setdefault(key, []).append(path)
+    newest_first = sorted(used, key=lambda key: -used[key])
+    for key in newest_first[MOST_PROGRAMS:]:
+        if time.time() - used[key] > DAY:
+            for path in files[key]:
+                path.unlink(missing_ok=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import time
 from pathlib import Path
 
 import pytest
@@ -151,10 +152,39 @@ def test_the_oldest_programs_go_after_a_day(folder: Path, monkeypatch: pytest.Mo
     with executable(heater()):
         pass
     (old,) = programs(folder)
-    os.utime(old, (1.0, 1.0))
+    (seal,) = (path for path in files(folder) if path.name == f"{old.name}.sha256")
+    for path in (old, seal, folder / cache.TIDIED):
+        os.utime(path, (1.0, 1.0))
     with executable(heater(), (*FLAGS, "-O1")) as new:
         assert programs(folder) == [new]
-    assert len(files(folder)) == 2, "its seal has gone too"
+    assert len(files(folder)) == 3, "its seal has gone too; the new one's and the stamp are there"
+
+
+def test_a_folder_is_looked_through_once_an_hour(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(cache, "MOST_PROGRAMS", 0)
+    cache.tidy(tmp_path)
+    old, other = tmp_path / f"{'a' * 64}.json", tmp_path / "a file of another kind"
+    for path in (old, other):
+        path.write_text("")
+        os.utime(path, (1.0, 1.0))
+    cache.tidy(tmp_path)
+    assert old.exists()
+    os.utime(tmp_path / cache.TIDIED, (time.time() - cache.HOUR - 1.0,) * 2)
+    cache.tidy(tmp_path)
+    assert not old.exists() and other.exists()
+
+
+def test_what_was_read_today_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cache, "MOST_PROGRAMS", 0)
+    library, recipe = (tmp_path / f"{'b' * 64}.{ending}" for ending in ("so", "json"))
+    for path in (library, recipe):
+        path.write_text("")
+        os.utime(path, (1.0, 1.0))
+    os.utime(library, (time.time(), 1.0))
+    cache.tidy(tmp_path)
+    assert library.exists() and recipe.exists(), "they belong together"
 
 
 @pytest.fixture
