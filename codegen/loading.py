@@ -22,7 +22,7 @@ def loaded(path: Path) -> Any:
     ]
     library.modewright_predict.restype = whole
     library.modewright_predict_all.argtypes = [
-        *(pointer, pointer, pointer, pointer, whole, pointer),
+        *(pointer, pointer, pointer, pointer, whole, pointer, ctypes.c_int),
         *(whole, whole, pointer, pointer, whole),
         *(pointer, pointer, pointer, pointer, pointer),
     ]

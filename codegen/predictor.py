@@ -34,6 +34,8 @@ LIBRARY_FLAGS = (
 )
 """One file, so that all is inlined; a diagnosis takes 0.86 of the time that it takes with -Og. No
 calibration tool writes into the page of a predictor: not volatile, a step takes 0.7 of the time."""
+SHARED = 3
+"""Dimensions of steady gains that all points have in common: (modes, states, seen)."""
 MATHEMATICS = re.compile(r"ha_mathf?\.c")
 FUNCTION = re.compile(r"^(?=\w+ ha_\w+\()", re.MULTILINE)
 
@@ -193,7 +195,7 @@ class Predictor:
         """Follow several recordings at several points, with `pages` (points, recordings, tunables).
 
         Return the innovations (points, samples, seen), and how many samples were done (points,
-        recordings). The other arrays are those of `predict`.
+        recordings). The other arrays are those of `predict`; gains may be by points as well.
         """
         points = len(pages)
         innovations = np.full((points, len(recorded.inputs), len(self.seen)), np.nan)
@@ -225,9 +227,11 @@ class Predictor:
     ) -> None:
         first, steady = gains
         starts, linear = recorded.starts, recorded.linear
+        own = int(steady.ndim > SHARED)
         self._library.modewright_predict_all(
             *(_at(a) for a in (pages, recorded.inputs, recorded.measured, first)),
-            *(len(first), _at(steady), points, len(linear), _at(starts), _at(linear), substeps),
+            *(first.shape[own], _at(steady), own, points, len(linear)),
+            *(_at(starts), _at(linear), substeps),
             *(None if a is None else _at(a) for a in told),
         )
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.bench import Bench
-from diagnosis.companion import turning_with
+from diagnosis.companion import orders_of
 from diagnosis.locus import Locus
 from language.known import entries_of
 from language.rewrite import reads
@@ -78,7 +78,7 @@ def acting(bench: Bench, section: str, place: str) -> str:
 
 def _ripples(locus: Locus) -> bool:
     name, part = locus.along[0] if locus.along else ("", 0.0)
-    return turning_with(name) == locus.place and part > RIPPLE
+    return name in orders_of(locus.place) and part > RIPPLE
 
 
 def _goes_with_acceleration(bench: Bench, locus: Locus) -> bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -13,7 +12,6 @@ from diagnosis.estimate import Estimate
 from language.document import Scalar, Table
 
 Reals = NDArray[np.float64]
-ORDER = re.compile(r"order \d+ of the angle of (\w+)")
 MOST = 3
 """Companions that are told."""
 ORDERS = (1, 2, 3, 4, 6, 8, 12, 24)
@@ -40,10 +38,9 @@ def along(bench: Bench, free: Estimate, drifts: Sequence[Reals]) -> tuple[tuple[
     return tuple(sorted(found, key=lambda pair: -abs(pair[1]))[:MOST])
 
 
-def turning_with(name: str) -> str | None:
-    """Return the rate of whose angle a feature is an order; None for other features."""
-    found = ORDER.fullmatch(name)
-    return found[1] if found else None
+def orders_of(rate: str) -> dict[str, int]:
+    """Return the features that are orders of the angle of a rate, with the periods per turn."""
+    return {f"order {order} of the angle of {rate}": order for order in ORDERS}
 
 
 def _ends(parts: Sequence[Reals], drifts: Sequence[Reals]) -> list[Reals]:
@@ -86,8 +83,8 @@ def _angles(bench: Bench, free: Estimate) -> dict[str, list[Reals]]:
         angles = [
             np.cumsum(one.states[: one.done, column]) * period for one in free.outcome.predictions
         ]
-        for order in ORDERS:
-            found[f"order {order} of the angle of {rate}"] = [order * angle for angle in angles]
+        for name, order in orders_of(rate).items():
+            found[name] = [order * angle for angle in angles]
     return found
 
 

@@ -19,6 +19,7 @@ from diagnosis.prediction import (
     Noises,
     Outcome,
     foreseen_at,
+    foreseen_with,
     noises_at,
     predicted,
 )
@@ -125,11 +126,13 @@ def with_normal(
 def _of_levels(now: Estimate, series: Sequence[Series], names: Sequence[str]) -> Columns:
     """Return how innovations change with levels: with the gains that are made with these."""
     candidate, found = now.candidate, {}
-    for name in names:
-        k = candidate.names.index(name)
-        there = now.point.moved(candidate, k, LEVEL_STEP / candidate.uncertain[k].sd)
-        outcome = run_at(candidate, series, now.point, gains_there(now, series, there), now.noises)
-        changes = (outcome.joined - now.outcome.joined) / (there.shared[k] - now.point.shared[k])
+    places = [candidate.names.index(name) for name in names]
+    moved = [now.point.moved(candidate, k, LEVEL_STEP / candidate.uncertain[k].sd) for k in places]
+    gains = [gains_there(now, series, there) for there in moved]
+    values = all_values_at(candidate, now.point)[: len(series)]
+    runs = foreseen_with(candidate, series, values, gains, now.noises.limits)
+    for name, k, there, run in zip(names, places, moved, runs, strict=True):
+        changes = (run.joined - now.outcome.joined) / (there.shared[k] - now.point.shared[k])
         found[name] = np.where(np.isfinite(changes), changes, 0.0)
     return found
 

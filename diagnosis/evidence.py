@@ -7,6 +7,7 @@ there they are foreseen.
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -24,6 +25,8 @@ PARTS = (1.0, 0.5, 0.25, 0.1)
 """Parts of a step that are tried."""
 LAGS = 0.25
 """Seconds over which innovations may hang together."""
+MOST_KEPT = 8
+"""Models of which what was left out is kept, the latest ones; known by their identity."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +59,10 @@ class Evidence:
     def total(self) -> float:
         """Their sum: what candidates are ranked by."""
         return self.train + self.left_out
+
+
+Key = tuple[int, tuple[int, ...]]
+_kept: OrderedDict[Key, tuple[Estimate, Sequence[Series], Reals]] = OrderedDict()
 
 
 def evidence(model: Estimate, base: Estimate, series: Sequence[Series]) -> Evidence:
@@ -139,7 +146,20 @@ def _gained(before: Reals, after: Reals, counts: Reals) -> Reals:
 
 
 def _left_out(model: Estimate, series: Sequence[Series]) -> Reals:
-    """Return the squares (recordings, seen) of each block at the point that the others ask for."""
+    """Return the squares (recordings, seen) of each block at the point that the others ask for.
+
+    What was found of the latest models is kept: a base is asked beside each candidate.
+    """
+    key = id(model), tuple(id(one) for one in series)
+    if key not in _kept:
+        _kept[key] = model, series, _left_out_anew(model, series)
+        if len(_kept) > MOST_KEPT:
+            _kept.popitem(last=False)
+    _kept.move_to_end(key)
+    return _kept[key][2]
+
+
+def _left_out_anew(model: Estimate, series: Sequence[Series]) -> Reals:
     found = np.zeros((len(series), len(model.candidate.predictor.seen)))
     if model.normal is None:
         return np.full(found.shape, np.inf)

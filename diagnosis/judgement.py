@@ -35,6 +35,7 @@ from diagnosis.locus import Locus
 from diagnosis.naming import verdict_id
 from diagnosis.place_sentence import place_sentence
 from diagnosis.plainer import may_be_plainer, plainer_ones
+from diagnosis.pressed import is_opposed
 from diagnosis.search import Tell
 from diagnosis.selection import Selection, selected
 from diagnosis.series import Series
@@ -118,14 +119,11 @@ def _adequate(
     """
     if not selection.accepted:
         return says, selection
-    is_heard = says == "effect" and not is_still(selection, units)
-    why = ""
-    if is_other:
-        why = "terms at their places explain much beside them"
-    elif not selection.has_hidden:  # which takes up anything at all
-        why = _why_not(selection, bench)
-        if not why and is_heard and is_inadequate(bench, selection, needed):
-            why = "free drifts explain much beside them"
+    is_free = says == "effect" and not is_still(selection, units) and not selection.has_hidden
+    why = "terms at their places explain much beside them" if is_other else ""
+    why = why or _why_not(selection, bench)
+    if not why and is_free and is_inadequate(bench, selection, needed):
+        why = "free drifts explain much beside them"
     if not why:
         return says, less_sure(bench, selection, tell) if says == "effect" else selection
     names = ", ".join(tried.layer.id for tried in selection.accepted)
@@ -134,14 +132,21 @@ def _adequate(
 
 
 def _why_not(selection: Selection, bench: Bench) -> str:
-    """Return why accepted effects are something else; nothing where they seem to be right."""
+    """Return why accepted effects are something else; nothing where they seem to be right.
+
+    Beside a hidden input, which takes up anything at all, only ends of ranges are looked at.
+    """
     first = selection.accepted[0]
-    if is_strained(selection.model, selection.accepted):
-        return "they are pulled out of their ranges"
     if is_at_limit(selection.model, first.layer):
         return "the first is at the end of a range"
+    if selection.has_hidden:
+        return ""
+    if is_strained(selection.model, selection.accepted):
+        return "they are pulled out of their ranges"
     if differs(selection.model, first, bench.series, len(selection.accepted) == 1):
         return "the parameters of the first differ from recording to recording"
+    if is_opposed(selection.model, first.layer, bench.automaton):
+        return "the first is more than what its balance can give up for it"
     if piles_up(selection):
         return "two at one place gain alike"
     if remembers_mostly(bench, selection):

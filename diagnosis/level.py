@@ -169,9 +169,13 @@ def first_fit(
 
 
 def recalibrated(first: Estimate, series: Sequence[Series], units: Mapping[str, float]) -> Estimate:
-    """Return the base fitted to recordings from a first fit, with drifts from little to much."""
+    """Return the base fitted to recordings from a first fit, with drifts from little to much, until
+    two come to rest alike.
+    """
     found: list[Estimate] = []
     for level in FIRST_LEVELS:
+        if len(found) > 1 and abs(found[-1].cost - found[-2].cost) < ENOUGH:
+            break
         drifts = {name: level * unit for name, unit in units.items()}
         known = dataclasses.replace(first.noises, drifts=drifts)
         near = min(found, key=lambda one: one.cost, default=first)

@@ -58,6 +58,10 @@ def still_needed(
             first = _credited(bench, rest, tried, found.base, without)
             last = dataclasses.replace(tried, evidence=worth)
             found = Needed(found.base, found.model, (*first, last))
+        else:
+            new = dataclasses.replace(tried, beside=worth.train)
+            kept = tuple(new if t is tried else t for t in found.kept)
+            found = Needed(found.base, found.model, kept)
     return found
 
 

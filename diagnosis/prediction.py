@@ -225,6 +225,35 @@ def foreseen_at(
     return [Innovations(one, recorded, limits, predictor) for one in found]
 
 
+def foreseen_with(
+    candidate: Candidate,
+    series: Sequence[Series],
+    values: Sequence[Mapping[str, float]],
+    gains: Sequence[Gains],
+    limits: Reals,
+) -> list[Innovations]:
+    """Return the innovations of recordings, each with values of its own, with several gains.
+
+    Those with as many first ones are followed side by side; nothing is told of states.
+    """
+    together = joined(series)
+    recorded, predictor = together.recorded, candidate.predictor
+    pages, found = candidate.pages(values, together.first), dict[int, Innovations]()
+    for count in {len(one.first) for one in gains}:
+        alike = [k for k, one in enumerate(gains) if len(one.first) == count]
+        runs, _ = predictor.predict_points(
+            np.repeat(pages[np.newaxis], len(alike), axis=0),
+            recorded,
+            np.array([gains[k].first for k in alike]),
+            np.array([gains[k].steady for k in alike]),
+            candidate.recipe.substeps,
+        )
+        found |= {
+            k: Innovations(r, recorded, limits, predictor) for k, r in zip(alike, runs, strict=True)
+        }
+    return [found[k] for k in range(len(gains))]
+
+
 def _counted(innovations: Reals, starts: NDArray[np.int64], skips: NDArray[np.int64]) -> Reals:
     """Return the innovations of all recordings behind their burn-in, one after the other."""
     edges = zip((starts[:-1] + skips).tolist(), starts[1:].tolist(), strict=True)

@@ -28,6 +28,8 @@ MOST_ON_ALL = 10
 the others alone may show."""
 HINT = 2.0
 """Nats that a candidate gains at least, if it is to be looked at further."""
+LOST = 100.0
+"""Nats: a start that loses as much on some recordings gains nothing on all."""
 STARTS, STARTS_BESIDE = 2, 1
 """Starts of a candidate from which steps are made, the best ones: alone, and beside what was
 accepted, where a second one was hardly ever better."""
@@ -39,6 +41,8 @@ BEHIND = 0.02
 """Part of what the best one gains that another has to gain to go on: none was seen to overtake one
 so far ahead, and what is weak is looked for again beside what is strong."""
 Known = tuple[Layer, Candidate]
+Fits = Mapping[str, Mapping[str, float]]
+"""What an effect's own parameters were where it was fitted alone, by its layer."""
 One = TypeVar("One")
 
 
@@ -55,22 +59,28 @@ class Promise:
 
 @dataclass(frozen=True)
 class Part:
-    """Some recordings, the `rows` of a bench, as a `bench` of their own, with the `base` there."""
+    """Some recordings, the `rows` of a bench, as a `bench` of their own, with the `base` there;
+    candidates start where they were fitted `alone`, too.
+    """
 
     rows: list[int]
     bench: Bench
     base: Estimate = field(repr=False)
+    alone: Fits = field(default_factory=dict, repr=False)
 
     def point(self, whole: Point) -> Point:
         """Return a point of all recordings for these."""
         return Point(whole.shared, whole.own[self.rows])
 
 
-def promises(bench: Bench, base: Estimate, known: Sequence[Known], least: float) -> list[Promise]:
+def promises(
+    bench: Bench, base: Estimate, known: Sequence[Known], least: float, alone: Fits | None = None
+) -> list[Promise]:
     """Return what candidates promise, the best first; one that gains `least` [nats] is looked at on
-    all recordings, unless many gain more or one much more.
+    all recordings, unless many gain more or one much more. They start where they were fitted
+    `alone`, too.
     """
-    some, fair = part_of(bench, base), _fair(base, bench.series)
+    some, fair = part_of(bench, base, alone or {}), _fair(base, bench.series)
     begun = [(layer, _begun(some, candidate)) for layer, candidate in known]
     ahead, behind = _apart(begun, lambda one: some.base.cost - one.cost)
     hints = [(layer, _hinted(bench, some, one, base, least)) for layer, one in ahead]
@@ -101,12 +111,12 @@ def _apart(
     )
 
 
-def part_of(bench: Bench, base: Estimate) -> Part:
+def part_of(bench: Bench, base: Estimate, alone: Fits) -> Part:
     """Return the recordings to begin with, spread over all."""
     count = len(bench.series)
     screened = min(max(round(SCREENED_PART * count), FEWEST_SCREENED), MOST_SCREENED)
     if count <= screened:
-        return Part(list(range(count)), bench, base)
+        return Part(list(range(count)), bench, base, alone)
     rows = [round(k * (count - 1) / (screened - 1)) for k in range(screened)]
     series = tuple(bench.series[row] for row in rows)
     parts = [base.outcome.parts[row] for row in rows]
@@ -114,7 +124,7 @@ def part_of(bench: Bench, base: Estimate) -> Part:
     seen = seen_at(base, series, Point(base.point.shared, base.point.own[rows]))
     own = dataclasses.replace(bench, series=series)
     seen = dataclasses.replace(seen, columns=columns)
-    return Part(rows, own, dataclasses.replace(seen, cost=_fair(seen, series)))
+    return Part(rows, own, dataclasses.replace(seen, cost=_fair(seen, series)), alone)
 
 
 def _fair(base: Estimate, series: Sequence[Series]) -> float:
@@ -139,9 +149,10 @@ class _Hint:
 
 def _begun(some: Part, candidate: Candidate) -> Estimate:
     """Return a candidate few steps from the best of its starts, on some recordings."""
-    make = partial(_raced, some, candidate, _starts(some, candidate))
+    starts = _starts(some, candidate)
+    make = partial(_raced, some, candidate, starts)
     base = some.base
-    given = [base.candidate, base.point, base.noises, base.columns]
+    given = [base.candidate, base.point, base.noises, base.columns, *starts]
     return some.bench.kept("begun", candidate, given, make)
 
 
@@ -160,10 +171,9 @@ def _hinted(bench: Bench, some: Part, begun: Estimate, base: Estimate, least: fl
     if gain >= least or some.bench is bench:
         return _Hint(found, point, gain * len(bench.series) / len(some.rows))
     first = extended(candidate, base.candidate, base.point, starts_of(candidate, base.values(0))[0])
-    ends = [
-        seen_at(found, bench.series, point),
-        looked_like(candidate, bench.series, base.noises, first, base),
-    ]
+    ends = [seen_at(found, bench.series, point)]
+    if seen_at(found, some.bench.series, some.point(first)).cost < some.base.cost + LOST:
+        ends.append(looked_like(candidate, bench.series, base.noises, first, base))
     best = min(ends, key=lambda one: one.cost)
     return _Hint(found, best.point, base.cost - best.cost, is_seen=False)
 
@@ -175,7 +185,7 @@ def _on_all(bench: Bench, some: Part, base: Estimate, hint: _Hint) -> Estimate:
     if some.bench is bench:
         return hint.found
     candidate = hint.found.candidate
-    whole = Part(list(range(len(bench.series))), bench, base)
+    whole = Part(list(range(len(bench.series))), bench, base, some.alone)
     starts = [hint.point, *_starts(whole, candidate)]
     make = partial(_reached, whole, candidate, starts)
     given = [base.candidate, base.point, base.noises, base.columns, *starts]
@@ -185,6 +195,9 @@ def _on_all(bench: Bench, some: Part, base: Estimate, hint: _Hint) -> Estimate:
 def _starts(part: Part, candidate: Candidate) -> list[Point]:
     base = part.base
     starts = starts_of(candidate, base.values(0))
+    known = part.alone.get(candidate.layers[-1].id, {}) if candidate.layers else {}
+    if known and known.keys() <= starts[0].keys():
+        starts.append({**starts[0], **known})
     return [extended(candidate, base.candidate, base.point, start) for start in starts]
 
 

@@ -159,7 +159,7 @@ def _looked_for(asked: _Asked, found: _Found) -> tuple[_Found, list[Tried]]:
     """Return candidates beside the model that was found, best first, and it or a better fit."""
     worth = (HOPE_BESIDE if found.accepted else HOPE) * max(found.needed, asked.thresholds.usual)
     model, bench, units, tell = found.model, asked.bench, asked.units, asked.tell
-    tried = searched(bench, model, units, found.layers, tell, worth)
+    tried = searched(bench, model, units, found.layers, tell, worth, found.first_round)
     better, tried = looked_again(bench, model, units, tried, tell, worth)
     model = model if better is None else better
     if found.accepted:

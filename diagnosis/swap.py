@@ -23,8 +23,9 @@ from diagnosis.strain import is_at_limit
 
 CLEARLY = 3.0
 """Nats by which the model must be better with the other effect."""
-RIVAL_PART = 0.5
-"""Part of what an accepted effect gains that another one gained alone, if it may stand for it."""
+RIVAL_PART, CONFUSED_PART = 0.5, 0.25
+"""Part of what an accepted effect gained that another one gained alone, if it may stand for it; and
+one that it is known to be confused with."""
 
 
 def swapped(
@@ -75,9 +76,11 @@ def _may_stand_for(rival: Tried, old: Tried) -> bool:
     """
     if rival.layer.place != old.layer.place or old.evidence is None:
         return False
+    is_confused = rival.layer.effect.name in old.layer.effect.confused_with
     if rival.evidence is None:
-        return rival.layer.effect.name in old.layer.effect.confused_with
-    return rival.evidence.train > RIVAL_PART * old.evidence.train
+        return is_confused
+    part = CONFUSED_PART if is_confused else RIVAL_PART
+    return rival.evidence.train > part * old.evidence.train
 
 
 def _credited(rival: Tried, old: Tried, model: Estimate, gained: Evidence) -> Tried:

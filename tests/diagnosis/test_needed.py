@@ -75,6 +75,17 @@ def test_what_is_worth_most_at_a_place_comes_first(bench: Bench) -> None:
     assert found.model.values(0)["T_c_w_em"] == pytest.approx(2.0, rel=0.1)
 
 
+def test_what_is_kept_knows_what_it_gains_beside_the_others(bench: Bench) -> None:
+    found = looked_at_after(bench, {"T_d_w_s": 0.03, "T_c_w_em": 2.0}, DELAY, FRICTION)
+    first, last = found.kept
+    assert (first.layer.id, last.layer.id) == (DELAY, FRICTION)
+    assert first.beside > 300.0
+    assert last.beside == 0.0  # not looked for: it was found beside the first
+    assert last.evidence is not None
+    assert last.gained == last.evidence.train
+    assert first.gained >= first.beside
+
+
 def test_a_gain_less_others_is_what_is_left() -> None:
     whole, part = Evidence(10.0, 9.0, (4.0, 5.0)), Evidence(3.0, 2.0, (1.5, 0.5))
     assert less(whole, [part]) == Evidence(7.0, 7.0, (2.5, 4.5))

@@ -13,7 +13,7 @@ from diagnosis.candidate import Candidate
 from diagnosis.estimate import Estimate, looked_at
 from diagnosis.layers import fitting, shipped_effects
 from diagnosis.level import first_fit, units_of
-from diagnosis.point import Point, extended
+from diagnosis.point import Point, extended, values_at
 from diagnosis.screening import BEHIND, HINT, MOST_SCREENED, Part, promises
 from tests.diagnosis.test_estimation import TRUTH, bench, recorded
 
@@ -79,3 +79,29 @@ def test_what_is_far_behind_is_not_followed_further(
     assert first.start is not None
     assert second.gain < BEHIND * first.gain
     assert second.start is None
+
+
+@pytest.mark.parametrize(
+    ("alone", "is_there"), [({}, False), ({"T_c_w_em": 33.0}, True), ({"k": 33.0}, False)]
+)
+def test_a_candidate_starts_where_it_was_fitted_alone_too(
+    bench: Bench, alone: dict[str, float], is_there: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Not with a parameter that the effect does not bring."""
+    layers = {layer.id: layer for e in shipped_effects() for layer in fitting(bench.document, e)}
+    rubs = layers["coulomb_friction@w_em"]
+    candidate, base = bench.candidate((rubs,)), bench.candidate(())
+    series = recorded(candidate, {**TRUTH, "T_c_w_em": 40.0})
+    own = dataclasses.replace(bench, series=series, _made={})
+    fitted = first_fit(base, series, units_of(base, series, {}))
+    begun: list[list[float]] = []
+    raced = screening._raced
+
+    def looking(part: Part, one: Candidate, starts: Sequence[Point]) -> Estimate:
+        begun.append([round(values_at(one, start, 0)["T_c_w_em"], 6) for start in starts])
+        return raced(part, one, starts)
+
+    monkeypatch.setattr(screening, "_raced", looking)
+    promises(own, fitted, [(rubs, candidate)], HINT, {rubs.id: alone})
+    assert [33.0 in starts for starts in begun] == [is_there] * len(begun)
+    assert begun

@@ -83,3 +83,28 @@ def test_a_first_name_that_ends_at_a_limit_is_none(
     model = at_end(bench, selection.model, FRICTION, "T_c_w_em", end)
     limited = dataclasses.replace(selection, model=dataclasses.replace(model, normal=None))
     assert _why_not(limited, rubbing) == why
+    hidden = Tried(
+        layer(bench, "unknown_input@w_w"), 0.0, limited.model, Evidence(1.0, 1.0, (1.0,))
+    )
+    beside = dataclasses.replace(limited, accepted=(*limited.accepted, hidden))
+    assert beside.has_hidden
+    assert _why_not(beside, rubbing) == why
+
+
+@pytest.mark.parametrize(
+    ("rule", "why"),
+    [
+        ("is_strained", "they are pulled out of their ranges"),
+        ("differs", "the parameters of the first differ from recording to recording"),
+        ("remembers_mostly", "most recordings remember what is left"),
+    ],
+)
+def test_beside_a_hidden_input_what_is_left_does_not_count(
+    bench: Bench, rubbing: Bench, monkeypatch: pytest.MonkeyPatch, rule: str, why: str
+) -> None:
+    """It takes up anything at all: its own form is never quite right."""
+    monkeypatch.setattr(f"diagnosis.judgement.{rule}", lambda *of: True)
+    alone = accepting(bench, rubbing, FRICTION)
+    assert _why_not(alone, rubbing) == why
+    hidden = Tried(layer(bench, "unknown_input@w_w"), 0.0, alone.model, alone.accepted[0].evidence)
+    assert _why_not(dataclasses.replace(alone, accepted=(*alone.accepted, hidden)), rubbing) == ""

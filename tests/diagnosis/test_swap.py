@@ -7,7 +7,7 @@ import dataclasses
 import pytest
 
 from diagnosis.bench import Bench
-from diagnosis.evidence import evidence
+from diagnosis.evidence import Evidence, evidence
 from diagnosis.level import settled, units_of
 from diagnosis.search import Tried
 from diagnosis.swap import swapped
@@ -55,3 +55,26 @@ def test_what_it_is_confused_with_is_tried_though_it_was_not_fitted(
     assert before is not None
     assert after is not None
     assert (after.train > before.train + 100.0) is goes_better
+
+
+@pytest.mark.parametrize(
+    ("name", "part", "is_tried"),
+    [
+        ("sensor_delay@w_s", 0.3, True),
+        ("sensor_delay@w_s", 0.2, False),
+        ("sensor_offset@w_s", 0.3, False),
+    ],
+)
+def test_what_it_is_confused_with_may_have_gained_less(
+    bench: Bench, late: tuple[Bench, list[Tried]], name: str, part: float, is_tried: bool
+) -> None:
+    """A delay gained four tenths of what a lag did, until what both hid was found."""
+    used, accepted = late
+    old, model = accepted[0], accepted[-1].estimate
+    assert old.evidence is not None
+    assert model is not None
+    gained = Evidence(part * old.evidence.train, part * old.evidence.left_out, old.evidence.each)
+    rival = Tried(layer(bench, name), 1.0, None, gained)
+    units = units_of(model.candidate, used.series, model.values(0))
+    kept, _ = swapped(used, model, accepted, [rival], units, lambda text: None)
+    assert (kept[0].layer.id == name) is is_tried

@@ -157,6 +157,25 @@ def test_other_tests_follow_with_the_same_bits(
 
 
 @pytest.mark.parametrize("effect", LAID)
+def test_each_point_may_have_gains_of_its_own(effect: str, bench: Bench) -> None:
+    candidate = candidate_of(bench, effect)
+    predictor, substeps = candidate.predictor, candidate.recipe.substeps
+    given = recorded(predictor, len(effect))
+    draw = np.random.default_rng(6)
+    pages = np.tile(list(predictor.page.values()), (POINTS, len(COUNTS), 1))
+    each = [
+        tuple(gains_of(predictor, draw, n) for n in (FIRST, len(predictor.modes)))
+        for _ in range(POINTS)
+    ]
+    first, steady = (np.array(gains) for gains in zip(*each, strict=True))
+    innovations, _ = predictor.predict_points(pages, given, first, steady, substeps)
+    for r, (low, high) in enumerate(zip(given.starts[:-1], given.starts[1:], strict=True)):
+        for p in range(POINTS):
+            run = alone(predictor, pages[p, r], given, r, (first[p], steady[p]), substeps)
+            assert_same(innovations[p, low:high], run.innovations)
+
+
+@pytest.mark.parametrize("effect", LAID)
 def test_most_effects_go_side_by_side(effect: str, bench: Bench) -> None:
     """The library tells: it holds what follows several."""
     candidate = candidate_of(bench, effect)
