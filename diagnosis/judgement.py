@@ -13,7 +13,7 @@ from diagnosis.adequacy import (
     refused,
     remembers_mostly,
 )
-from diagnosis.alone import LEFT_OUT, SIMULATED, alone, forgets
+from diagnosis.alone import LEFT_OUT, PROMISED, SIMULATED, alone, forgets
 from diagnosis.bench import Bench
 from diagnosis.bootstrap import bootstrapped, kept_thresholds
 from diagnosis.case import Case
@@ -169,7 +169,7 @@ def _judged_by_simulation(
     tell("what happened long ago does not matter here: whole simulations are judged")
     thresholds = SIMULATED if case.thresholds == EVERYWHERE else case.thresholds
     found = alone(raw, base)
-    selection = selected(found.bench, found.base, {}, thresholds, tell, LEFT_OUT)
+    selection = selected(found.bench, found.base, {}, thresholds, tell, LEFT_OUT, hope=PROMISED)
     says = _says(selection, left, found.bench, max(USUAL, thresholds.most))
     bench = dataclasses.replace(bench, series=found.bench.series)
     return Judgement(bench, found.base, selection, loci, says, thresholds)

@@ -89,6 +89,7 @@ class _Asked:
     units: Mapping[str, float]
     thresholds: Thresholds
     left_out: float
+    hope: float
     tell: Tell
 
 
@@ -112,13 +113,15 @@ def selected(
     tell: Tell = lambda text: None,
     left_out: float = 1.0,
     known: Sequence[Tried] = (),
+    hope: float = HOPE,
 ) -> Selection:
     """Return the effects that the training recordings ask for: at most three, none too many.
 
-    `left_out` is the part of the threshold that is asked for what is left out. `known` candidates,
-    best first, were tried with the recordings read in another way: only the best are tried again.
+    `left_out` is the part of the threshold that is asked for what is left out, `hope` the part that
+    a candidate has to promise alone. `known` candidates, best first, were tried with the recordings
+    read in another way: only the best are tried again.
     """
-    asked = _Asked(bench, units, thresholds, left_out, tell)
+    asked = _Asked(bench, units, thresholds, left_out, hope, tell)
     found = _Found(base, base, layers=tuple(_near_best(known) or bench.layers()))
     goes_on = True
     while goes_on and len(found.accepted) < MOST_EFFECTS:
@@ -157,7 +160,9 @@ def _one_more(asked: _Asked, found: _Found) -> tuple[_Found, bool]:
 
 def _looked_for(asked: _Asked, found: _Found) -> tuple[_Found, list[Tried]]:
     """Return candidates beside the model that was found, best first, and it or a better fit."""
-    worth = (HOPE_BESIDE if found.accepted else HOPE) * max(found.needed, asked.thresholds.usual)
+    worth = (HOPE_BESIDE if found.accepted else asked.hope) * max(
+        found.needed, asked.thresholds.usual
+    )
     model, bench, units, tell = found.model, asked.bench, asked.units, asked.tell
     tried = searched(bench, model, units, found.layers, tell, worth, found.first_round)
     better, tried = looked_again(bench, model, units, tried, tell, worth)
