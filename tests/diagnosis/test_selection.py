@@ -6,11 +6,13 @@ from collections.abc import Sequence
 
 import pytest
 
+from diagnosis.alone import PROMISED
 from diagnosis.bench import Bench
 from diagnosis.evidence import Evidence
 from diagnosis.screening import Promise
 from diagnosis.search import FULL_FITS, Tried, searched
-from diagnosis.selection import MOST_EFFECTS, selected
+from diagnosis.selection import HOPE, MOST_EFFECTS, selected
+from diagnosis.threshold import USUAL
 from tests.diagnosis.test_adequacy import accepting, rubbing
 from tests.diagnosis.test_estimation import bench
 from tests.diagnosis.test_location import based
@@ -18,6 +20,8 @@ from tests.diagnosis.test_needed import DRAG, FRICTION, layer
 
 __all__ = ["bench", "rubbing"]
 THIRD = "torque_offset@T_em"
+WORTH = 5
+"""Place of what a candidate has to promise among what a search is given."""
 
 
 def test_what_some_recordings_alone_promise_takes_no_turn_of_a_fit(
@@ -59,3 +63,20 @@ def test_a_last_effect_that_pulls_the_others_out_of_their_ranges_is_not_taken(
     monkeypatch.setattr("diagnosis.selection.is_strained", many)
     accepted = selected(rubbing, based(rubbing), {}).accepted
     assert len(accepted) == (MOST_EFFECTS - 1 if strained == MOST_EFFECTS else MOST_EFFECTS)
+
+
+@pytest.mark.parametrize(("hope", "least"), [(HOPE, 0.25 * USUAL), (PROMISED, 0.1 * USUAL)])
+def test_a_candidate_has_to_promise_a_part_of_what_it_must_gain(
+    rubbing: Bench, monkeypatch: pytest.MonkeyPatch, hope: float, least: float
+) -> None:
+    """A quarter, but where whole simulations are judged: a tenth (decision 0096)."""
+    asked: list[object] = []
+
+    def found(*given: object) -> list[Tried]:
+        asked.append(given[WORTH])
+        return []
+
+    monkeypatch.setattr("diagnosis.selection.searched", found)
+    selection = selected(rubbing, based(rubbing), {}, hope=hope)
+    assert not selection.accepted
+    assert asked == [pytest.approx(least)]
