@@ -144,7 +144,8 @@ def _seal(target: Path) -> Path:
 
 
 def tidy(folder: Path) -> None:
-    """Remove the oldest of what is kept in a folder; look for them once an hour at most.
+    """Remove the oldest of what is kept in a folder, and in each inside it; look for them once an
+    hour at most.
 
     What belongs together begins with the same key. Reading counts as use where the system tells it.
     """
@@ -157,7 +158,9 @@ def tidy(folder: Path) -> None:
     files: dict[str, list[Path]] = {}
     for path in folder.iterdir():
         key = path.name[:KEY_LENGTH]
-        if len(key) == KEY_LENGTH:
+        if path.is_dir() and not path.is_symlink():
+            tidy(path)
+        elif len(key) == KEY_LENGTH:
             with suppress(OSError):  # another process may have removed it
                 found = path.stat()
                 used[key] = max(used.get(key, 0.0), found.st_mtime, found.st_atime)

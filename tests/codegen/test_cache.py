@@ -187,6 +187,22 @@ def test_what_was_read_today_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert library.exists() and recipe.exists(), "they belong together"
 
 
+def test_folders_inside_are_looked_through_but_no_links(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Compiled candidates of a diagnosis have a folder of their own there."""
+    monkeypatch.setattr(cache, "MOST_PROGRAMS", 0)
+    inside, elsewhere = tmp_path / "kept" / "candidates", tmp_path / "elsewhere"
+    for folder in (inside, elsewhere):
+        folder.mkdir(parents=True)
+        (folder / f"{'c' * 64}.so").write_text("")
+        os.utime(folder / f"{'c' * 64}.so", (1.0, 1.0))
+    (tmp_path / "kept" / "link").symlink_to(elsewhere)
+    cache.tidy(tmp_path / "kept")
+    assert [path.name for path in inside.iterdir()] == [cache.TIDIED]
+    assert (elsewhere / f"{'c' * 64}.so").exists()
+
+
 @pytest.fixture
 def objects(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """The sources that were compiled to an object, call by call."""
