@@ -44,7 +44,14 @@ def _is_within(value: Any, limits: Limits) -> bool:
 
 
 def term(world: World, at: At, fact: Fact) -> Any:
-    """Return a fact of the values at a cut, for z3."""
+    """Return a fact of the values at a cut, for z3: one term each time that it is asked for."""
+    key = id(at), fact
+    if key not in world.said:
+        world.said[key] = _term(world, at, fact), at  # it keeps its number
+    return world.said[key][0]
+
+
+def _term(world: World, at: At, fact: Fact) -> Any:
     z3, terms, values = world.z3, world.terms, at.values
     match fact:
         case Within(_, name, limits, where):

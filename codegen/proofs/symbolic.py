@@ -43,7 +43,8 @@ KINDS = ("real", "whole")
 class World:
     """The `ways` of a Program from cut to cut; `visits` are by `id` of a condition.
 
-    Each of the `cuts` has the numbers and truth values with which its loop begins.
+    Each of the `cuts` has the numbers and truth values with which its loop begins. What was `said`
+    of the values at a cut is kept.
     """
 
     def __init__(self, program: Program) -> None:
@@ -61,6 +62,7 @@ class World:
         self.cuts: dict[Cut, dict[str, int]] = {}
         self.ways: list[Way] = []
         self.visits: dict[int, list[Visit]] = {}
+        self.said: dict[tuple[int, object], tuple[Any, At]] = {}
         self.begin: At | None = None
         self.given: tuple[Any, ...] = ()
         self._go()

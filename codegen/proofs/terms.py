@@ -43,6 +43,7 @@ class Terms:
         self.count = 0
         self.bounds: dict[int, list[Any]] = {}
         self.known: dict[tuple[object, ...], tuple[Any, object]] = {}
+        self.limited: dict[tuple[object, ...], tuple[Any, object]] = {}
 
     def value(self, value: float | int | bool) -> Any:
         """Return a literal; -0 is another term than 0, for 1 / -0 is another number."""
@@ -83,7 +84,13 @@ class Terms:
         return self.z3.If(test, then, other)
 
     def within(self, value: Any, limits: Limits) -> Any:
-        """Return whether a value is within limits."""
+        """Return whether a value is within limits: one term for the same question."""
+        key = (*(part.get_id() for part in _parts(value)), limits)
+        if key not in self.limited:
+            self.limited[key] = self._within(value, limits), value  # a value keeps its numbers
+        return self.limited[key][0]
+
+    def _within(self, value: Any, limits: Limits) -> Any:
         z3 = self.z3
         if isinstance(limits, frozenset) and z3.is_bool(value):
             return z3.Or(*(value if number else z3.Not(value) for number in sorted(limits)))
@@ -122,7 +129,7 @@ class Terms:
     def lemmas(self, facts: Sequence[Any]) -> list[Any]:
         """Return what is known of the products and tables in some facts."""
         found: list[Any] = []
-        seen, stack = set[int](), list(facts)
+        seen, stack = set[int](), list(facts if self.bounds else ())
         while stack:
             part = stack.pop()
             number = part.get_id()
@@ -189,8 +196,13 @@ class Terms:
 
     def _left_open(self, name: str, given: Sequence[Any], kind: str) -> Any:
         """Return what may be anything, but the same for the same operands."""
-        parts = [p for g in given for p in ((g.value, g.nan) if isinstance(g, Real) else (g,))]
+        parts = [part for one in given for part in _parts(one)]
         key = (name, *(part.get_id() for part in parts))
         if key not in self.known:
             self.known[key] = self.new(kind, name), parts  # parts keep their numbers
         return self.known[key][0]
+
+
+def _parts(value: Any) -> tuple[Any, ...]:
+    """Return the terms of z3 that a value has."""
+    return (value.value, value.nan) if isinstance(value, Real) else (value,)
