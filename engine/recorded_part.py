@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import filecmp
+import os
 import re
 from fractions import Fraction
 from pathlib import Path
@@ -51,7 +52,7 @@ def overlap(first: Path, second: Path, opened: bool = True) -> bool:
     Where they may not be `opened` yet, a copy is taken for another file.
     """
     (one, a), (other, b) = part_of(first), part_of(second)
-    if one.resolve() != other.resolve() and not (opened and is_copy(one, other)):
+    if os.path.realpath(one) != os.path.realpath(other) and not (opened and is_copy(one, other)):
         return False
     return a is None or b is None or max(a[0], b[0]) < min(a[1], b[1])
 

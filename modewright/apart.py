@@ -27,5 +27,5 @@ def require_apart(train: Sequence[str | Path], held_out: Sequence[str | Path]) -
 def _require_other(file: str | Path, what: str, earlier: str | Path, opened: bool = True) -> None:
     """Raise ValueError where a recording has values of an earlier one."""
     if overlap(Path(file), Path(earlier), opened):
-        same = file_of(Path(file)).resolve() == file_of(Path(earlier)).resolve()
+        same = os.path.realpath(file_of(Path(file))) == os.path.realpath(file_of(Path(earlier)))
         raise ValueError(f"{file} {what}" if same else f"{file}, a copy of {earlier}, {what}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -79,7 +80,7 @@ def check_recordings(
     else:
         mapping = guessed_map(Path(files[0]), databases)
     used = used_columns(mapping, automaton)
-    if len({Path(file).resolve() for file in files}) < len(files):
+    if len({os.path.realpath(file) for file in files}) < len(files):
         raise ValueError("a recording is named twice: each recording counts once")
     names = file_names([Path(file) for file in files])
     read = [_read(path, name, mapping, used) for path, name in names.items()]

@@ -128,3 +128,10 @@ def test_a_pipe_is_no_recording(project: Path, capsys: pytest.CaptureFixture[str
         assert run(name, "--map", "bench") == 1
         told = capsys.readouterr().err
         assert f"{name}:1:1: error: the recording cannot be read: it is a pipe or a device" in told
+
+
+def test_a_loop_of_links_is_no_recording(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (project / "loop.csv").symlink_to("loop.csv")
+    for more in (("--map", "bench"), ("--spec", "small_driveline")):
+        assert run("loop.csv", *more) == 1
+        assert "loop.csv:1:1: error: the recording cannot be read" in capsys.readouterr().err
