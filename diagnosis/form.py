@@ -23,7 +23,7 @@ from diagnosis.search import Tried
 
 SHOWN = 4.0
 """Nats by which the fuller form must fit better, no price counted: where the plainer one is right
-it does by 2.6 at most, where it is not by 5.2 at least (54 Coulomb and Stribeck frictions)."""
+it does by 2.6 at most, where it is not by 5.2 at least (63 dry frictions of two studies)."""
 
 
 def shown_form(

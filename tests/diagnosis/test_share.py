@@ -57,7 +57,3 @@ def test_a_loss_is_not_made_less() -> None:
 def test_an_unstable_model_counts_as_nothing() -> None:
     lost = -float("inf")
     assert counted(Evidence(lost, lost, (lost, lost, lost))) == lost
-
-
-def test_the_rest_is_what_the_best_recording_leaves() -> None:
-    assert Evidence(1.0, 60.0, (10.0, 40.0, 10.0)).without_best == 20.0
