@@ -20,6 +20,8 @@ VARIABLE = "MODEWRIGHT_CACHE"
 KEY_LENGTH = 64
 MOST_PROGRAMS = 200
 """Programs kept; beyond, those not used for a day go, the oldest first (100 kB each)."""
+ENDINGS = ("", ".so")
+"""Of programs: what else has a key, such as thresholds of a bootstrap, is small and stays."""
 DAY = 86400.0
 HOUR = 3600.0
 TIDIED = "tidied"
@@ -144,10 +146,10 @@ def _seal(target: Path) -> Path:
 
 
 def tidy(folder: Path) -> None:
-    """Remove the oldest of what is kept in a folder, and in each inside it; look for them once an
-    hour at most.
+    """Remove the oldest programs that are kept in a folder, and in each inside it; look for them
+    once an hour at most.
 
-    What belongs together begins with the same key. Reading counts as use where the system tells it.
+    What belongs to a program begins with its key. Reading counts as use where the system tells it.
     """
     stamp = folder / TIDIED
     with suppress(OSError):
@@ -165,7 +167,8 @@ def tidy(folder: Path) -> None:
                 found = path.stat()
                 used[key] = max(used.get(key, 0.0), found.st_mtime, found.st_atime)
                 files.setdefault(key, []).append(path)
-    newest_first = sorted(used, key=lambda key: -used[key])
+    programs = [key for key in used if any(path.suffix in ENDINGS for path in files[key])]
+    newest_first = sorted(programs, key=lambda key: -used[key])
     for key in newest_first[MOST_PROGRAMS:]:
         if time.time() - used[key] > DAY:
             for path in files[key]:

@@ -165,8 +165,9 @@ def test_a_folder_is_looked_through_once_an_hour(
 ) -> None:
     monkeypatch.setattr(cache, "MOST_PROGRAMS", 0)
     cache.tidy(tmp_path)
-    old, other = tmp_path / f"{'a' * 64}.json", tmp_path / "a file of another kind"
-    for path in (old, other):
+    old, other = tmp_path / f"{'a' * 64}.so", tmp_path / "a file of another kind"
+    thresholds = tmp_path / f"{'d' * 64}.json"
+    for path in (old, other, thresholds):
         path.write_text("")
         os.utime(path, (1.0, 1.0))
     cache.tidy(tmp_path)
@@ -174,6 +175,7 @@ def test_a_folder_is_looked_through_once_an_hour(
     os.utime(tmp_path / cache.TIDIED, (time.time() - cache.HOUR - 1.0,) * 2)
     cache.tidy(tmp_path)
     assert not old.exists() and other.exists()
+    assert thresholds.exists(), "no program belongs to it"
 
 
 def test_what_was_read_today_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
