@@ -25,7 +25,7 @@ from language.reader import Reader
 from language.region import with_regions
 from language.transition_table import with_transition_tables
 from language.truth_table import TruthTableReader
-from language.units import SECOND, fits
+from language.units import SECOND, UNKNOWN_UNIT, fits
 from language.values import with_given
 from language.variable import VariableReader
 
@@ -42,6 +42,8 @@ KEYS = (
 )
 DEFAULT_STEP = Fraction(1, 1000)
 """Major step of a continuous automaton that gives none."""
+SHORTEST, LONGEST = Fraction(1, 10**9), Fraction(86400)
+"""Bounds [s] of a period and a step; beyond them is a mistake of the unit."""
 
 Values = Mapping[str, Node]
 
@@ -214,8 +216,8 @@ class _AutomatonReader(Reader):
         value, unit = self.quantity(node, what, node.span, None)
         if not fits(unit.dimension, SECOND):
             self.problems.error("dimension", node.span, f"`{what}` is a time, like `1 ms`")
-        elif value <= 0:
-            self.problems.error("range", node.span, f"`{what}` is above zero")
-        else:
+        elif unit is not UNKNOWN_UNIT and not SHORTEST <= value <= LONGEST:
+            self.problems.error("range", node.span, f"`{what}` is a time from 1 ns to a day")
+        elif unit is not UNKNOWN_UNIT:
             return value
         return Fraction(1, 1000)

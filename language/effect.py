@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
-from language.document import Document, Entry, Items, Node, Scalar, Table, require_kind
+from language.check_effect import check_functions, check_keys, check_parameters, report_hole
+from language.document import Document, Entry, Node, Scalar, Table, require_kind
 from language.names import check_name
 from language.parse import parse_balance, parse_expression
 from language.passage import EFFECT, Path, changed
@@ -130,7 +131,7 @@ def foreign_names(body: Table) -> list[str]:
     own, found = own_names(body), dict[str, None]()
 
     def look(path: Path, scalar: Scalar) -> Scalar:
-        for name in _names_of(path, scalar, Problems()):
+        for name in (name for part in _parsed(path, scalar, Problems()) for name in names(part)):
             if not (name.path.startswith("$") or name.path in own or name.path == "base"):
                 found.setdefault(name.path)
         return scalar
@@ -167,6 +168,7 @@ class _EffectReader(Reader):
         check_name(document.name, document.name_span, self.problems)
         fits = self._fits(tree.get("at"), document.name_span)
         self._sections(tree)
+        check_parameters(tree, self.problems)
         self._names(tree, fits)
         about = tree.get("about")
         signature = tree.get("signature")
@@ -231,6 +233,7 @@ class _EffectReader(Reader):
                 label = f"`{name}` is the effect's own: it is not read of the model"
                 self.problems.error("effect", item.span, label)
         known = {f"${hole}" for fit in fits for hole in (*HOLES[fit.kind], *fit.has)}
+        check_keys(tree, known, self.problems)
 
         def check(path: Path, scalar: Scalar) -> Scalar:
             if path[:2] == ("redirect", "except"):
@@ -238,8 +241,10 @@ class _EffectReader(Reader):
             allowed = {*known, *own, *reads}
             if path[0] == "equations" and path[1].startswith("$"):
                 allowed.add("base")
-            for name in _names_of(path, scalar, self.problems):
-                self._known(name, allowed)
+            for part in _parsed(path, scalar, self.problems):
+                check_functions(part, self.problems)
+                for name in names(part):
+                    self._known(name, allowed)
             return scalar
 
         changed(tree, EFFECT, check)
@@ -248,29 +253,18 @@ class _EffectReader(Reader):
         if name.path in allowed or "." in name.path:
             return
         if name.path.startswith("$"):
-            label = f"`{name.path}` is not a hole of the places where this effect fits"
-            hint = nearest(name.path, allowed) or f"or `has: [{name.path[1:]}]` says that it is"
-        else:
-            label = f"`{name.path}` is neither a hole nor a name of this effect"
-            hint = nearest(name.path, allowed)
-            if not hint and name.path != "base":
-                hint = f"or `reads: [{name.path}]` says that it is one of the model"
+            report_hole(name.path, name.span, allowed, self.problems)
+            return
+        label = f"`{name.path}` is neither a hole nor a name of this effect"
+        hint = nearest(name.path, allowed)
+        if not hint and name.path != "base":
+            hint = f"or `reads: [{name.path}]` says that it is one of the model"
         self.problems.error("effect", name.span, label, hint)
 
 
-def _names_of(path: Path, scalar: Scalar, problems: Problems) -> list[Name]:
+def _parsed(path: Path, scalar: Scalar, problems: Problems) -> tuple[Tree, ...]:
     with problems.collecting():
-        trees: tuple[Tree, ...]
         if path[0] == "flow" or path[-2:-1] == ("flow",):
-            trees = parse_balance(scalar)
-        else:
-            trees = (parse_expression(scalar),)
-        return [name for tree in trees for name in names(tree)]
-    return []
-
-
-def items_of(node: Node | None) -> tuple[Scalar, ...]:
-    """Return the scalars of a list; of a single one, itself."""
-    if isinstance(node, Items):
-        return tuple(item for item in node.nodes if isinstance(item, Scalar))
-    return (node,) if isinstance(node, Scalar) else ()
+            return parse_balance(scalar)
+        return (parse_expression(scalar),)
+    return ()

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 
 from language.document import Entry, Items, Node, Scalar, Table
-from language.effect import ADDED, Laying, items_of, own_names
+from language.effect import ADDED, Laying, own_names
 from language.known import entries_of
 from language.moving import put_in, taken_out
 from language.names import NAME, check_name
@@ -16,7 +16,7 @@ from language.place import Hole, Misfit, Place, place_of
 from language.problem import Problems, Source, Span, nearest
 from language.redirect import Part, exists, rebuilt, redirected, rewritten
 from language.rewrite import renamed
-from language.tree import at, entries, put, resourced
+from language.tree import at, entries, items_of, put, resourced
 from language.values import with_value
 
 HOLE = re.compile(r"\$([A-Za-z]\w*)")

@@ -6,11 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from language.document import Scalar, Table
-from language.effect import ELEMENT_PARTS, Effect, Fit, items_of
+from language.effect import ELEMENT_PARTS, Effect, Fit
 from language.element import outputs_as_mapping
 from language.known import Known, entries_of, unit_text
 from language.problem import nearest
 from language.rewrite import sides
+from language.tree import items_of
 from language.units import SECOND, Dimension, fits
 
 Hole = str | tuple[str, ...]

@@ -78,8 +78,8 @@ class _ScenarioReader(StimulusReader):
                 self.problems.error("missing", node.span, label)
             return None
         horizon = self.time(node, "horizon", at)
-        if horizon > MAX_HORIZON:
-            self.problems.error("range", at, "the horizon is longer than a day")
+        if node and horizon > MAX_HORIZON:
+            self.problems.error("range", node.span, "the horizon is longer than a day")
         return horizon
 
     def _recording(self, document: Document, tree: Table) -> RecordingUse | None:

@@ -15,6 +15,13 @@ def entries(node: Node | None) -> Iterator[Entry]:
         yield from node
 
 
+def items_of(node: Node | None) -> tuple[Scalar, ...]:
+    """Return the scalars of a list; of a single one, itself."""
+    if isinstance(node, Items):
+        return tuple(item for item in node.nodes if isinstance(item, Scalar))
+    return (node,) if isinstance(node, Scalar) else ()
+
+
 def at(tree: Table, path: Sequence[str]) -> Node | None:
     """Return what stands under a path of keys, or None."""
     node: Node | None = tree

@@ -15,7 +15,6 @@ from diagnosis.dossier import Dossier, errors_of, hashes, undecided, unusable, u
 from diagnosis.file_names import names_of
 from diagnosis.finding import told
 from diagnosis.fit import Fit, fit as fitted
-from diagnosis.layers import effects_in
 from diagnosis.leftover import left_by
 from diagnosis.library import library
 from diagnosis.threshold import EVERYWHERE, Thresholds, thresholds_in, written
@@ -29,6 +28,7 @@ from language.project import Project, expanded, read_document, shown
 from modewright.apart import require_apart
 from modewright.files import OutputError, make_folder, remove_files, write_files
 from modewright.garbage import rarely_looked
+from modewright.own_effects import laid_nowhere, own_effects
 from modewright.recordings import CheckedRecordings, check_recordings, held_out_findings
 from modewright.threads import OneThread
 
@@ -112,6 +112,8 @@ def diagnose(
     left_out = tuple(case.name_of(file) for file in case.train if file not in kept)
     if kept:
         reasons = [f"left out: {text}" for _, text in told(errors_of(checked.check)) if left_out]
+        if effects is not None:
+            reasons += laid_nowhere(case.effects or (), case.document, case.project)
         for text in reasons:
             tell(text)
         case = dataclasses.replace(case, train=kept)
@@ -241,12 +243,7 @@ def _candidates(folder: str | Path | None, project: Project) -> tuple[Effect, ..
 
     Raises SpecError, ValueError.
     """
-    if folder is None:
-        return library(project)
-    found = effects_in(Path(folder))
-    if not found:
-        raise ValueError(f"there is no effect in {folder}")
-    return found
+    return library(project) if folder is None else own_effects(Path(folder))
 
 
 @OneThread()

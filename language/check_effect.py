@@ -1,0 +1,83 @@
+"""Check of an effect on its own: what would be wrong with it at every place where it is laid."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection
+
+from language.document import Entry, Node, Scalar, Table
+from language.function import ARGUMENTS, KNOWN
+from language.parameter_reader import ParameterReader
+from language.problem import Problems, Span, nearest
+from language.reader import Reader
+from language.syntax import Application, Tree, children
+from language.tree import entries, items_of, put
+from language.units import NO_UNIT, UNKNOWN_UNIT
+
+HOLE = re.compile(r"\$[A-Za-z]\w*")
+KEYED = ("terms", "equations", "redirect", "move")
+"""Sections whose keys may be holes."""
+VALUES = ("value", "range", "neutral", "plain", "starts")
+"""Keys of a parameter that are numbers in its unit."""
+
+
+def check_keys(tree: Table, holes: Collection[str], problems: Problems) -> None:
+    """Report keys with a hole that no place of the effect has."""
+    for section in KEYED:
+        for entry in entries(tree.get(section)):
+            for found in HOLE.finditer(entry.key):
+                if found.group() not in holes:
+                    span = entry.span.inside(found.start(), len(found.group()))
+                    report_hole(found.group(), span, holes, problems)
+
+
+def report_hole(hole: str, span: Span, holes: Collection[str], problems: Problems) -> None:
+    """Report a hole that no place of the effect has."""
+    label = f"`{hole}` is not a hole of the places where this effect fits"
+    hint = nearest(hole, holes) or f"or `has: [{hole[1:]}]` says that it is"
+    problems.error("effect", span, label, hint)
+
+
+def check_functions(tree: Tree, problems: Problems) -> None:
+    """Report functions that are none, or that take another number of arguments."""
+    if isinstance(tree, Application):
+        wanted = ARGUMENTS.get(tree.function)
+        if tree.function not in KNOWN:
+            hint = nearest(tree.function, KNOWN) or f"there are `{' '.join(KNOWN)}`"
+            span = tree.span.inside(0, len(tree.function))
+            problems.error("name", span, f"`{tree.function}` is not a function", hint)
+        elif wanted is not None and len(tree.arguments) != wanted:
+            label = f"`{tree.function}` takes {wanted} argument(s), not {len(tree.arguments)}"
+            problems.error("arguments", tree.span, label)
+    for part in children(tree):
+        check_functions(part, problems)
+
+
+def check_parameters(tree: Table, problems: Problems) -> None:
+    """Report values, ranges and starts of parameters that are none or do not go together."""
+    known = tree.get("parameters")
+    if isinstance(known, Table):
+        made = {entry.key: _without_hole(entry) for entry in known}
+        tree = put(tree, ("parameters",), Table({k: e for k, e in made.items() if e}, known.span))
+    ParameterReader(problems, tree).parameters()
+
+
+def _without_hole(entry: Entry) -> Entry | None:
+    """Return a parameter whose unit, where it is a hole, is a number.
+
+    None if it mixes that with units of its own, which are known where the effect is laid.
+    """
+    table = entry.node
+    unit = table.get("unit") if isinstance(table, Table) else None
+    if not (isinstance(table, Table) and isinstance(unit, Scalar) and HOLE.search(unit.text)):
+        return entry
+    if any(_has_unit(table.get(key)) for key in VALUES):
+        return None
+    kept = {key: part for key, part in table.entries.items() if key != "unit"}
+    return Entry(entry.key, entry.span, Table(kept, table.span))
+
+
+def _has_unit(node: Node | None) -> bool:
+    reader = Reader(Problems())
+    own = [reader.quantity(item, "value", item.span, None)[1] for item in items_of(node)]
+    return any(unit not in (NO_UNIT, UNKNOWN_UNIT) for unit in own)
