@@ -26,8 +26,9 @@ from diagnosis.prediction import noises_of
 from diagnosis.recipe import node_text, recipe_key, write_whole
 from diagnosis.replicate import replicate
 from diagnosis.search import Tell, Tried, searched
-from diagnosis.selection import counted, looked_again
+from diagnosis.selection import looked_again
 from diagnosis.series import Series, paced
+from diagnosis.share import counted
 from diagnosis.shelf import NOWHERE
 from diagnosis.threshold import Thresholds, group_of
 

@@ -17,6 +17,7 @@ from diagnosis.naming import place_path
 from diagnosis.regression import ranking
 from diagnosis.search import Tried
 from diagnosis.selection import Selection
+from diagnosis.share import ranked
 from diagnosis.verdict import Says
 from language.problem import SpecError
 
@@ -86,8 +87,8 @@ def left_over(bench: Bench, selection: Selection, units: Mapping[str, float]) ->
 
 def explains_more(found: Description, selection: Selection) -> bool:
     """Tell whether a formula gains clearly more than all that was accepted."""
-    totals = [tried.evidence.total for tried in selection.accepted if tried.evidence]
-    return found.evidence.total > MORE * sum(totals)
+    gains = [ranked(tried.evidence) for tried in selection.accepted if tried.evidence]
+    return ranked(found.evidence) > MORE * sum(gains)
 
 
 def selected_formula(selection: Selection, found: Description) -> Selection:

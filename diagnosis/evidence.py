@@ -46,16 +46,6 @@ class Evidence:
         return min(self.train, self.left_out)
 
     @property
-    def without_best(self) -> float:
-        """What is gained left out without the recording that gains most."""
-        return self.left_out - max(self.each)
-
-    @property
-    def without_worst(self) -> float:
-        """What is gained left out without the recording that gains least."""
-        return self.left_out - min(self.each)
-
-    @property
     def total(self) -> float:
         """Their sum: what candidates are ranked by."""
         return self.train + self.left_out

@@ -27,7 +27,8 @@ from diagnosis.naming import place_path
 from diagnosis.noise import MAD
 from diagnosis.point import extended
 from diagnosis.search import Tell, Tried
-from diagnosis.selection import PART, Selection, counted, selected
+from diagnosis.selection import PART, Selection, selected
+from diagnosis.share import counted
 from diagnosis.silence import from_silence
 from diagnosis.stirring import resting, stirring
 from diagnosis.threshold import USUAL, Thresholds
@@ -50,6 +51,8 @@ LITTLE = 0.5
 """Part of what it gains that effects explain less of, if it is to stand for them."""
 MUCH_MORE = 3.0
 """Times what a hidden input gains that effects explain which are named before it."""
+IN_ONE = 3.0
+"""Times what it needs to gain that an input must gain which acts in one recording alone."""
 ROUNDS = 5
 """Rounds in which what was accepted is fitted without drifts."""
 
@@ -68,6 +71,11 @@ class _Hidden:
     explained: float = 0.0
 
 
+def _counted(known: Evidence) -> float:
+    """Return what an input gains [nats] as it counts: it may act in one recording alone."""
+    return counted(known, alone=IN_ONE)
+
+
 def with_hidden(
     bench: Bench,
     selection: Selection,
@@ -82,10 +90,10 @@ def with_hidden(
     are the nats that it must gain at least.
     """
     found = _found(bench, selection, loci, needed)
-    if found is None or counted(found.evidence) < needed:
+    if found is None or _counted(found.evidence) < needed:
         return selection, tuple(loci)
     layer, quiet = _inputs(bench)[found.locus.path], freed(bench, selection.base)
-    gained = f"accepted {layer.id}: {counted(found.evidence):.0f} nats"
+    gained = f"accepted {layer.id}: {_counted(found.evidence):.0f} nats"
     beside = f", beside effects that explain {found.explained:.0f}" if found.effects else ""
     tell(f"{gained}, silent most of the time{beside}")
     place = _from_silence(bench, found.locus, found.model)
@@ -112,7 +120,7 @@ def _is_less(bench: Bench, found: _Hidden) -> bool:
     explains there is then what the form of that one does not.
     """
     gained = sum(one.evidence.train for one in found.effects if one.evidence)
-    if gained > counted(found.evidence) or found.explained > MUCH_MORE * found.gained:
+    if gained > _counted(found.evidence) or found.explained > MUCH_MORE * found.gained:
         return True
     places = (place_path(one.layer).partition(".") for one in found.effects)
     return any(acting(bench, section, place) == found.locus.path for section, _, place in places)
@@ -190,7 +198,7 @@ def _joined(bench: Bench, selection: Selection, alone: _Hidden) -> _Hidden:
     model = alone.model
     units = units_of(model.candidate, bench.series, model.values(0))
     others = {name: unit for name, unit in units.items() if name != alone.locus.drift}
-    needed = Thresholds(usual=max(USUAL, PART * counted(alone.evidence)))
+    needed = Thresholds(usual=max(USUAL, PART * _counted(alone.evidence)))
     found = selected(bench, model, others, needed, known=selection.first_round)
     return dataclasses.replace(alone, model=found.model, effects=found.accepted)
 

@@ -18,6 +18,7 @@ from diagnosis.level import settled
 from diagnosis.naming import place_path
 from diagnosis.point import extended
 from diagnosis.search import Tell, Tried
+from diagnosis.share import counted
 from diagnosis.threshold import Thresholds
 
 STAND_IN = 0.25
@@ -48,7 +49,7 @@ def still_needed(
         beside = [t for t in found.kept if t is not tried and _place(t) == _place(tried)]
         most = max((t.evidence.train for t in beside if t.evidence), default=0.0)
         gained = sum(t.evidence.train for t in beside if t.evidence)
-        if worth.least <= max(thresholds.of(tried.layer), STAND_IN * gained):
+        if counted(worth) <= max(thresholds.of(tried.layer), STAND_IN * gained):
             tell(f"{tried.layer.id} is needless beside the others")
             rest = tuple(t for t in found.kept if t is not tried)
             found = Needed(found.base, without, _credited(bench, rest, tried, found.base, without))

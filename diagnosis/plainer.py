@@ -8,18 +8,15 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from functools import partial
+from collections.abc import Iterator, Sequence
 
-from diagnosis.bench import Bench
 from diagnosis.estimate import Estimate
-from diagnosis.evidence import evidence, inflation
+from diagnosis.evidence import inflation
 from diagnosis.layers import Layer
-from diagnosis.level import settled
 from diagnosis.naming import brought_by, covariance_of, place_path
-from diagnosis.point import extended
 from diagnosis.search import Tried
 from diagnosis.series import Series
+from language.document import Table
 
 PLAINLY = 5.0
 """Nats that the recordings must tell an effect from what it is where it is a plainer one."""
@@ -29,35 +26,11 @@ AHEAD = 4.0
 """Nats of score by which the plainer one then leads: odds of seven to one."""
 
 
-def plainest(
-    bench: Bench, base: Estimate, units: Mapping[str, float], best: Tried, tried: Sequence[Tried]
-) -> Tried:
-    """Return the plainer candidate that the best one gains too little over, or the best one.
-
-    The plainer one is fitted from there as well: which one fits better is not to be an accident.
-    """
-    model = best.estimate
-    if model is None or best.evidence is None:
-        return best
-    for other in plainer_ones(best, tried):
-        assert other.estimate is not None
-        candidate = other.estimate.candidate
-        start = extended(candidate, model.candidate, model.point, other.estimate.point)
-        given = (model.noises, start, units)
-        make = partial(settled, candidate, bench.series, *given, like=model)
-        again = bench.kept("settled", candidate, (*given, model.gains), make)
-        found = min(other.estimate, again, key=lambda one: one.cost)
-        known = evidence(found, base, bench.series)
-        if best.evidence.train - known.train < PLAINLY:
-            return dataclasses.replace(other, estimate=found, evidence=known)
-    return best
-
-
 def plainer_ones(best: Tried, tried: Sequence[Tried]) -> Iterator[Tried]:
     """Yield the candidates that one which may be plainer may be: at its place, with fewer numbers,
     that gained nearly as much.
     """
-    if best.estimate is None or best.evidence is None or not _plain_ones(best.estimate, best.layer):
+    if best.estimate is None or best.evidence is None or not has_plain(best.layer):
         return
     for other in tried:
         if other.evidence is None or place_path(other.layer) != place_path(best.layer):
@@ -91,6 +64,13 @@ def may_be_plainer(model: Estimate, layer: Layer, series: Sequence[Series]) -> b
         if shrink * apart**2 / (2.0 * covariance[place, place]) < PLAINLY:
             return True
     return False
+
+
+def has_plain(layer: Layer) -> bool:
+    """Tell whether an effect is a plainer one at some value of one of its parameters."""
+    known = layer.effect.body.get("parameters")
+    entries = known if isinstance(known, Table) else ()
+    return any(isinstance(one.node, Table) and "plain" in one.node.entries for one in entries)
 
 
 def _plain_ones(model: Estimate, layer: Layer) -> dict[int, float]:

@@ -11,12 +11,13 @@ import numpy as np
 from diagnosis.bench import Bench
 from diagnosis.estimate import Estimate, looked_like
 from diagnosis.evidence import Evidence, evidence, inflation
-from diagnosis.layers import Layer
+from diagnosis.layers import Layer, has_parameters
 from diagnosis.level import fitted
 from diagnosis.naming import brought_by
 from diagnosis.point import extended, point_of
 from diagnosis.pressed import eased, pressed_places
 from diagnosis.screening import HINT, Promise, promises, starts_of
+from diagnosis.share import ALONE, ranked
 
 FULL_FITS, FITS_BESIDE = 7, 4
 """Candidates that are fitted to the end, best foreseen first: alone, and beside what was accepted,
@@ -77,12 +78,14 @@ class Tried:
         """What candidates are ranked by: what they gain, less for each number that they bring.
 
         One that brings more also takes up what the form of a plainer one gets wrong. What is left
-        out counts as much as what was fitted at most: more is an accident.
+        out counts as much as what was fitted at most: more is an accident. So is what one recording
+        gains alone, but for an input without parameters.
         """
         if self.evidence is None or self.estimate is None:
             return self.promised - 1e6
         brought = brought_by(self.layer).keys() & set(self.estimate.candidate.names)
-        return self.evidence.train + self.evidence.least + self.lead - PLAIN * len(brought)
+        gained = ranked(self.evidence, ALONE if has_parameters(self.layer) else 1.0)
+        return gained + self.lead - PLAIN * len(brought)
 
 
 def searched(

@@ -11,15 +11,17 @@ import numpy as np
 
 from diagnosis.bench import Bench
 from diagnosis.estimate import Estimate
-from diagnosis.evidence import Evidence, evidence
+from diagnosis.evidence import evidence
+from diagnosis.form import shown_form
 from diagnosis.layers import Layer, has_parameters
 from diagnosis.level import settled
 from diagnosis.needed import Needed, renewed, still_needed
-from diagnosis.plainer import led_by, plainest
+from diagnosis.plainer import led_by
 from diagnosis.point import extended
 from diagnosis.rival import rivals
 from diagnosis.room import is_full
 from diagnosis.search import Tell, Tried, searched
+from diagnosis.share import counted
 from diagnosis.strain import is_strained, within_range
 from diagnosis.swap import swapped
 from diagnosis.threshold import EVERYWHERE, USUAL, Thresholds
@@ -35,15 +37,9 @@ NEXT = 7
 Beside one all are: what one hid may show itself."""
 AGAIN = 15
 """Candidates that are looked at again where the model itself is found to fit better."""
-FEW = 3
-"""Recordings of which none can be against all others."""
 MUCH = 0.1
 """Part of what the best candidate gained: a model that gains more has them looked for anew, and
 candidates that gained less are not tried in another way."""
-SHARED = 0.15
-"""The part of what an effect gains that must be left without the recording that gains most."""
-ALONE = 3.0
-"""Times the threshold that is enough where less than that is left."""
 BETTER = 10.0
 """Nats by which a model must fit better for its candidates to be looked at again."""
 MOST_EFFECTS = 3
@@ -176,7 +172,7 @@ def _led(
     bench: Bench, model: Estimate, units: Mapping[str, float], best: Tried, tried: list[Tried]
 ) -> tuple[Tried, list[Tried]]:
     """Return what the best candidate gives way to, or that one, and all with it, best first."""
-    first = within_range(plainest(bench, model, units, best, tried), tried)
+    first = within_range(shown_form(bench, model, units, best, tried), tried)
     return (best, tried) if first is best else led_by(first, tried)
 
 
@@ -213,20 +209,6 @@ def _near_best(known: Sequence[Tried]) -> list[Layer]:
     gains = {t.layer.id: (t.evidence.total, t.layer) for t in known if t.evidence}
     best = max((total for total, _ in gains.values()), default=0.0)
     return [layer for total, layer in gains.values() if total > 0.0 and total > MUCH * best]
-
-
-def counted(known: Evidence, left_out: float = 1.0) -> float:
-    """Return what an effect gains [nats] as it counts: less where one recording is against all.
-
-    A little in one recording is more often an accident of it than physics. One that denies what all
-    others show may be the only one that tells how large it is.
-    """
-    shared = len(known.each) == 1 or known.without_best > SHARED * known.left_out
-    least = min(known.train, known.left_out / left_out)
-    whole = least if shared else least / ALONE
-    if len(known.each) < FEW:
-        return whole
-    return max(whole, min(known.train, known.without_worst / left_out) / ALONE)
 
 
 def looked_again(

@@ -9,9 +9,10 @@ import pytest
 from diagnosis.bench import Bench
 from diagnosis.estimate import Estimate
 from diagnosis.evidence import Evidence, evidence
+from diagnosis.form import shown_form
 from diagnosis.layers import fitting, shipped_effects
 from diagnosis.level import settled, units_of
-from diagnosis.plainer import AHEAD, led_by, may_be_plainer, plainer_ones, plainest
+from diagnosis.plainer import AHEAD, led_by, may_be_plainer, plainer_ones
 from diagnosis.search import Tried
 from tests.diagnosis.test_estimation import bench
 from tests.diagnosis.test_location import based, with_effect
@@ -39,16 +40,32 @@ def tried(own: Bench, base: Estimate, effect: str) -> Tried:
 
 
 @pytest.mark.parametrize(("rise", "named"), [(0.0, PLAIN), (3.0, RISES)])
-def test_what_may_as_well_be_plainer_gives_way(bench: Bench, rise: float, named: str) -> None:
+def test_the_form_that_recordings_show_is_named(bench: Bench, rise: float, named: str) -> None:
     own = rubbing(bench, rise)
     base = based(own)
     units = units_of(base.candidate, own.series, base.values(0))
-    best, other = tried(own, base, RISES), tried(own, base, PLAIN)
-    assert best.estimate is not None
-    assert may_be_plainer(best.estimate, best.layer, own.series) is (named == PLAIN)
-    assert plainest(own, base, units, best, [best, other]).layer.id == named
-    assert plainest(own, base, units, best, [best]) is best, "there is no plainer candidate"
-    assert plainest(own, base, units, other, [best, other]) is other, "it is the plainer one"
+    full, plain = tried(own, base, RISES), tried(own, base, PLAIN)
+    assert full.estimate is not None
+    assert may_be_plainer(full.estimate, full.layer, own.series) is (named == PLAIN)
+    for best, other in ((full, plain), (plain, full)):
+        assert shown_form(own, base, units, best, [best, other]).layer.id == named
+        unfitted = Tried(other.layer, 0.0)
+        assert shown_form(own, base, units, best, [best, unfitted]).layer.id == named
+        assert shown_form(own, base, units, best, [best]) is best, "there is no other form"
+
+
+def test_a_form_is_fitted_from_where_the_other_is(bench: Bench) -> None:
+    """One that was left where it fits badly is not the reason why the other one is named."""
+    own = rubbing(bench, 3.0)
+    base = based(own)
+    units = units_of(base.candidate, own.series, base.values(0))
+    full, plain = tried(own, base, RISES), tried(own, base, PLAIN)
+    assert full.estimate is not None
+    lost = dataclasses.replace(full, estimate=dataclasses.replace(full.estimate, cost=1e9))
+    found = shown_form(own, base, units, plain, [plain, lost])
+    assert found.layer.id == RISES
+    assert found.estimate is not None
+    assert found.estimate.cost < full.estimate.cost + 1.0
 
 
 def test_a_plainer_one_gains_nearly_as_much_at_the_same_place(bench: Bench) -> None:

@@ -56,7 +56,7 @@ def test_a_last_effect_that_pulls_the_others_out_of_their_ranges_is_not_taken(
     monkeypatch.setattr(
         "diagnosis.selection.looked_again", lambda _, m, u, tried, *__: (None, tried)
     )
-    monkeypatch.setattr("diagnosis.selection.plainest", lambda _, m, u, best, tried: best)
+    monkeypatch.setattr("diagnosis.selection.shown_form", lambda _, m, u, best, tried: best)
     monkeypatch.setattr("diagnosis.selection.swapped", lambda _, m, before, *__: (before, m))
     monkeypatch.setattr("diagnosis.selection.is_full", lambda *_: False)
     monkeypatch.setattr("diagnosis.selection.still_needed", lambda _, kept, *__: kept)

@@ -10,10 +10,10 @@ import random
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-SEED = 20270110
+SEED = 20270111
 """Of all cases that are concealed; a study with another one is another study. Of 20261225 thirteen
 were looked at, of 20261227 more than ninety, of 20261228, 20261230 and 20270101 to 20270105 all,
-of 20261231 and 20270106 to 20270109 most, and the method was changed after that."""
+of 20261231 and 20270106 to 20270110 most, and the method was changed after that."""
 PAIRS = 40
 """Cases with two effects, at places of their own."""
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from diagnosis.evidence import Evidence
-from diagnosis.selection import counted
+from diagnosis.share import AGAINST, ALONE, as_shared, counted
 from diagnosis.threshold import USUAL
 
 
@@ -13,14 +13,15 @@ from diagnosis.threshold import USUAL
     ("train", "each", "wanted"),
     [
         (200.0, (60.0, 50.0, 90.0), True),
-        (220.0, (-27.0, 19.0, 957.0), False),
-        (230.0, (-27.0, 19.0, 957.0), True),
+        (740.0, (-27.0, 19.0, 957.0), False),
+        (760.0, (-27.0, 19.0, 957.0), True),
+        (713.0, (801.0, 3.0, -10.0, -13.0, -7.0, -7.0, -2.0, -22.0, -7.0), False),
         (300.0, (20.0, 25.0, 15.0), False),
         (60.0, (60.0, 50.0, 90.0), False),
         (90.0, (300.0,), True),
     ],
 )
-def test_what_gains_in_one_recording_alone_has_to_gain_three_times_as_much(
+def test_what_gains_in_one_recording_alone_has_to_gain_ten_times_as_much(
     train: float, each: tuple[float, ...], wanted: bool
 ) -> None:
     assert (counted(Evidence(train, sum(each), each)) > USUAL) == wanted
@@ -33,6 +34,7 @@ def test_what_gains_in_one_recording_alone_has_to_gain_three_times_as_much(
         (1311.0, (-900.0, 15.0, 17.0, 25.0, 10.0, 10.0), False),
         (200.0, (-900.0, 115.0, 117.0, 225.0, 110.0, 110.0), False),
         (1311.0, (-900.0, 400.0), False),
+        (411.0, (-48.0, 7.0, 5.0, -11.0, 30.0, 15.0, 49.0, -18.0, 372.0), False),
     ],
 )
 def test_one_recording_alone_does_not_deny_what_all_others_show_clearly(
@@ -41,10 +43,17 @@ def test_one_recording_alone_does_not_deny_what_all_others_show_clearly(
     assert (counted(Evidence(train, sum(each), each)) > USUAL) == wanted
 
 
+def test_of_two_recordings_none_is_against_all() -> None:
+    each = (300.0, 5.0)
+    assert counted(Evidence(300.0, sum(each), each)) == 300.0 / AGAINST
+    assert counted(Evidence(300.0, sum(each), each), alone=2.0) == 300.0 / 2.0
+
+
+def test_a_loss_is_not_made_less() -> None:
+    assert as_shared(-20.0, (40.0, -30.0, -30.0)) == -20.0
+    assert as_shared(20.0, (40.0, -10.0, -10.0)) == 20.0 / ALONE
+
+
 def test_an_unstable_model_counts_as_nothing() -> None:
     lost = -float("inf")
     assert counted(Evidence(lost, lost, (lost, lost, lost))) == lost
-
-
-def test_the_rest_is_what_the_best_recording_leaves() -> None:
-    assert Evidence(1.0, 60.0, (10.0, 40.0, 10.0)).without_best == 20.0
