@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 from collections.abc import Sequence
 from fractions import Fraction
 from functools import cached_property
@@ -17,6 +18,10 @@ from language.units import Unit, UnitError, fits, parse_unit
 LONGEST_STAMP = 40
 LATEST_TIME = 10**12
 """Time stamps are below this, in their unit."""
+STAMP = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)"
+STAMPS = re.compile(rf"(?:{STAMP}\n)*+{STAMP}", re.ASCII)
+"""Numbers without an exponent alone, one a line: most columns of time are such."""
+TENS = [10**k for k in range(LONGEST_STAMP + 1)]
 OTHER_WORDS = {
     "Nm": "N*m", "1/min": "rpm", "U/min": "rpm", "r/min": "rpm", "kph": "km/h", "m/s2": "m/s^2",
     "\N{DEGREE SIGN}C": "degC", "\N{DEGREE SIGN}": "deg",
@@ -67,10 +72,13 @@ class ChannelReader:
     def times(self, name: str) -> list[Fraction | None]:
         """Return the time stamps of a column [s]; None where it is blank."""
         samples = self.file.read(name)
+        factor = self.mapping.time_unit.factor
+        plain = None if self.is_full else _plain(samples)
+        if plain is not None:
+            return [value * factor for value in plain] if factor != 1 else [*plain]
         found: list[Fraction | None] = []
         last: Fraction | None = None
         rounded = -math.inf
-        factor = self.mapping.time_unit.factor
         for k in range(len(samples.values)):
             if self.is_full:
                 break
@@ -195,6 +203,20 @@ def _means(columns: Sequence[Sequence[float | None]]) -> list[float | None]:
             total += cell or 0.0
         found.append(None if None in row else total / len(row))
     return found
+
+
+def _plain(samples: Samples) -> list[Fraction] | None:
+    """Return time stamps that grow and have no exponent, all at once; None for any others."""
+    numbers = [value for value in samples.values if value is not None]
+    is_growing = all(after > before for before, after in itertools.pairwise(numbers))
+    if not numbers or len(numbers) < len(samples.values) or not is_growing:
+        return None
+    texts = [samples.text(k) for k in range(len(numbers))]
+    if not STAMPS.fullmatch("\n".join(texts)) or max(map(len, texts)) > LONGEST_STAMP:
+        return None
+    parts = [text.partition(".") for text in texts]
+    found = [Fraction(int(whole + part), TENS[len(part)]) for whole, _, part in parts]
+    return found if max(-found[0], found[-1]) < LATEST_TIME else None
 
 
 def _exact(text: str) -> Fraction | None:

@@ -119,7 +119,7 @@ def plan_of(system: System, scenario: Scenario, assembly: Assembly) -> Plan:
     assert tick is not None
     end = int(schedule.horizon / tick)
     grids = {name: _ticks(grid, tick, end) for name, grid in schedule.grids().items()}
-    events = [int(time / tick) for time in schedule.events if time <= schedule.horizon]
+    events = [_ceiling(time, tick) for time in schedule.events if time <= schedule.horizon]
     instants = np.unique(np.concatenate([np.array([0, end, *events]), *grids.values()]))
     rows = _ticks(schedule.rows, tick, end)
     noise = {
@@ -148,6 +148,11 @@ def plan_of(system: System, scenario: Scenario, assembly: Assembly) -> Plan:
         courses={c.name: _course_table(system, scenario, c) for c in assembly.courses},
         exact=tuple(int(instant) * tick for instant in instants),
     )
+
+
+def _ceiling(time: Fraction, tick: Fraction) -> int:
+    """Return how many ticks a time has, rounded up; a second is a whole number of them."""
+    return -(-time.numerator * tick.denominator // time.denominator)
 
 
 def _happens(instants: Wholes, grids: Sequence[Wholes]) -> NDArray[np.uint32]:
@@ -186,8 +191,9 @@ def input_values(
         if scenario.inputs[source].varies:
             continue
         course = Course(source, scenario.inputs[source], _no_formula)
-        starts = [math.ceil((piece.start + delay) / tick) for piece in course.pieces]
-        values = [float(course.at(piece.start)) for piece in course.pieces]
+        later = [piece.start + delay for piece in course.pieces] if delay else course.starts
+        starts = [_ceiling(start, tick) for start in later]
+        values = [float(course.held(piece)) for piece in course.pieces]
         if line:
             values[0] = float(LineRun(line, course).at(Fraction(0)))
         pieces = np.maximum(np.searchsorted(np.array(starts), instants, side="right") - 1, 0)
@@ -203,7 +209,7 @@ def _course_pieces(
     for place, course in enumerate(assembly.courses):
         line = system.lines.get(course.name)
         stimulus = scenario.inputs[line.source if line else course.name]
-        starts = [math.ceil((piece.start + course.delay) / tick) for piece in stimulus.pieces]
+        starts = [_ceiling(piece.start + course.delay, tick) for piece in stimulus.pieces]
         at = np.searchsorted(np.array(starts), instants, side="right") - 1
         found[:, place] = np.maximum(at, 0)
     return found

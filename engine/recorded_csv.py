@@ -97,18 +97,14 @@ class _Rows:
     def samples(self, name: str) -> Samples:
         """Return the cells of a column."""
         position = self.head.index(name)
-
-        def text(k: int) -> str:
-            row = self.rows[k][1]
-            return row[position].strip() if position < len(row) else ""
+        texts = [row[position].strip() for _, row in self.rows]
 
         def place(k: int) -> Span:
             line, row = self.rows[k]
             column = 1 + sum(len(cell) + 1 for cell in row[:position])
-            width = len(row[position]) if position < len(row) else 1
-            return Span(self.source, line, column, max(1, width))
+            return Span(self.source, line, column, max(1, len(row[position])))
 
-        return Samples(_numbers([text(k) for k in range(len(self.rows))]), text, place)
+        return Samples(_numbers(texts), texts.__getitem__, place)
 
 
 def _numbers(texts: list[str]) -> list[float | None]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from bisect import bisect_left, bisect_right
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -104,6 +104,7 @@ def read_recording(path: Path, mapping: RecordingMap, used: Sequence[str]) -> Re
     reader = ChannelReader(file, mapping, problems)
     channels = {column.name: Channel(column, *reader.samples(column)) for column in columns}
     problems.stop_if_any()
+    _share_seconds(channels.values())
     ends = [*reader.clock[:1], *reader.clock[-1:]]
     if file.is_stamped:
         ends = [t for c in channels.values() for t in (c.times[0], c.times[-1])]
@@ -111,6 +112,14 @@ def read_recording(path: Path, mapping: RecordingMap, used: Sequence[str]) -> Re
     windows = windows_of(path, mapping, problems)
     problems.stop_if_any()
     return within(Recording(path.name, channels, max(known), min(known), windows), mapping)
+
+
+def _share_seconds(channels: Iterable[Channel]) -> None:
+    """Let channels that were sampled together have the same array of seconds."""
+    first: dict[int, Channel] = {}
+    for channel in channels:
+        together = first.setdefault(id(channel.times), channel)
+        vars(channel)["seconds"] = together.seconds
 
 
 def open_recorded(path: Path, mapping: RecordingMap, problems: Problems) -> RecordedFile:

@@ -10,7 +10,7 @@ from fractions import Fraction
 from engine.recording import Channel, Recording, read_recording
 from language.experiment import Scenario, System
 from language.problem import Problems, SpecError
-from language.signal import Stimulus
+from language.signal import Piece, Stimulus
 from language.stimulus import held, linear
 from language.wires import piece_block
 
@@ -27,7 +27,7 @@ class Course:
         self.pieces = stimulus.pieces
         self.truth = stimulus.truth
         self.varies = stimulus.varies
-        self._starts = [piece.start for piece in stimulus.pieces]
+        self.starts = [piece.start for piece in stimulus.pieces]
         self._formulas = formulas
         self._latest = 0
 
@@ -38,21 +38,26 @@ class Course:
         piece = self.pieces[number]
         if piece.formula:
             return self._formulas(piece_block(self.name, number), float(max(time, Fraction(0))))
+        if not piece.slope:
+            return self.held(piece)
+        exact = piece.value + piece.slope * (max(time, Fraction(0)) - piece.start)
+        return bool(exact) if self.truth else exact.numerator / exact.denominator
+
+    def held(self, piece: Piece) -> float | bool:
+        """Return the value of a piece that does not vary."""
         exact = piece.value
-        if piece.slope:
-            exact += piece.slope * (max(time, Fraction(0)) - piece.start)
         return bool(exact) if self.truth else exact.numerator / exact.denominator
 
     def _number(self, time: Fraction) -> int:
         """Return the place of the piece that is active at a time: most often that of before."""
-        starts, latest = self._starts, self._latest
+        starts, latest = self.starts, self._latest
         if not starts[latest] <= time or (latest + 1 < len(starts) and starts[latest + 1] <= time):
             self._latest = max(0, bisect_right(starts, time) - 1)
         return self._latest
 
     def events(self) -> list[Fraction]:
         """Return when pieces start, after time 0."""
-        return [start for start in self._starts if start > 0]
+        return [start for start in self.starts if start > 0]
 
 
 def resolved(system: System, scenario: Scenario) -> Scenario:
