@@ -28,6 +28,7 @@ from language.project import Project, expanded, read_document, shown
 from modewright.apart import require_apart
 from modewright.files import OutputError, make_folder, remove_files, write_files
 from modewright.garbage import rarely_looked
+from modewright.missed import missed, with_missed
 from modewright.own_effects import laid_nowhere, own_effects
 from modewright.recordings import CheckedRecordings, check_recordings, held_out_findings
 from modewright.threads import OneThread
@@ -160,12 +161,14 @@ def _concluded(
         return Dossier(case, automaton, checked.check, verdict, left_out=left_out, ended=ended)
     case = dataclasses.replace(case, thresholds=found.thresholds)
     after = hashes(case, case.held_out)
-    dossier = Dossier(case, automaton, checked.check, found.verdict, found, after, left_out)
-    held_out = held_out_findings(case, automaton)
-    for text in held_out:
+    misses = tuple(missed(found.verdict))
+    verdict = with_missed(found.verdict, misses)
+    dossier = Dossier(case, automaton, checked.check, verdict, found, after, left_out)
+    doubts = (*misses, *held_out_findings(case, automaton))
+    for text in doubts:
         clock.tell(text)
-    messages = (*reasons, *summary(dossier), *found.unread, *held_out, *needed(dossier))
-    verdict = dataclasses.replace(found.verdict, messages=messages)
+    messages = (*reasons, *summary(dossier), *found.unread, *doubts, *needed(dossier))
+    verdict = dataclasses.replace(verdict, messages=messages)
     return dataclasses.replace(dossier, verdict=verdict)
 
 

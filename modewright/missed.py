@@ -1,0 +1,29 @@
+"""Missed: signals that a model, as it was concluded, follows worse than a constant would."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterator, Sequence
+
+from diagnosis.verdict import Verdict
+
+CONSTANT = 1.0
+"""NRMSE of the mean of a recorded signal: a model that misses more shows nothing of it."""
+
+
+def missed(verdict: Verdict) -> Iterator[str]:
+    """Yield what free simulation misses by more than the spread of the signal, in words."""
+    for part, signals in verdict.fit.items():
+        for name, misfit in signals.items():
+            share = misfit.nrmse_after
+            if share > CONSTANT or math.isnan(share):
+                where = f"{part.replace('_', ' ')}: free simulation misses `{name}`"
+                yield f"{where} by {100 * share:.0f} % of its spread, a constant by 100 %"
+
+
+def with_missed(verdict: Verdict, misses: Sequence[str]) -> Verdict:
+    """Return a verdict beside what it misses: where nothing was to be missing, something is."""
+    if misses and verdict.verdict == "nothing_missing":
+        return dataclasses.replace(verdict, verdict="unknown")
+    return verdict
