@@ -32,6 +32,7 @@ from modewright.missed import missed, with_missed
 from modewright.own_effects import laid_nowhere, own_effects
 from modewright.recordings import CheckedRecordings, check_recordings, held_out_findings
 from modewright.threads import OneThread
+from modewright.workable import unworkable
 
 Tell = Callable[[str], None]
 KEPT = "kept"
@@ -109,10 +110,10 @@ def diagnose(
         case, thresholds=limits, bootstrap=bootstrap, stages=stages, before=clock.check
     )
     tell(f"looked at {len(case.train)} recordings: {len(checked.check.findings)} findings")
-    kept = case.train if anyway else usable(checked.check, case)
+    kept, errors = _kept(case, checked, anyway)
     left_out = tuple(case.name_of(file) for file in case.train if file not in kept)
     if kept:
-        reasons = [f"left out: {text}" for _, text in told(errors_of(checked.check)) if left_out]
+        reasons = [f"left out: {text}" for text in errors]
         if effects is not None:
             reasons += laid_nowhere(case.effects or (), case.document, case.project)
         for text in reasons:
@@ -120,12 +121,23 @@ def diagnose(
         case = dataclasses.replace(case, train=kept)
         dossier = _concluded(case, automaton, checked, left_out, reasons, clock)
     else:
-        messages = unusable(checked.check)
+        messages = tuple(dict.fromkeys((*unusable(checked.check), *errors)))
         verdict = undecided(messages, hashes(case, case.train), clock.spent)
         dossier = Dossier(case, automaton, checked.check, verdict)
     if out is not None:
         save_diagnosis(dossier, out, spec)
     return dossier
+
+
+def _kept(
+    case: Case, checked: CheckedRecordings, anyway: bool
+) -> tuple[tuple[Path, ...], list[str]]:
+    """Return the recordings to conclude from, and why others are none of them."""
+    kept = case.train if anyway else usable(checked.check, case)
+    why = [text for _, text in told(errors_of(checked.check))] if kept != case.train else []
+    hopeless = {file: text for file in kept if (text := unworkable(case.read[file]))}
+    why += [f"{case.name_of(file)}: {text}" for file, text in hopeless.items()]
+    return tuple(file for file in kept if file not in hopeless), why
 
 
 def _stages(out: str | Path | None) -> Path | None:

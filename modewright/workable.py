@@ -1,0 +1,44 @@
+"""Workable: whether a model can follow a recording at all, even one that is wanted anyway."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from engine.recording import Channel, Recording
+
+FEWEST = 10
+"""Samples of a channel from which on something can be said."""
+SHORTEST = 1e-6
+"""Time [s] between samples below which the unit of the time is a mistake."""
+MOST = 10_000_000
+"""Samples, at the usual distance, between the first and the last one: a day at 100 Hz."""
+LARGEST = 1e12
+"""Value in SI beyond which a run of a model is given up."""
+
+
+def unworkable(recording: Recording) -> str:
+    """Return why no model can follow a recording; nothing where one can."""
+    for channel in recording.channels.values():
+        why = _too_large(channel) or (_no_course(channel) if channel.column.compare else "")
+        if why:
+            return f"`{channel.column.name}` has {why}"
+    return ""
+
+
+def _too_large(channel: Channel) -> str:
+    largest = float(np.max(np.abs(channel.array)))
+    return f"values up to {largest:.2g} in SI, beyond {LARGEST:g}" if largest > LARGEST else ""
+
+
+def _no_course(channel: Channel) -> str:
+    """Return why what is compared with a model shows no course over time."""
+    count = len(channel.times)
+    if count < FEWEST:
+        return f"{count} samples, {FEWEST} are needed"
+    usual = float(np.median(np.diff(channel.seconds)))
+    if usual < SHORTEST:
+        return f"samples {usual:.2g} s apart: is its time in another unit?"
+    lasts = float(channel.times[-1] - channel.times[0])
+    if lasts > MOST * usual:
+        return f"samples {usual:.2g} s apart in {lasts:.2g} s: `FILE@0..60` uses a part of it"
+    return ""
