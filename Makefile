@@ -25,7 +25,7 @@ for python in $(PYTHON) python3 python3.14 python3.13 python3.12 python3.11 ""; 
 done
 endef
 
-.PHONY: help setup system-packages demo test target-test prove verify verify-part prove-diagnosis paper bench check
+.PHONY: help setup system-packages demo test long-test target-test prove verify verify-part prove-diagnosis paper bench check
 .PHONY: format generate lock clean
 .PHONY: check-lock check-format check-lint check-types check-floors check-specs check-tests check-generated
 
@@ -51,17 +51,20 @@ system-packages: ## install what the target needs (Debian, Ubuntu), if it is not
 demo: setup ## show the product at work
 	@$(BIN)/modewright demo $(ARGS)
 
-test target-test: export CI := true
-test target-test: export HYPOTHESIS_PROFILE := ci
-test target-test: export LC_ALL := C
-test target-test: export MPLBACKEND := Agg
-test target-test: export OMP_NUM_THREADS := 1
-test target-test: export OPENBLAS_NUM_THREADS := 1
-test target-test: export PYTHONHASHSEED := 0
-test target-test: export PYTHONUTF8 := 1
-test target-test: export TZ := UTC
-test: setup ## run the tests but those of the target, the same way everywhere
-	$(BIN)/pytest -n 2 --dist worksteal -q --ignore=tests/target $(ARGS)
+test long-test target-test: export CI := true
+test long-test target-test: export HYPOTHESIS_PROFILE := ci
+test long-test target-test: export LC_ALL := C
+test long-test target-test: export MPLBACKEND := Agg
+test long-test target-test: export OMP_NUM_THREADS := 1
+test long-test target-test: export OPENBLAS_NUM_THREADS := 1
+test long-test target-test: export PYTHONHASHSEED := 0
+test long-test target-test: export PYTHONUTF8 := 1
+test long-test target-test: export TZ := UTC
+test: setup ## run the tests but the long ones and those of the target, the same way everywhere
+	$(BIN)/pytest -n 2 --dist worksteal -q --ignore=tests/target -m "not long" $(ARGS)
+
+long-test: setup ## run the long ones: proofs, fuzzing, methods of integration
+	$(BIN)/pytest -n 2 --dist worksteal -q --ignore=tests/target -m long $(ARGS)
 
 target-test: setup ## compare the C on an emulated Cortex-M4F with the engine, and prove contracts
 	$(BIN)/pytest -n 2 --dist worksteal -q tests/target $(ARGS)

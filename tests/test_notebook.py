@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import nbformat
+import pytest
 from nbclient import NotebookClient
 
 NOTEBOOK = Path(__file__).parent.parent / "docs" / "ev_driveline.ipynb"
@@ -12,6 +13,7 @@ SECONDS = 240
 """Longest time of one cell before it is given up; the whole takes about 15 s."""
 
 
+@pytest.mark.long
 def test_the_notebook_runs_and_every_picture_is_shown(tmp_path: Path) -> None:
     book = nbformat.read(NOTEBOOK, as_version=4)  # type: ignore[no-untyped-call]
     where = {"metadata": {"path": str(tmp_path)}}

@@ -98,6 +98,7 @@ def test_the_wheel_holds_specs_templates_and_the_skeleton_but_no_tests(wheel: Pa
     assert [name for name in names if name.startswith(("tests/", "docs/", "generated/"))] == []
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "arguments",
     [

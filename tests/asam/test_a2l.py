@@ -88,6 +88,7 @@ def test_what_may_be_calibrated_is_named_as_in_pages_that_are_exchanged(name: st
     assert sorted(ours) == sorted(page_name(used, one) for one in page_constants(used))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("target", ["host", pytest.param("cortex-m4f", marks=NEEDS_ARM)])
 @pytest.mark.parametrize("name", ["estimator_simple", "supervisor", "maps"])
 def test_addresses_are_those_of_the_linker(name: str, target: str, tmp_path: Path) -> None:

@@ -49,6 +49,7 @@ def test_solved_numbers_of_a_page_may_be_any() -> None:
     assert solved["solved.drive_L_w_w__y_w"]["type"] == "float"
 
 
+@pytest.mark.long
 def test_a_wait_of_many_ticks_and_another_page_are_found() -> None:
     """`least > 6` is false with the page of the spec, and true with one where it is 7."""
     ways = explored(slow(), RANGES, 20_000, (1,))
@@ -60,6 +61,7 @@ def test_a_wait_of_many_ticks_and_another_page_are_found() -> None:
     assert found.missed == mcdc(slow(), [], ways[::-1], RANGES).missed
 
 
+@pytest.mark.long
 def test_seeds_find_the_same_ways_each_time() -> None:
     """The second one begins with what the first one found, in one order."""
     ways = explored(slow(), RANGES, 5_000, (1, 2))

@@ -37,6 +37,7 @@ def test_whole_numbers_are_not_computed_in_software() -> None:
     assert "jump_drive" not in apart(c_program(program("hko")))
 
 
+@pytest.mark.long
 @pytest.mark.skipif(shutil.which(ARM_COMPILER) is None, reason="no compiler for the target")
 @pytest.mark.parametrize("numbers", ["float64", "float32"])
 @pytest.mark.parametrize("name", ["hko", "leaf_hko"])

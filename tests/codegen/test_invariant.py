@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from codegen.proofs import reach
+from codegen.proofs.fact import AtMost, Within
 from codegen.proofs.holding import Number, holds
 from codegen.proofs.infeasible import places_of
 from codegen.proofs.invariant import invariant
@@ -21,12 +22,14 @@ from tests.lockstep.chance.running import taped
 from tests.lockstep.chance.spec import Spec, program as program_of
 from tests.verify.random_charts import programs
 
-CHART, SEEDS, TICKS = 6, (14, 19), 300
-"""A chart with two regions; one without is in tests/target."""
+CHARTS, SEEDS, TICKS = (3, 6), (14, 19), 300
+"""A chart without regions, one with two."""
 
 
-def test_facts_hold_in_runs_of_a_random_chart(tmp_path: Path) -> None:
-    ((spec, made),) = programs(range(CHART, CHART + 1), tmp_path)
+@pytest.mark.long
+@pytest.mark.parametrize("number", CHARTS)
+def test_facts_hold_in_runs_of_a_random_chart(number: int, tmp_path: Path) -> None:
+    ((spec, made),) = programs(range(number, number + 1), tmp_path)
     checked(spec, made)
 
 
@@ -51,6 +54,20 @@ def checked(spec: Spec, made: Program) -> None:
         assert not wrong, wrong[:3]
 
     taped(spec, made, TICKS, run=used, look=look)
+
+
+@pytest.mark.long
+def test_of_a_chart_much_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Micro-steps, their log, histories, and which regions are left in which mode."""
+    monkeypatch.setattr("codegen.proofs.invariant._last", lambda world: ())  # they take long
+    world = World(c_program(program_named("supervisor")))
+    facts = invariant(world, {}, most_where=1)
+    said = {(f.cut.name, f.name, f.where): f.limits for f in facts if isinstance(f, Within)}
+    drive = (("memory.mode", 3),)
+    assert said["step", "memory.mode_operation_drive_torque", drive] == frozenset({0, 1, 2})
+    assert said["step", "timer.operation_fault", ()] == (0, 3)
+    counts = {fact.name for fact in facts if isinstance(fact, AtMost)}
+    assert {"memory.count_of_log", "work.tail", "work.turn"} <= counts
 
 
 def test_a_question_that_takes_too_long_proves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:

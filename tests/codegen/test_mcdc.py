@@ -82,6 +82,7 @@ def test_a_decision_of_one_condition_has_to_be_true_and_false() -> None:
     assert not any(text.startswith("case ") for text in both)
 
 
+@pytest.mark.long
 def test_the_command_tells_what_was_not_shown() -> None:
     text = CliRunner().invoke(app, ["mcdc", "contactor", "--runs", "60"]).output
     first, last = text.split("\n")[0], text.strip().split("\n")[-1]
@@ -92,6 +93,7 @@ def test_the_command_tells_what_was_not_shown() -> None:
     assert found["conditions"] == sum(len(d["shown"]) for d in found["decisions"]) > found["shown"]
 
 
+@pytest.mark.long
 def test_tests_of_the_project_are_the_sequences() -> None:
     found = code.mcdc("estimator", is_proven=False)
     assert found.sequences > 3 and (found.sequences - 3) % (2 * REACH) == 0  # and their borders
@@ -100,6 +102,7 @@ def test_tests_of_the_project_are_the_sequences() -> None:
     assert stamp.shown == (False,)  # tests have the page of the spec
 
 
+@pytest.mark.long
 def test_nothing_to_run_it_on_is_told() -> None:
     with pytest.raises(ValueError, match="no test of the project runs contactor as it is: give it"):
         code.mcdc("contactor")

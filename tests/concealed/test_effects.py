@@ -26,6 +26,7 @@ def serials(name: str) -> list[int]:
     return sorted(range(len(kinds)), key=lambda one: name not in BEST_SEEN_IN.get(kinds[one], ()))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", CATALOGUE)
 def test_shows_in_two_training_recordings(name: str) -> None:
     """At strength 1 by 3 standard deviations in at least two of them."""

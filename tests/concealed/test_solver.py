@@ -26,6 +26,7 @@ def serial_of(kind: str) -> int:
     return [recording.manoeuvre for recording in clean_recordings()].index(kind)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("names", [(), *((name,) for name in CATALOGUE)])
 def test_half_the_step_changes_little(names: tuple[str, ...]) -> None:
     """Less than a twentieth of the smallest noise, through zero speed and through the gap."""

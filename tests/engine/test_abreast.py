@@ -105,6 +105,7 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("effect", LAID)
 def test_effects_on_a_plant_have_the_same_bits(effect: str, project: Path) -> None:
     laid = f"effects: {{{effect}: {{}}}}" if effect else "about: as it is"

@@ -82,6 +82,7 @@ def assert_same(name: str, theirs: mw.Trajectory) -> None:
         )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", DRIVES)
 def test_rk4_follows_the_method_of_order_8(name: str) -> None:
     theirs = by(name, "DOP853")
@@ -89,6 +90,7 @@ def test_rk4_follows_the_method_of_order_8(name: str) -> None:
     assert_same(name, theirs)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("method", ["Radau", "LSODA"])
 @pytest.mark.parametrize("name", ["two_gaps", "clutch"])
 def test_rk4_follows_the_implicit_methods(name: str, method: Method) -> None:
@@ -98,6 +100,7 @@ def test_rk4_follows_the_implicit_methods(name: str, method: Method) -> None:
     assert_same(name, theirs)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("method", ["DOP853", "Radau", "LSODA"])
 def test_the_paper_s_first_gap_by_every_method(method: str) -> None:
     """0.5060139445701604 and 0.5249921050106992 s: an independent reproduction by DOP853."""

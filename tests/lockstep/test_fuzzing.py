@@ -24,6 +24,7 @@ needs_fuzzer = pytest.mark.skipif(
 RUNS = 400
 
 
+@pytest.mark.long
 @needs_fuzzer
 @pytest.mark.parametrize("name", ["contactor", "estimator_float32", "supervisor"])
 def test_engine_and_c_agree_on_what_is_found(name: str) -> None:
@@ -34,6 +35,7 @@ def test_engine_and_c_agree_on_what_is_found(name: str) -> None:
     assert len(found.modes) >= 2
 
 
+@pytest.mark.long
 @needs_fuzzer
 @pytest.mark.parametrize(
     ("name", "right", "wrong", "told"),
@@ -51,6 +53,7 @@ def test_another_bit_is_found(
     assert told in str(found.first)
 
 
+@pytest.mark.long
 @needs_fuzzer
 def test_a_store_beyond_its_array_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     place = "self->log[self->count_of_log"

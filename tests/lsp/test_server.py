@@ -54,6 +54,7 @@ def test_a_defect_of_ours_is_told_in_the_file_that_shows_it(
     assert told.severity == types.DiagnosticSeverity.Error
 
 
+@pytest.mark.long
 def test_what_has_to_be_proven_follows_and_stays_while_its_line_stays(
     talk: Talk, heater: Path
 ) -> None:

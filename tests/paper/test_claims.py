@@ -17,6 +17,7 @@ from tests.verify.store import ROOT
 REMADE = "docs/paper belongs to other specs: make paper"
 
 
+@pytest.mark.long
 def test_what_the_paper_says_of_its_figures_holds() -> None:
     found = quick_claims()
     assert {claim.figure for claim in found} == {*FIGURES, "Table 1"} - {"fig_3", "fig_5"}

@@ -51,6 +51,7 @@ def scheduler() -> Iterator[tuple[subprocess.Popen[str], str]]:
         process.communicate()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("sign", "told"),
     [
