@@ -15,15 +15,8 @@ unexport VIRTUAL_ENV PYTHONHOME PYTHONPATH PYTHONSAFEPATH UV_PROJECT UV_WORKING_
 # Python keeps what it compiled of its modules, as it does by default: commands start sooner.
 unexport PYTHONDONTWRITEBYTECODE
 
-# A shell fragment that puts the first Python that is new enough into $$python.
-define find_python
-for python in $(PYTHON) python3 python3.14 python3.13 python3.12 python3.11 ""; do \
-	if [ -z "$$python" ]; then \
-		echo "no Python 3.11 or newer on PATH: try make PYTHON=/path/to/python3" >&2; exit 3; \
-	fi; \
-	if $$python -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then break; fi; \
-done
-endef
+# A shell fragment that puts a Python that is new enough into $$python.
+find_python := python=$$(tools/find_python.sh $(PYTHON)) || exit
 
 .PHONY: help setup system-packages demo test long-test target-test prove verify verify-part prove-diagnosis paper bench check
 .PHONY: format generate lock clean
