@@ -119,6 +119,7 @@ def test_every_file_that_the_architecture_page_names_is_in_the_package_it_says()
     assert missing == []
 
 
+@pytest.mark.long
 def test_what_is_shipped_is_replayed_as_the_page_on_recordings_says(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -133,6 +134,7 @@ def test_what_is_shipped_is_replayed_as_the_page_on_recordings_says(
     assert (tmp_path / "replay.png").exists()
 
 
+@pytest.mark.long
 def test_the_commands_and_the_python_of_the_guide_work_as_it_says(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

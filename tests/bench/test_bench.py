@@ -25,6 +25,7 @@ def test_the_rivals_in_c_are_those_that_were_given() -> None:
     assert found == listed
 
 
+@pytest.mark.long
 def test_a_small_run_has_every_figure_with_its_errors(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

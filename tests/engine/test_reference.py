@@ -251,6 +251,7 @@ def test_no_block_of_ours_that_integrates_or_locates_is_kept(
     assert set(kept) >= {"init", "start", "equations", "watch", "jump"}
 
 
+@pytest.mark.long
 def test_the_result_is_the_same_without_our_motion(
     tip_out: tuple[System, Scenario], theirs: Trajectory, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -65,6 +65,7 @@ def _set(stepper: Interpreter, program: Program, name: str, value: float) -> Non
         stepper.set(full, int(value) if kind == "whole" else value)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", TICKS)
 def test_an_fmu_gives_the_bits_of_the_engine(
     name: str, version: Version, ready: Ready, tapes: dict[str, Tape]

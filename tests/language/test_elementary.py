@@ -65,6 +65,7 @@ def specials(name: str) -> list[float]:
     return [x for y in near for x in (y, -y) if low <= x <= high] + [low]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ONE)
 def test_error_is_as_stated(name: str) -> None:
     draw = random.Random(f"elementary {name}")

@@ -79,6 +79,7 @@ def has_fused_operations() -> bool:
     return info.exists() and " fma " in info.read_text()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("level", LEVELS)
 @pytest.mark.parametrize("name", ["estimator", "estimator_simple"])
 def test_optimisation_keeps_every_bit_of_a_tip_out(
@@ -105,6 +106,7 @@ def test_contraction_is_forbidden_and_would_be_found(product: Tape) -> None:
         assert verdict.first.compiled == f"{lost} ({LOST[number]})"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("named", ["gcc", "clang-19"])
 def test_every_compiler_gives_the_same_bits(tapes: dict[str, Tape], named: str) -> None:
     if shutil.which(named) is None:

@@ -53,6 +53,7 @@ def test_a_definition_is_found_in_another_file(talk: Talk, driveline: Path) -> N
         assert found["range"]["start"]["line"] in (line - 1, line)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("old", ["k_hs:", "no_contact:\n"])
 def test_a_rename_reaches_all_files_of_the_project_and_changes_no_meaning(
     talk: Talk, driveline: Path, old: str

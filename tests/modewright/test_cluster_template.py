@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 ASKED = """
 import os
 import modewright
@@ -32,6 +34,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.long
 def test_workers_are_copies_of_one_process_that_has_loaded_our_code(tmp_path: Path) -> None:
     script, folder = tmp_path / "script" / "asked.py", tmp_path / "user"
     script.parent.mkdir()

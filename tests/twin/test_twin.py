@@ -29,6 +29,7 @@ def pair(request: pytest.FixtureRequest) -> tuple[Tape, str]:
     return driveline("float32", horizon, [request.param])[request.param], twin
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("machine", [HOST.name, pytest.param(CORTEX_M4F.name, marks=NEEDS)])
 def test_a_twin_has_the_same_bits(pair: tuple[Tape, str], machine: str) -> None:
     tape, twin = pair
