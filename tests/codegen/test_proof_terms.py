@@ -51,6 +51,7 @@ def same(terms: Terms, found: Real, wanted: float) -> None:
         assert truth(terms, found.value == real(terms, wanted).value)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("number", NUMBERS)
 def test_a_table_gives_what_lies_within_its_bounds(number: NumberType) -> None:
     draw = Random(number)

@@ -160,6 +160,7 @@ def test_what_we_add_to_page_and_inputs_is_named_like_no_parameter_and_no_input(
     assert ours <= reserved_words()["GENERATED"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("hash_seed", ["1", "2"])
 def test_another_process_generates_the_same_bytes(hash_seed: str) -> None:
     script = (

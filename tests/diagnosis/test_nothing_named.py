@@ -44,6 +44,7 @@ def test_a_torque_that_acts_in_windows_is_an_unknown_input(tmp_path: Path) -> No
     assert run(folder, "check", "found/variant.yaml") == 0
 
 
+@pytest.mark.long
 def test_a_torque_that_acts_in_windows_is_found_beside_a_friction_that_acts_always(
     tmp_path: Path,
 ) -> None:
@@ -70,6 +71,7 @@ def test_what_is_held_out_and_cannot_be_used_is_told_on_the_screen_and_in_the_re
     assert told.replace("`", "") in page.replace("`", "")
 
 
+@pytest.mark.long
 def test_a_spec_without_a_range_is_diagnosed_as_it_is(tmp_path: Path) -> None:
     folder = bench(tmp_path / "exact")
     path = folder / "spec" / "spinner.yaml"

@@ -39,6 +39,7 @@ def tried(own: Bench, base: Estimate, effect: str) -> Tried:
     return Tried(layers[effect], known.train, model, known)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("rise", "named"), [(0.0, PLAIN), (3.0, RISES)])
 def test_the_form_that_recordings_show_is_named(bench: Bench, rise: float, named: str) -> None:
     own = rubbing(bench, rise)

@@ -61,6 +61,7 @@ def fitted(bench: Bench) -> tuple[Estimate, dict[str, Estimate]]:
     return base, found
 
 
+@pytest.mark.long
 def test_an_amplitude_dependent_shaft_is_told_named_and_repaired() -> None:
     bench = bench_of(hidden=True)
     base, found = fitted(bench)

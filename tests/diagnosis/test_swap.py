@@ -36,6 +36,7 @@ def late_and_rubbing(bench: Bench) -> tuple[Bench, list[Tried]]:
     return used, [first, Tried(layer(bench, FRICTION), 0.0, both, evidence(both, lag, series))]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("name", "goes_better"), [(DELAY, True), (OFFSET, False)])
 def test_what_it_is_confused_with_is_tried_though_it_was_not_fitted(
     bench: Bench, late: tuple[Bench, list[Tried]], name: str, goes_better: bool
@@ -57,6 +58,7 @@ def test_what_it_is_confused_with_is_tried_though_it_was_not_fitted(
     assert (after.train > before.train + 100.0) is goes_better
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "part", "is_tried"),
     [

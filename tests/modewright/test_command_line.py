@@ -122,6 +122,7 @@ def test_a_pipe_gets_no_colour_and_no_bar() -> None:
     assert "nowhere.csv:1:1: error: the run cannot be read" in done.stderr
 
 
+@pytest.mark.long
 def test_a_file_does_not_differ_from_the_same_simulation(
     tip_out: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
