@@ -26,7 +26,8 @@ builds() {
 }
 
 quick_enough='
-NR == 1 { version = $1 }
+NF < 3 { next }
+!count { version = $1 }
 $1 == version { took[++count] = $2; best = (count == 1 || $2 < best) ? $2 : best; sub(/^[^ ]* [^ ]* /, ""); path[count] = $0 }
 END { for (k = 1; k <= count; k++) if (took[k] <= 1.25 * best) { print path[k]; exit } }'
 
