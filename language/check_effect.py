@@ -11,24 +11,31 @@ from language.parameter_reader import ParameterReader
 from language.problem import Problems, Span, nearest
 from language.reader import Reader
 from language.syntax import Application, Tree, children
-from language.tree import entries, items_of, put
+from language.tree import entries, items_of, one_line, put
 from language.units import NO_UNIT, UNKNOWN_UNIT
 
 HOLE = re.compile(r"\$[A-Za-z]\w*")
 KEYED = ("terms", "equations", "redirect", "move")
 """Sections whose keys may be holes."""
+UNITS = ("parameters", "states", "discrete")
+"""Sections of what has a unit, which may be a hole."""
 VALUES = ("value", "range", "neutral", "plain", "starts")
 """Keys of a parameter that are numbers in its unit."""
 
 
 def check_keys(tree: Table, holes: Collection[str], problems: Problems) -> None:
-    """Report keys with a hole that no place of the effect has."""
-    for section in KEYED:
+    """Report keys and units with a hole that no place of the effect has."""
+    texts = [(entry.key, entry.span) for section in KEYED for entry in entries(tree.get(section))]
+    for section in UNITS:
         for entry in entries(tree.get(section)):
-            for found in HOLE.finditer(entry.key):
-                if found.group() not in holes:
-                    span = entry.span.inside(found.start(), len(found.group()))
-                    report_hole(found.group(), span, holes, problems)
+            unit = entry.node.get("unit") if isinstance(entry.node, Table) else None
+            if isinstance(unit, Scalar):
+                texts.append((unit.text, unit.span))
+    for text, span in texts:
+        for found in HOLE.finditer(text):
+            hole = found.group()
+            if hole not in holes:
+                report_hole(hole, span.inside(found.start(), len(hole)), holes, problems)
 
 
 def report_hole(hole: str, span: Span, holes: Collection[str], problems: Problems) -> None:
@@ -65,11 +72,15 @@ def check_parameters(tree: Table, problems: Problems) -> None:
 def _without_hole(entry: Entry) -> Entry | None:
     """Return a parameter whose unit, where it is a hole, is a number.
 
-    None if it mixes that with units of its own, which are known where the effect is laid.
+    None for one whose units are known where the effect is laid alone: it mixes a hole with units
+    of its own, or has a table with holes.
     """
     table = entry.node
-    unit = table.get("unit") if isinstance(table, Table) else None
-    if not (isinstance(table, Table) and isinstance(unit, Scalar) and HOLE.search(unit.text)):
+    if not isinstance(table, Table) or not HOLE.search(one_line(table)):
+        return entry
+    if "table" in table.entries:
+        return None
+    if not (isinstance(unit := table.get("unit"), Scalar) and HOLE.search(unit.text)):
         return entry
     if any(_has_unit(table.get(key)) for key in VALUES):
         return None
