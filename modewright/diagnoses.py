@@ -17,10 +17,12 @@ from diagnosis.finding import told
 from diagnosis.fit import Fit, fit as fitted
 from diagnosis.leftover import left_by
 from diagnosis.library import library
+from diagnosis.recording_check import used_columns
 from diagnosis.threshold import EVERYWHERE, Thresholds, thresholds_in, written
 from diagnosis.variant import needed, variant_text
 from diagnosis.wording import summary
 from engine.recorded_part import file_of
+from engine.recording import read_recording
 from language.effect import Effect
 from language.load import automaton_of
 from language.model import Automaton
@@ -32,7 +34,7 @@ from modewright.missed import missed, with_missed
 from modewright.own_effects import laid_nowhere, own_effects
 from modewright.recordings import CheckedRecordings, check_recordings, held_out_findings
 from modewright.threads import OneThread
-from modewright.workable import unworkable
+from modewright.workable import OpenedLater, unworkable
 
 Tell = Callable[[str], None]
 KEPT = "kept"
@@ -238,7 +240,9 @@ def _case(
     files = tuple(Path(file) for file in train), tuple(Path(file) for file in held_out)
     candidates = _candidates(effects, project)
     names = names_of(*files)
-    read = dict(zip(files[0], checked.recordings, strict=True))
+    known = dict(zip(files[0], checked.recordings, strict=True))
+    used = used_columns(checked.mapping, automaton)
+    read = OpenedLater(known, files[1], lambda path: read_recording(path, checked.mapping, used))
     case = Case(whole, project, checked.mapping, *files, candidates, names=names, read=read)
     return case, automaton
 

@@ -103,12 +103,12 @@ def held_out_findings(case: Case, automaton: Automaton) -> tuple[str, ...]:
     used = used_columns(case.mapping, automaton)
     recordings = []
     for path in case.held_out:
-        known = case.opened.get(path)
-        if known is not None and list(known.channels) == list(used):
-            recordings.append(dataclasses.replace(known, name=case.name_of(path)))
-            continue
         try:
-            recordings.append(_read(path, case.name_of(path), case.mapping, used)[0])
+            known = case.read.get(path) or case.opened.get(path)
+            if known is not None and list(known.channels) == list(used):
+                recordings.append(dataclasses.replace(known, name=case.name_of(path)))
+            else:
+                recordings.append(_read(path, case.name_of(path), case.mapping, used)[0])
         except (SpecError, ToolMissing, ValueError):
             continue
     if not recordings:

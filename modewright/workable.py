@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Collection, Iterator, Mapping
+from pathlib import Path
+
 import numpy as np
 
 from engine.recording import Channel, Recording
@@ -14,6 +17,39 @@ MOST = 10_000_000
 """Samples, at the usual distance, between the first and the last one: a day at 100 Hz."""
 LARGEST = 1e12
 """Value in SI beyond which a run of a model is given up."""
+
+
+class OpenedLater(Mapping[Path, Recording]):
+    """Recordings as they were read; those held out are read when they are asked for, no sooner.
+
+    Raises ValueError for one of these that no model can follow, SpecError and ToolMissing as
+    `read` does.
+    """
+
+    def __init__(
+        self,
+        known: Mapping[Path, Recording],
+        held_out: Collection[Path],
+        read: Callable[[Path], Recording],
+    ) -> None:
+        """Take what is known, and how others are read."""
+        self._known = dict(known)
+        self._held_out = held_out
+        self._read = read
+
+    def __getitem__(self, path: Path) -> Recording:
+        if path not in self._known and path in self._held_out:
+            recording = self._read(path)
+            if why := unworkable(recording):
+                raise ValueError(why)
+            self._known[path] = recording
+        return self._known[path]
+
+    def __iter__(self) -> Iterator[Path]:
+        return iter(self._known)
+
+    def __len__(self) -> int:
+        return len(self._known)
 
 
 def unworkable(recording: Recording) -> str:
@@ -34,7 +70,7 @@ def _no_course(channel: Channel) -> str:
     """Return why what is compared with a model shows no course over time."""
     count = len(channel.times)
     if count < FEWEST:
-        return f"{count} samples, {FEWEST} are needed"
+        return f"{count} of the {FEWEST} samples that are needed"
     usual = float(np.median(np.diff(channel.seconds)))
     if usual < SHORTEST:
         return f"samples {usual:.2g} s apart: is its time in another unit?"

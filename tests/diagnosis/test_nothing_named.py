@@ -65,7 +65,9 @@ def test_what_is_held_out_and_cannot_be_used_is_told_on_the_screen_and_in_the_re
     folder = bench(tmp_path / "broken", T_c=0.0)
     (folder / "run_2.csv").write_text("t_s,torque,speed\n0,1,2\n", "utf-8")
     assert run(folder, *COMMAND, "--out", "found") == 0
-    told = "run_2.csv was held out and cannot be used: run_2.csv: `torque` has one sample only"
+    told = (
+        "run_2.csv was held out and cannot be used: `speed` has 1 of the 10 samples that are needed"
+    )
     assert told in capsys.readouterr().err
     page = (folder / "found" / "report.html").read_text("utf-8")
     assert told.replace("`", "") in page.replace("`", "")

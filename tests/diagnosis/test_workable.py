@@ -12,11 +12,13 @@ import pytest
 import modewright as mw
 from engine.recording import Channel, Recording
 from language.experiment import Column
-from modewright.workable import FEWEST, LARGEST, MOST, unworkable
+from modewright.workable import FEWEST, LARGEST, MOST, OpenedLater, unworkable
 from tests.diagnosis.driving import bench
 
 COLUMNS = bench().columns
 COMPARED = next(one for one in COLUMNS.values() if one.compare)
+YEARS = Fraction(10**9)
+"""A time stamp [s] behind a leap."""
 FED = next(one for one in COLUMNS.values() if not one.compare)
 
 
@@ -36,7 +38,9 @@ def test_a_usual_recording_is_workable() -> None:
 
 def test_few_samples_are_not() -> None:
     assert unworkable(recording(every(Fraction(1, 100), FEWEST))) == ""
-    assert "9 samples, 10 are needed" in unworkable(recording(every(Fraction(1, 100), FEWEST - 1)))
+    assert "9 of the 10 samples that are needed" in unworkable(
+        recording(every(Fraction(1, 100), FEWEST - 1))
+    )
 
 
 def test_nanoseconds_are_not() -> None:
@@ -46,7 +50,7 @@ def test_nanoseconds_are_not() -> None:
 def test_a_leap_of_years_is_not() -> None:
     times = every(Fraction(1, 100))
     assert unworkable(recording([*times, times[-1] + Fraction(MOST, 100) - 2])) == ""
-    assert "FILE@0..60" in unworkable(recording([*times, Fraction(10**9)]))
+    assert "FILE@0..60" in unworkable(recording([*times, YEARS]))
 
 
 @pytest.mark.parametrize("column", [COMPARED, FED])
@@ -72,3 +76,21 @@ def test_wanted_anyway_nothing_is_concluded_from_it(tmp_path: Path) -> None:
     found = mw.diagnose("blind_driveline", [file], anyway=True, thresholds="usual")
     assert found.diagnosis is None and found.verdict.verdict == "unknown"
     assert any("values up to 1e+300 in SI, beyond 1e+12" in one for one in found.verdict.messages)
+
+
+def test_what_is_held_out_is_read_when_it_is_asked_for_and_refused_then() -> None:
+    usual, leaps = recording(every(Fraction(1, 100))), recording([*every(Fraction(1, 100)), YEARS])
+    files = {Path("train.csv"): usual, Path("late.csv"): usual, Path("leaps.csv"): leaps}
+    asked: list[Path] = []
+
+    def read(path: Path) -> Recording:
+        asked.append(path)
+        return files[path]
+
+    train, late, leaping = files
+    known = OpenedLater({train: usual}, (late, leaping), read)
+    assert known[train] is usual and list(known) == [train] and asked == []
+    assert known.get(late) is usual and known.get(late) is usual and asked == [late]
+    with pytest.raises(ValueError, match="uses a part of it"):
+        known.get(leaping)
+    assert known.get(Path("another.csv")) is None
