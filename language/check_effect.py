@@ -6,7 +6,7 @@ import re
 from collections.abc import Collection
 
 from language.document import Entry, Node, Scalar, Table
-from language.function import ARGUMENTS, KNOWN
+from language.function import KNOWN, miscounted
 from language.parameter_reader import ParameterReader
 from language.problem import Problems, Span, nearest
 from language.reader import Reader
@@ -23,7 +23,7 @@ VALUES = ("value", "range", "neutral", "plain", "starts")
 """Keys of a parameter that are numbers in its unit."""
 
 
-def check_keys(tree: Table, holes: Collection[str], problems: Problems) -> None:
+def check_holes(tree: Table, holes: Collection[str], problems: Problems) -> None:
     """Report keys and units with a hole that no place of the effect has."""
     texts = [(entry.key, entry.span) for section in KEYED for entry in entries(tree.get(section))]
     for section in UNITS:
@@ -48,13 +48,11 @@ def report_hole(hole: str, span: Span, holes: Collection[str], problems: Problem
 def check_functions(tree: Tree, problems: Problems) -> None:
     """Report functions that are none, or that take another number of arguments."""
     if isinstance(tree, Application):
-        wanted = ARGUMENTS.get(tree.function)
         if tree.function not in KNOWN:
             hint = nearest(tree.function, KNOWN) or f"there are `{' '.join(KNOWN)}`"
             span = tree.span.inside(0, len(tree.function))
             problems.error("name", span, f"`{tree.function}` is not a function", hint)
-        elif wanted is not None and len(tree.arguments) != wanted:
-            label = f"`{tree.function}` takes {wanted} argument(s), not {len(tree.arguments)}"
+        elif label := miscounted(tree):
             problems.error("arguments", tree.span, label)
     for part in children(tree):
         check_functions(part, problems)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
-from language.check_effect import check_functions, check_keys, check_parameters, report_hole
+from language.check_effect import check_functions, check_holes, check_parameters, report_hole
 from language.document import Document, Entry, Node, Scalar, Table, require_kind
 from language.names import check_name
 from language.parse import parse_balance, parse_expression
@@ -233,7 +233,7 @@ class _EffectReader(Reader):
                 label = f"`{name}` is the effect's own: it is not read of the model"
                 self.problems.error("effect", item.span, label)
         known = {f"${hole}" for fit in fits for hole in (*HOLES[fit.kind], *fit.has)}
-        check_keys(tree, known, self.problems)
+        check_holes(tree, known, self.problems)
 
         def check(path: Path, scalar: Scalar) -> Scalar:
             if path[:2] == ("redirect", "except"):

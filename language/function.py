@@ -44,8 +44,7 @@ def function_kind(check: DimensionCheck, tree: Application) -> Kind | None:
         hint = FUNCTIONS.get(name) or nearest(name, KNOWN) or f"there are `{' '.join(usable)}`"
         check.report("name", tree.span, label, hint)
         return None
-    if len(arguments) != wanted:
-        label = f"`{name}` takes {wanted} argument(s), not {len(arguments)}"
+    if label := miscounted(tree):
         check.report("arguments", tree.span, label)
         return None
     given = [check.kind(argument) for argument in arguments]
@@ -56,6 +55,13 @@ def function_kind(check: DimensionCheck, tree: Application) -> Kind | None:
     if any(kind is None for kind in kinds):
         return None
     return _elementary(check, tree, [kind for kind in kinds if kind is not None])
+
+
+def miscounted(tree: Application) -> str:
+    """Return what is wrong with the number of arguments of an elementary function."""
+    wanted, given = ARGUMENTS.get(tree.function), len(tree.arguments)
+    is_right = wanted is None or given == wanted
+    return "" if is_right else f"`{tree.function}` takes {wanted} argument(s), not {given}"
 
 
 def is_of_wholes(arguments: Sequence[Tree], wholes: Sequence[bool]) -> bool:

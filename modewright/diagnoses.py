@@ -11,7 +11,7 @@ from pathlib import Path
 
 from diagnosis.case import Bootstrap, Case
 from diagnosis.diagnose import diagnose as diagnosed
-from diagnosis.dossier import Dossier, errors_of, hashes, undecided, unusable, usable
+from diagnosis.dossier import Dossier, hashes, undecided, unusable
 from diagnosis.file_names import names_of
 from diagnosis.finding import told
 from diagnosis.fit import Fit, fit as fitted
@@ -34,7 +34,7 @@ from modewright.missed import missed, with_missed
 from modewright.own_effects import laid_nowhere, own_effects
 from modewright.recordings import CheckedRecordings, check_recordings, held_out_findings
 from modewright.threads import OneThread
-from modewright.workable import OpenedLater, unworkable
+from modewright.workable import OpenedLater, workable
 
 Tell = Callable[[str], None]
 KEPT = "kept"
@@ -112,7 +112,7 @@ def diagnose(
         case, thresholds=limits, bootstrap=bootstrap, stages=stages, before=clock.check
     )
     tell(f"looked at {len(case.train)} recordings: {len(checked.check.findings)} findings")
-    kept, errors = _kept(case, checked, anyway)
+    kept, errors = workable(case, checked.check, anyway)
     left_out = tuple(case.name_of(file) for file in case.train if file not in kept)
     if kept:
         reasons = [f"left out: {text}" for text in errors]
@@ -123,23 +123,23 @@ def diagnose(
         case = dataclasses.replace(case, train=kept)
         dossier = _concluded(case, automaton, checked, left_out, reasons, clock)
     else:
-        messages = tuple(dict.fromkeys((*unusable(checked.check), *errors)))
-        verdict = undecided(messages, hashes(case, case.train), clock.spent)
-        dossier = Dossier(case, automaton, checked.check, verdict)
+        dossier = _unusable(case, automaton, checked, errors, clock)
     if out is not None:
         save_diagnosis(dossier, out, spec)
     return dossier
 
 
-def _kept(
-    case: Case, checked: CheckedRecordings, anyway: bool
-) -> tuple[tuple[Path, ...], list[str]]:
-    """Return the recordings to conclude from, and why others are none of them."""
-    kept = case.train if anyway else usable(checked.check, case)
-    why = [text for _, text in told(errors_of(checked.check))] if kept != case.train else []
-    hopeless = {file: text for file in kept if (text := unworkable(case.read[file]))}
-    why += [f"{case.name_of(file)}: {text}" for file, text in hopeless.items()]
-    return tuple(file for file in kept if file not in hopeless), why
+def _unusable(
+    case: Case,
+    automaton: Automaton,
+    checked: CheckedRecordings,
+    errors: Sequence[str],
+    clock: _Budget,
+) -> Dossier:
+    """Return what is told where no recording is left to conclude from."""
+    messages = tuple(dict.fromkeys((*unusable(checked.check), *errors)))
+    verdict = undecided(messages, hashes(case, case.train), clock.spent)
+    return Dossier(case, automaton, checked.check, verdict)
 
 
 def _stages(out: str | Path | None) -> Path | None:
@@ -284,11 +284,12 @@ def fit(
     """
     require_apart(train, ())
     checked = check_recordings(train, map, spec, root=root)
-    for severity, text in told(checked.check.findings):
-        if severity != "note":
-            tell(f"{severity}: {text}")
     case, _ = _case(spec, train, (), checked, None, root)
-    kept = case.train if anyway else usable(checked.check, case)
+    kept, errors = workable(case, checked.check, anyway)
+    found = [f"{severity}: {text}" for severity, text in told(checked.check.findings)]
+    for text in dict.fromkeys((*found, *(f"error: {text}" for text in errors))):
+        if not text.startswith("note"):
+            tell(text)
     if not kept:
         raise UnusableRecordings("the recordings are not usable; nothing was fitted to them")
     for file in case.train:

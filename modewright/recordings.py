@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import os
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -98,19 +99,15 @@ def check_recordings(
 def held_out_findings(case: Case, automaton: Automaton) -> tuple[str, ...]:
     """Return what a check finds of recordings that are held out, for people.
 
-    It is told beside a verdict that is final. What cannot be read is told elsewhere.
+    It is told beside a verdict that is final. What cannot be used is told elsewhere.
     """
     used = used_columns(case.mapping, automaton)
     recordings = []
     for path in case.held_out:
-        try:
-            known = case.read.get(path) or case.opened.get(path)
-            if known is not None and list(known.channels) == list(used):
-                recordings.append(dataclasses.replace(known, name=case.name_of(path)))
-            else:
-                recordings.append(_read(path, case.name_of(path), case.mapping, used)[0])
-        except (SpecError, ToolMissing, ValueError):
-            continue
+        name = case.name_of(path)
+        with suppress(SpecError, ToolMissing, ValueError):
+            known = case.read.get(path) or _read(path, name, case.mapping, used)[0]
+            recordings.append(dataclasses.replace(known, name=name))
     if not recordings:
         return ()
     mistakes = partial(mistakes_of, case.document, case.project, automaton, case.mapping)

@@ -7,6 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
+from diagnosis.case import Case
+from diagnosis.dossier import errors_of, usable
+from diagnosis.finding import told
+from diagnosis.recording_check import RecordingCheck
 from engine.recording import Channel, Recording
 
 FEWEST = 10
@@ -50,6 +54,15 @@ class OpenedLater(Mapping[Path, Recording]):
 
     def __len__(self) -> int:
         return len(self._known)
+
+
+def workable(case: Case, check: RecordingCheck, anyway: bool) -> tuple[tuple[Path, ...], list[str]]:
+    """Return the recordings of a case to conclude from, and why others are none of them."""
+    kept = case.train if anyway else usable(check, case)
+    why = [text for _, text in told(errors_of(check))] if kept != case.train else []
+    hopeless = {file: text for file in kept if (text := unworkable(case.read[file]))}
+    why += [f"{case.name_of(file)}: {text}" for file, text in hopeless.items()]
+    return tuple(file for file in kept if file not in hopeless), why
 
 
 def unworkable(recording: Recording) -> str:
