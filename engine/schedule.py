@@ -72,8 +72,8 @@ class Schedule:
                     at.append(Grid(own.start - line.delay, own.period))
                 elif reader not in self.ticks and ticking is not None:
                     self._arrivals.append(Grid(ticking.start + line.delay, ticking.period))
-        pages = {page.time for page in scenario.pages}
-        self.events = sorted(pages.union(_events(system, scenario.inputs)))
+        pages = (page.time for page in scenario.pages)
+        self.events = sorted(dict.fromkeys((*pages, *_events(system, scenario.inputs))))
         self._require_bounded(scenario)
 
     @property
