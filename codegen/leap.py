@@ -10,8 +10,11 @@ guard changed, the step is gone through from where it began.
 from __future__ import annotations
 
 import dataclasses
+import itertools
+import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Literal
 
 from codegen.way import LEFT, PLACE, NotPlain, Way
@@ -29,7 +32,25 @@ ENTRIES = ("init", "derive", "step")
 LEAP, DONE, RECORD, STARTED = "leap", "memory.is_leapt", "record", "memory.started"
 THROUGH = "through_events"
 END = "work.end_"
+Numbers = tuple[tuple[str, int], ...]
+MOST_STAYS = 12
+"""Modes of chart and regions together that have a leap each: more are too much C."""
 UNDONE = (Assign(DONE, Value(False)),)
+
+
+@dataclass(frozen=True)
+class Stay:
+    """Where an automaton stays in a step: its modes, as the `numbers` of the variables that hold
+    them; `title` is the block of such a step.
+    """
+
+    title: str
+    numbers: Numbers
+
+    @property
+    def known(self) -> dict[str, Expr]:
+        """What the variables are."""
+        return {variable: Value(number) for variable, number in self.numbers}
 
 
 def leaping(program: Program, leaps: Leaps = "on") -> Program:
@@ -55,14 +76,15 @@ def _stepping(program: Program, leaps: Leaps) -> Program:
             return program
     first = tuple(op for op in flow if op == Run(RECORD))
     flow = tuple(op for op in flow if op != Run(RECORD))
-    ways = dict(_ways(program, flow, leaps))
+    stays = list(stays_of(program, LEAP)) if leaps == "anew" else _of_modes(program.modes, LEAP)
+    ways = dict(_ways(program, flow, leaps, stays))
     once = (*first, Run(LEAP))
-    if _are_sure(ways, program.modes):
+    if _are_sure(ways, stays):
         step: Block = (Branch(started, once, (*enter, *rest)),)
     else:
         step = (*UNDONE, Branch(started, once), *_else(THROUGH))
     whole = (Branch(started, flow, enter), *rest)
-    return _with_leaps(program, LEAP, MODE, ways, {"step": step, THROUGH: whole})
+    return _with_leaps(program, LEAP, ways, {"step": step, THROUGH: whole})
 
 
 def _running(program: Program) -> Program:
@@ -71,12 +93,14 @@ def _running(program: Program) -> Program:
     for name, block in program.blocks.items():
         if _is_through(block):
             mode = name.removeprefix("run_")
-            ways = dict(_run_ways(program, block, program.blocks.get(f"equations_{mode}", ())))
             leap, through = f"{LEAP}_{mode}", f"{THROUGH}_{mode}"
+            stays = _of_modes(program.run_modes, leap, RUN_MODE)
+            equations = program.blocks.get(f"equations_{mode}", ())
+            ways = dict(_run_ways(program, block, equations, stays))
             once: Block = (Run(leap),)
-            if not _are_sure(ways, program.run_modes):
+            if not _are_sure(ways, stays):
                 once = (*UNDONE, *once, *_else(through))
-            made = _with_leaps(made, leap, RUN_MODE, ways, {name: once, through: block})
+            made = _with_leaps(made, leap, ways, {name: once, through: block})
     return made
 
 
@@ -84,9 +108,24 @@ def _else(through: str) -> Block:
     return (Branch(Unary("not", Ref(DONE)), (Run(through),)),)
 
 
-def _are_sure(ways: Mapping[int, Way], modes: Sequence[ModeInfo]) -> bool:
-    """Tell whether no mode has a guard."""
-    return all(mode.number in ways and ways[mode.number].is_sure for mode in modes)
+def stays_of(program: Program, leap: str) -> Iterator[Stay]:
+    """Yield the modes of a chart; with regions beside it each with each, unless these are many."""
+    names = program.mode_variables()
+    found = [_of_modes(program.modes_of(region), "", names[region]) for region in names]
+    if program.regions and math.prod(map(len, found)) > MOST_STAYS:
+        return
+    for stays in itertools.product(*found):
+        numbers = tuple(pair for stay in stays for pair in stay.numbers)
+        yield Stay(leap + "".join(stay.title for stay in stays), numbers)
+
+
+def _of_modes(modes: Sequence[ModeInfo], leap: str, variable: str = MODE) -> list[Stay]:
+    return [Stay(f"{leap}_{mode.name}", ((variable, mode.number),)) for mode in modes]
+
+
+def _are_sure(ways: Mapping[Stay, Way], stays: Sequence[Stay]) -> bool:
+    """Tell whether nothing has a guard, wherever it stays."""
+    return all(stay in ways and ways[stay].is_sure for stay in stays)
 
 
 def _is_through(block: Block) -> bool:
@@ -97,52 +136,55 @@ def _is_through(block: Block) -> bool:
     return False
 
 
-def _run_ways(program: Program, flow: Block, equations: Block) -> Iterator[tuple[int, Way]]:
+def _run_ways(
+    program: Program, flow: Block, equations: Block, stays: Sequence[Stay]
+) -> Iterator[tuple[Stay, Way]]:
     """Yield the way through a tick without a crossing of each mode of the model.
 
     What updates does not count yet when equations are made: then these are computed again.
     """
     updates = [block for name, block in program.blocks.items() if name.startswith("update")]
     is_fixed = not any(name.startswith("state.") for b in updates for name in block_writes(b))
-    for mode in program.run_modes:
-        way = Way(program, {RUN_MODE: Value(mode.number)})
+    for stay in stays:
+        way = Way(program, stay.known)
         try:
             way.keep(equations if is_fixed else (), ("state.", "constant."))
             way.follow(flow)
         except NotPlain:
             continue
-        yield mode.number, way
+        yield stay, way
 
 
-def _ways(program: Program, flow: Block, leaps: Leaps) -> Iterator[tuple[int, Way]]:
-    """Yield the way through a step without a crossing of each mode that has one."""
-    for mode in program.modes:
-        way = Way(program, {MODE: Value(mode.number), STARTED: Value(True)})
-        known = program.blocks.get(f"equations_{mode.name}", ()) if leaps == "on" else ()
+def _ways(
+    program: Program, flow: Block, leaps: Leaps, stays: Sequence[Stay]
+) -> Iterator[tuple[Stay, Way]]:
+    """Yield the way through a step without a crossing of each stay that has one."""
+    for stay in stays:
+        way = Way(program, stay.known | {STARTED: Value(True)})
+        mode = stay.title.removeprefix(f"{LEAP}_")
+        known = program.blocks.get(f"equations_{mode}", ()) if leaps == "on" else ()
         try:
             way.keep(known, ("state.", "constant.", "before."))
             way.follow(flow)
             way.end()
         except NotPlain:
             continue
-        yield mode.number, way
+        yield stay, way
 
 
 def _with_leaps(
-    program: Program, leap: str, mode: str, ways: Mapping[int, Way], changed: Mapping[str, Block]
+    program: Program, leap: str, ways: Mapping[Stay, Way], changed: Mapping[str, Block]
 ) -> Program:
-    """Return a Program with a block `leap` by the mode that a variable tells, and changed blocks.
+    """Return a Program with a block `leap` by the modes that variables tell, and changed blocks.
 
-    The same Program where no mode has a way, or where a block is called like that already.
+    The same Program where nothing has a way, or where a block is called like that already.
     """
-    modes = program.modes if mode == MODE else program.run_modes
-    titles = {info.number: f"{leap}_{info.name}" for info in modes}
-    if not ways or {leap, *titles.values()} & set(program.blocks):
+    if not ways or {leap, *(stay.title for stay in ways)} & set(program.blocks):
         return program
     tells = DONE in reads(changed.values())
-    done = {number: _needed(_block(way, tells)) for number, way in ways.items()}
-    blocks = {titles[number]: _named(done[number], way) for number, way in ways.items()}
-    cases = tuple((number, (Run(titles[number]),)) for number in ways)
+    done = {stay: _needed(_block(way, tells)) for stay, way in ways.items()}
+    blocks = {stay.title: _named(done[stay], way) for stay, way in ways.items()}
+    chosen = _chosen([(stay.numbers, stay.title) for stay in ways])
     made: dict[str, Variable] = {}
     used = reads(blocks.values())
     for way in ways.values():
@@ -153,8 +195,20 @@ def _with_leaps(
         *(v for v in program.variables if v.name not in made),
         *made.values(),
     )
-    blocks = {**program.blocks, **blocks, leap: (Choose(mode, cases),), **changed}
+    blocks = {**program.blocks, **blocks, leap: chosen, **changed}
     return finished(dataclasses.replace(program, blocks=blocks, variables=variables), ENTRIES)
+
+
+def _chosen(titles: Sequence[tuple[Numbers, str]]) -> Block:
+    """Return what runs the block of the modes that variables tell, one variable in another."""
+    ((numbers, title), *_) = titles
+    if not numbers:
+        return (Run(title),)
+    inner: dict[int, list[tuple[Numbers, str]]] = {}
+    for ((_, number), *rest), one in titles:
+        inner.setdefault(number, []).append((tuple(rest), one))
+    cases = tuple((number, _chosen(some)) for number, some in inner.items())
+    return (Choose(numbers[0][0], cases),)
 
 
 def _block(way: Way, tells: bool) -> Block:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.build import FLAGS, compile_program, compiler, compiler_version
+from codegen.build import compile_program, compiler, compiler_version, optimised
 from codegen.cache import key_of, stored
 from codegen.harness import tunable
 from codegen.kalman_gains import MOST_SAMPLES, kalman_gains
@@ -29,11 +29,12 @@ from language.program import Program, short
 
 Reals = NDArray[np.float64]
 LIBRARY_FLAGS = (
-    *FLAGS,
+    *optimised("O1"),
     *("-fno-semantic-interposition", "-shared", "-fPIC", "-w", "-Dvolatile="),
 )
-"""One file, so that all is inlined; a diagnosis takes 0.86 of the time that it takes with -Og. No
-calibration tool writes into the page of a predictor: not volatile, a step takes 0.7 of the time."""
+"""One file, so that all is inlined. Recordings are followed as soon as with -O2, which compiles for
+a tenth longer. No calibration tool writes into the page of a predictor: not volatile, a step takes
+0.7 of the time."""
 SHARED = 3
 """Dimensions of steady gains that all points have in common: (modes, states, seen)."""
 MATHEMATICS = re.compile(r"ha_mathf?\.c")
@@ -172,8 +173,8 @@ class Predictor:
         """
         samples = len(recorded.inputs)
         whole = Prediction(
-            np.full((samples, len(self.seen)), np.nan),
-            np.full((samples, len(self.seen)), np.nan),
+            np.empty((samples, len(self.seen))),
+            np.empty((samples, len(self.seen))),
             np.empty((samples, len(self.states))),
             np.zeros(samples, dtype=np.int16),
             samples,
@@ -181,6 +182,8 @@ class Predictor:
         done = np.empty(len(pages), dtype=np.int64)
         told = (whole.innovations, whole.seen, whole.states, whole.modes, done)
         self._follow(pages, 1, recorded, (first_gains, gains), substeps, told)
+        for part in _lost(recorded.starts, done):
+            whole.innovations[part] = whole.seen[part] = np.nan
         squares, counts = self.squares(whole.innovations, recorded, limits)
         return Runs(whole, recorded.starts, done, squares, counts)
 
@@ -198,10 +201,13 @@ class Predictor:
         recordings). The other arrays are those of `predict`; gains may be by points as well.
         """
         points = len(pages)
-        innovations = np.full((points, len(recorded.inputs), len(self.seen)), np.nan)
+        innovations = np.empty((points, len(recorded.inputs), len(self.seen)))
         done = np.empty(pages.shape[:2], dtype=np.int64)
         told = (innovations, None, None, None, done)
         self._follow(pages, points, recorded, (first_gains, gains), substeps, told)
+        for one, here in zip(innovations, done, strict=True):
+            for part in _lost(recorded.starts, here):
+                one[part] = np.nan
         return innovations, done
 
     def squares(self, innovations: Reals, recorded: Recorded, limits: Reals) -> tuple[Reals, Reals]:
@@ -234,6 +240,12 @@ class Predictor:
             *(_at(starts), _at(linear), substeps),
             *(None if a is None else _at(a) for a in told),
         )
+
+
+def _lost(starts: NDArray[np.int64], done: NDArray[np.int64]) -> list[slice]:
+    """Return the samples behind the one in which each run that was not done left all bounds."""
+    ends = zip(starts[:-1].tolist(), starts[1:].tolist(), done.tolist(), strict=True)
+    return [slice(low + count + 1, high) for low, high, count in ends if low + count < high]
 
 
 def _at(values: NDArray[Any]) -> int:

@@ -13,14 +13,14 @@ from typing import Any
 
 from codegen.abreast import LANES, Kind, Lanes, NotAbreast, flat
 from codegen.expression import LIBRARY
-from codegen.leap import DONE, LEAP, RECORD, THROUGH, leaping
+from codegen.leap import DONE, LEAP, RECORD, THROUGH, Stay, leaping, stays_of
 from codegen.member import PAGE as MODULE_PAGE
 from codegen.names import CNames, c_member
 from codegen.source import c_program, module_context, stepped
 from codegen.statement import wrapped
 from language.functions import FUNCTIONS
 from language.operation import Assign, Binary, Block, Branch, Call, Expr, Op, Ref, Select
-from language.program import ModeInfo, Program
+from language.program import MODE, Program
 from language.substitution import with_expressions, with_parts
 from language.traversal import block_writes, parts
 
@@ -29,7 +29,7 @@ PAGE = ("derived.", "calibration.")
 REAL_OF = "real_of "
 """Before the name of a whole number: that as a real."""
 WIDTH = 96
-OVER_VECTORS = ("abs", "min", "max", "clip", "sign", "pow2")
+OVER_VECTORS = ("abs", "min", "max", "clip", "floor", "sign", "pow2")
 """Operations that the template has for all lanes at once."""
 TRUTH: Mapping[Kind, str] = {"real": "Reals", "truth": "Truths"}
 
@@ -39,7 +39,7 @@ def tracks(program: Program, columns: tuple[str, ...], seen: tuple[str, ...]) ->
 
     `columns` are the states, `seen` the outputs that are compared.
     """
-    if program.number != "float64" or len(program.mode_variables()) != 1:
+    if program.number != "float64":
         return None
     made = leaping(stepped(program), "anew")
     records = _records(program) if RECORD in made.blocks else {"record": ""}
@@ -55,7 +55,7 @@ def tracks(program: Program, columns: tuple[str, ...], seen: tuple[str, ...]) ->
     kinds |= {REAL_OF + name: "real" for name, kind in types.items() if kind == "whole"}
     fixed = frozenset(name for name in kinds if name.startswith("constant."))
     lanes = Lanes(made, kinds, fixed)
-    leaps = _together([leap for mode in made.modes for leap in _leaps(lanes, mode)])
+    leaps = _together([leap for stay in stays_of(made, LEAP) for leap in _leaps(lanes, stay)])
     try:
         return _context(lanes, leaps, columns, seen) | records if leaps else None
     except NotAbreast:
@@ -94,11 +94,16 @@ def _context(
     page = [name for name in lanes.touched if name.startswith(PAGE)]
     recorded = set(block_writes(lanes.program.blocks.get(RECORD, ())))
     functions = dict(reversed(list(_functions(lanes))))
+    held = [name for name in lanes.program.mode_variables().values() if name != MODE]
+    beside = [(_holder(name), "whole", CNames(lanes.program)(name)) for name in held]
     return {
         "lanes": LANES,
-        "members": [(flat(name), TRUTH[kind]) for name, kind in lanes.touched.items()],
+        "members": [
+            *((flat(name), TRUTH[kind]) for name, kind in lanes.touched.items()),
+            *((member, TRUTH["truth"]) for member, _, _ in beside),
+        ],
         "page": _places(lanes, page),
-        "read": _places(lanes, kept),
+        "read": _places(lanes, kept) + beside,
         "written": _places(lanes, own),
         "recorded": _places(lanes, [n for n in kept if n.removeprefix(REAL_OF) in recorded]),
         "inputs": [(flat(f"input.{n}"), flat(f"before.{n}"), _kind(lanes, n), n) for n in inputs],
@@ -114,6 +119,11 @@ def _context(
     }
 
 
+def _holder(variable: str) -> str:
+    """Return the member that holds the modes of a chart or a region."""
+    return variable.removeprefix("memory.")
+
+
 def _kind(lanes: Lanes, name: str) -> Kind:
     return lanes.kind(Ref(f"input.{name}"))
 
@@ -126,11 +136,11 @@ def _places(lanes: Lanes, names: list[str]) -> list[tuple[str, Kind, str]]:
 
 @dataclass
 class _Leap:
-    """The step of modes, by their numbers and names, in `values`: name, kind and text of each. The
-    lanes of which `quiet` is true end at `ends`.
+    """The step of modes, by where lanes are in them and what they are called, in `values`: name,
+    kind and text of each. The lanes of which `quiet` is true end at `ends`.
     """
 
-    modes: dict[int, str]
+    modes: dict[str, str]
     values: list[tuple[str, Kind, str]] = field(default_factory=list)
     quiet: list[str] = field(default_factory=list)
     ends: dict[str, str] = field(default_factory=dict)
@@ -168,7 +178,7 @@ def _is_alike(first: _Leap, second: _Leap) -> bool:
 
 def _joined(first: _Leap, second: _Leap) -> _Leap:
     """Return the step of the modes of two, each lane with the truths of its own mode."""
-    there = " | ".join(f"(all->mode == {number})" for number in second.modes)
+    there = " | ".join(second.modes)
     values = [
         (name, kind, text if text == other else f"CHOSEN_TRUTH({there}, {other}, {text})")
         for (name, kind, text), (_, _, other) in zip(first.values, second.values, strict=True)
@@ -180,14 +190,16 @@ def _chooser(kind: Kind) -> str:
     return "CHOSEN" if kind == "real" else "CHOSEN_TRUTH"
 
 
-def _leaps(lanes: Lanes, mode: ModeInfo) -> Iterator[_Leap]:
-    """Yield the step of a mode over vectors, if it has one that is arithmetic of reals."""
-    block = lanes.program.blocks.get(f"{LEAP}_{mode.name}")
+def _leaps(lanes: Lanes, stay: Stay) -> Iterator[_Leap]:
+    """Yield the step of a stay over vectors, if it has one that is arithmetic of reals."""
+    block = lanes.program.blocks.get(stay.title)
     if block is None:
         return
     block = with_expressions(block, _real)
     lanes.named.clear()
-    leap, touched = _Leap({mode.number: c_member(f"mode.{mode.name}")}), dict(lanes.touched)
+    held = [f"(all->{_holder(name)} == {number})" for name, number in stay.numbers]
+    here = f"({' & '.join(held)})" if held[1:] else held[0]
+    leap, touched = _Leap({here: stay.title.removeprefix(f"{LEAP}_")}), dict(lanes.touched)
     try:
         _follow(lanes, leap, block)
     except NotAbreast:

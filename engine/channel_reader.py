@@ -7,7 +7,9 @@ import math
 import re
 from collections.abc import Sequence
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, lru_cache
+
+import numpy as np
 
 from engine.recorded_csv import DECIMAL
 from engine.recorded_file import MAX_PROBLEMS, RecordedFile, Samples
@@ -21,6 +23,8 @@ LATEST_TIME = 10**12
 STAMP = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)"
 STAMPS = re.compile(rf"(?:{STAMP}\n)*+{STAMP}", re.ASCII)
 """Numbers without an exponent alone, one a line: most columns of time are such."""
+MOST_KEPT = 2**16
+"""Time stamps that are kept: recordings of one logger have the same ones."""
 TENS = [10**k for k in range(LONGEST_STAMP + 1)]
 OTHER_WORDS = {
     "Nm": "N*m", "1/min": "rpm", "U/min": "rpm", "r/min": "rpm", "kph": "km/h", "m/s2": "m/s^2",
@@ -129,10 +133,10 @@ class ChannelReader:
         kept: list[float] = []
         scale = float(column.scale[0]) * column.sign
         means = cells[0] if len(cells) == 1 else _means(cells)
-        if stamps is self.clock and self.whole and not column.delay and None not in means:
-            values = tuple(mean * scale for mean in means if mean is not None)
-            if len(values) == len(self.whole) and all(map(math.isfinite, values)):
-                return self.whole, values
+        if stamps is self.clock and len(self.whole) == len(means) > 0 and not column.delay:
+            values = _scaled(means, scale)
+            if values is not None:
+                return self.whole, tuple(values)
         for k, (stamp, mean) in enumerate(zip(stamps, means, strict=False)):
             if mean is None:
                 continue
@@ -155,10 +159,9 @@ class ChannelReader:
     def _values(self, name: str, samples: Samples, column: Column) -> list[float | None]:
         factor, offset = float(column.unit.factor), float(column.unit.offset)
         self._check_unit(name, samples.unit, column)
-        if None not in samples.values and not self.is_full:
-            plain = [value for value in samples.values if value is not None]
-            if all(map(math.isfinite, plain)):
-                return [value * factor + offset for value in plain]
+        plain = None if self.is_full else _scaled(samples.values, factor, offset)
+        if plain is not None:
+            return [*plain]
         found: list[float | None] = []
         for k, value in enumerate(samples.values):
             if self.is_full:
@@ -194,6 +197,16 @@ def file_unit(written: str) -> Unit | None:
         return None
 
 
+def _scaled(
+    values: Sequence[float | None], factor: float, offset: float | None = None
+) -> list[float] | None:
+    """Return values scaled, all at once; None where there is one that is none or is not finite."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        known = np.array(values, dtype=np.float64)
+        found = known * factor if offset is None else known * factor + offset
+    return found.tolist() if np.isfinite(known).all() and np.isfinite(found).all() else None
+
+
 def _means(columns: Sequence[Sequence[float | None]]) -> list[float | None]:
     """Return the mean of each row; None where one has no value."""
     found: list[float | None] = []
@@ -214,9 +227,14 @@ def _plain(samples: Samples) -> list[Fraction] | None:
     texts = [samples.text(k) for k in range(len(numbers))]
     if not STAMPS.fullmatch("\n".join(texts)) or max(map(len, texts)) > LONGEST_STAMP:
         return None
-    parts = [text.partition(".") for text in texts]
-    found = [Fraction(int(whole + part), TENS[len(part)]) for whole, _, part in parts]
+    found = [_stamp(text) for text in texts]
     return found if max(-found[0], found[-1]) < LATEST_TIME else None
+
+
+@lru_cache(MOST_KEPT)
+def _stamp(text: str) -> Fraction:
+    whole, _, part = text.partition(".")
+    return Fraction(int(whole + part), TENS[len(part)])
 
 
 def _exact(text: str) -> Fraction | None:

@@ -8,6 +8,8 @@ import io
 import math
 import re
 import zlib
+from contextlib import suppress
+from functools import cached_property
 from pathlib import Path
 
 from engine.recorded_file import MAX_BYTES, MAX_PROBLEMS, RecordedFile, Samples
@@ -17,8 +19,8 @@ from language.project import shown
 DECIMAL = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,3})?", re.ASCII)
 """A number: longer ones, and words such as `nan`, are none."""
 
-PLAIN = re.compile(rf"(?:{DECIMAL.pattern}\n)*+{DECIMAL.pattern}", re.ASCII)
-"""Numbers alone, one a line: most columns are such."""
+PLAIN = b"+-.0123456789"
+"""What most numbers are made of: where `float` takes such a text, it is a number."""
 LONGEST_PLAIN = 100_000
 """A line that is shorter has no cell that is too long for a CSV reader."""
 
@@ -69,8 +71,26 @@ class _Rows:
     def __init__(self, source: Source, problems: Problems) -> None:
         self.source = source
         self.head: list[str] = []
-        self.rows: list[tuple[int, list[str]]] = []
-        for number, line in enumerate(source.lines, start=1):
+        self.numbers: list[int] = []
+        self.rows: list[list[str]] = []
+        if len(problems.found) >= MAX_PROBLEMS or not self._take_plain():
+            self._take_each(problems)
+
+    def _take_plain(self) -> bool:
+        """Take all rows at once where none has quotes and all as many cells; tell whether so."""
+        lines = self.source.lines
+        if '"' in "".join(lines) or max(map(len, lines)) >= LONGEST_PLAIN:
+            return False
+        numbers = [number for number, line in enumerate(lines, start=1) if line.strip()]
+        rows = [lines[number - 1].split(",") for number in numbers]
+        if len(set(map(len, rows))) > 1:
+            return False
+        self.head = [cell.strip() for cell in rows[0]]
+        self.numbers, self.rows = numbers[1:], rows[1:]
+        return True
+
+    def _take_each(self, problems: Problems) -> None:
+        for number, line in enumerate(self.source.lines, start=1):
             if not line.strip():
                 continue
             row = self._cells_of(number, line, problems)
@@ -79,9 +99,10 @@ class _Rows:
             elif len(row) != len(self.head):
                 label = f"this row has {len(row)} cells, the head line has {len(self.head)}"
                 hint = "a recording is separated by commas, with decimal points"
-                problems.error("row", Span(source, number, 1, len(line)), label, hint)
+                problems.error("row", Span(self.source, number, 1, len(line)), label, hint)
             else:
-                self.rows.append((number, row))
+                self.numbers.append(number)
+                self.rows.append(row)
             if len(problems.found) >= MAX_PROBLEMS:
                 break
 
@@ -94,13 +115,18 @@ class _Rows:
             problems.error("row", Span(self.source, number, 1, len(line)), f"not CSV: {error}")
             return [""] * len(self.head)
 
+    @cached_property
+    def columns(self) -> list[tuple[str, ...]]:
+        """The cells of each column."""
+        return list(zip(*self.rows, strict=True)) or [()] * len(self.head)
+
     def samples(self, name: str) -> Samples:
         """Return the cells of a column."""
         position = self.head.index(name)
-        texts = [row[position].strip() for _, row in self.rows]
+        texts = list(map(str.strip, self.columns[position]))
 
         def place(k: int) -> Span:
-            line, row = self.rows[k]
+            line, row = self.numbers[k], self.rows[k]
             column = 1 + sum(len(cell) + 1 for cell in row[:position])
             return Span(self.source, line, column, max(1, len(row[position])))
 
@@ -109,8 +135,9 @@ class _Rows:
 
 def _numbers(texts: list[str]) -> list[float | None]:
     """Return the number of each cell, None for an empty one, NaN for what is none."""
-    if PLAIN.fullmatch("\n".join(texts)):
-        return [float(text) for text in texts]
+    with suppress(ValueError):
+        if not "".join(texts).encode().translate(None, PLAIN):
+            return list(map(float, texts))
     return [_number(text) for text in texts]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections import OrderedDict
 from collections.abc import Iterator
 
 from language.operation import (
@@ -29,6 +30,11 @@ from language.operation import (
 from language.program import Program
 
 INDENT = "    "
+MOST_KEPT = 16
+"""Programs whose digests are kept, the latest ones: they are asked for before each run."""
+
+_kept: OrderedDict[int, tuple[Program, str]] = OrderedDict()
+"""By identity: what is kept holds its Program, so no other one has it meanwhile."""
 
 
 def program_text(program: Program) -> str:
@@ -38,6 +44,14 @@ def program_text(program: Program) -> str:
 
 def digest(program: Program) -> str:
     """Return the first 16 hexadecimal digits of the SHA-256 of the program's text."""
+    known = _kept.pop(id(program), None) or (program, _digest(program))
+    _kept[id(program)] = known
+    if len(_kept) > MOST_KEPT:
+        _kept.popitem(last=False)
+    return known[1]
+
+
+def _digest(program: Program) -> str:
     return hashlib.sha256(program_text(program).encode()).hexdigest()[:16]
 
 

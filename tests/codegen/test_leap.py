@@ -109,6 +109,20 @@ def test_an_automaton_without_guards_has_no_general_path() -> None:
     assert compare(taped(made, inputs())).is_equal
 
 
+@pytest.mark.parametrize(("count", "wanted"), [(1, 6), (2, 0)])
+def test_regions_leap_together_with_the_chart_unless_there_are_too_many(
+    count: int, wanted: int
+) -> None:
+    """Of a predictor, each mode with each: two of the chart and three of each region."""
+    text = CART.format(number="float64", method="rk4", when="gap <= 0 m", wait="")
+    modes = "low: {transitions: {high: {when: x > 0.9 m}}}, high: {}, idle: {}"
+    beside = ", ".join(f"r{k}: {{initial: low, modes: {{{modes}}}}}" for k in range(count))
+    made = program(text.replace("initial: free", f"regions: {{{beside}}}\ninitial: free"))
+    blocks = leaping(stepped(made), "anew").blocks
+    assert sum(name.startswith("leap_") for name in blocks) == wanted
+    assert not leaps(made)
+
+
 def test_what_a_page_may_have_turned_is_computed_again() -> None:
     """`drag` reads a tunable parameter."""
     block = leaping(stepped(cart())).blocks["leap_free"]

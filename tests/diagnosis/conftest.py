@@ -21,7 +21,7 @@ from tests.language.making import ROOT
 
 SCHEMA = json.loads((ROOT / "spec" / "verdict.schema.json").read_text("utf-8"))
 VALIDATOR = jsonschema.Draft7Validator(SCHEMA)
-SOON = tuple("-Og" if flag == "-O2" else flag for flag in predictor.LIBRARY_FLAGS)
+SOON = tuple("-Og" if flag.startswith("-O") else flag for flag in predictor.LIBRARY_FLAGS)
 """Flags under which a test compiles and follows its short recordings in the least time."""
 
 

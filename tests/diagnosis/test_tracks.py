@@ -36,7 +36,7 @@ FIRST = 20
 LAID = {
     "": True,
     "actuator_delay@T_em": True,
-    "backlash@half_shaft": False,
+    "backlash@half_shaft": True,
     "actuator_lag@T_em": True,
     "coulomb_friction@w_em": True,
     "mount_compliance@half_shaft": True,
@@ -45,6 +45,7 @@ LAID = {
     "stiffness_hysteresis@half_shaft": True,
     "torque_ripple@T_em": True,
     "tyre_slip@vehicle": True,
+    "unequal_half_shafts@half_shaft": True,
 }
 """Effects on the blind driveline: whether recordings go side by side."""
 
