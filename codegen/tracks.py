@@ -20,7 +20,7 @@ from codegen.source import c_program, module_context, stepped
 from codegen.statement import wrapped
 from language.functions import FUNCTIONS
 from language.operation import Assign, Binary, Block, Branch, Call, Expr, Op, Ref, Select
-from language.program import MODE, Program
+from language.program import MODE, Program, short
 from language.substitution import with_expressions, with_parts
 from language.traversal import block_writes, parts
 
@@ -79,30 +79,24 @@ def _context(
     lanes.named.clear()
     wires = {wire.name: wire.source for wire in lanes.program.outputs}
     states = [lanes.member(f"state.{name}") for name in columns]
-    inputs = [short for v in lanes.program.inputs for short in (v.name.partition(".")[2],)]
+    inputs = [short(variable.name) for variable in lanes.program.inputs]
     for name in inputs:
         lanes.member(f"input.{name}")
         lanes.member(f"before.{name}")
-    looks = [lanes.member(wires[name]) for name in seen]
-    if any(name.startswith("work.") for name in lanes.touched) or any(
-        lanes.kind(Ref(wires[name])) != "real" for name in seen
-    ):
-        raise NotAbreast
+    looks = _looks(lanes, [wires[name] for name in seen])
     written = {name for leap in leaps for name in leap.ends}
     kept = [name for name in lanes.touched if not name.startswith((*PAGE, "input."))]
     own = [n for n in kept if n in written or n.startswith(("state.", "before."))]
-    page = [name for name in lanes.touched if name.startswith(PAGE)]
     recorded = set(block_writes(lanes.program.blocks.get(RECORD, ())))
     functions = dict(reversed(list(_functions(lanes))))
-    held = [name for name in lanes.program.mode_variables().values() if name != MODE]
-    beside = [(_holder(name), "whole", CNames(lanes.program)(name)) for name in held]
+    beside = _modes_beside(lanes.program)
     return {
         "lanes": LANES,
         "members": [
             *((flat(name), TRUTH[kind]) for name, kind in lanes.touched.items()),
             *((member, TRUTH["truth"]) for member, _, _ in beside),
         ],
-        "page": _places(lanes, page),
+        "page": _places(lanes, [name for name in lanes.touched if name.startswith(PAGE)]),
         "read": _places(lanes, kept) + beside,
         "written": _places(lanes, own),
         "recorded": _places(lanes, [n for n in kept if n.removeprefix(REAL_OF) in recorded]),
@@ -119,9 +113,19 @@ def _context(
     }
 
 
-def _holder(variable: str) -> str:
-    """Return the member that holds the modes of a chart or a region."""
-    return variable.removeprefix("memory.")
+def _looks(lanes: Lanes, names: list[str]) -> list[str]:
+    """Return the members of what is compared. Raises NotAbreast unless these are lasting reals."""
+    looks = [lanes.member(name) for name in names]
+    are_real = all(lanes.kind(Ref(name)) == "real" for name in names)
+    if not are_real or any(name.startswith("work.") for name in lanes.touched):
+        raise NotAbreast
+    return looks
+
+
+def _modes_beside(program: Program) -> list[tuple[str, str, str]]:
+    """Return the members that hold the modes of regions, as `_places` does."""
+    held = [name for name in program.mode_variables().values() if name != MODE]
+    return [(short(name), "whole", CNames(program)(name)) for name in held]
 
 
 def _kind(lanes: Lanes, name: str) -> Kind:
@@ -197,7 +201,7 @@ def _leaps(lanes: Lanes, stay: Stay) -> Iterator[_Leap]:
         return
     block = with_expressions(block, _real)
     lanes.named.clear()
-    held = [f"(all->{_holder(name)} == {number})" for name, number in stay.numbers]
+    held = [f"(all->{short(name)} == {number})" for name, number in stay.numbers]
     here = f"({' & '.join(held)})" if held[1:] else held[0]
     leap, touched = _Leap({here: stay.title.removeprefix(f"{LEAP}_")}), dict(lanes.touched)
     try:
