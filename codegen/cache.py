@@ -56,6 +56,16 @@ def cache_fault(folder: Path) -> str:
     return ""
 
 
+def own_folder(part: str) -> Path | None:
+    """Return the folder inside the cache where others than programs are kept; None without one."""
+    with suppress(OSError, RuntimeError):
+        folder = cache_folder()
+        own = folder / part
+        if not cache_fault(folder) and not cache_fault(own):
+            return own
+    return None
+
+
 def key_of(
     sources: Sequence[Path],
     command: Sequence[str],

@@ -53,6 +53,7 @@ def turned(estimate: Estimate, series: Sequence[Series]) -> Estimate:
         trials = [best.copy() for _ in uncertain[k].starts]
         for trial, start in zip(trials, uncertain[k].starts, strict=True):
             trial[:, k] = uncertain[k].coordinate(start)
+        trials = [trial for trial in trials if not np.array_equal(trial, best)]
         points = [Point(estimate.point.shared, trial) for trial in trials]
         for trial, there in zip(trials, innovations_at(estimate, series, points), strict=True):
             each = np.sum(there.squares / variances, axis=1)

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from codegen.cache import cache_fault, cache_folder
+from codegen.cache import own_folder
 from diagnosis.bench import Bench
 from diagnosis.candidate import candidate
 from diagnosis.estimate import Estimate
@@ -176,12 +176,8 @@ def _best(gains: Gains) -> str:
 
 def _file(key: str) -> Path | None:
     """Return where replicates are kept; None where there is no folder of the user's own."""
-    with suppress(OSError, RuntimeError):
-        folder = cache_folder()
-        own = folder / "thresholds"
-        if not cache_fault(folder) and not cache_fault(own):
-            return own / f"{key}.json"
-    return None
+    folder = own_folder("thresholds")
+    return folder / f"{key}.json" if folder else None
 
 
 def _known(file: Path | None) -> list[Gains]:

@@ -41,12 +41,12 @@ class Candidate:
     predictor: Predictor
     levels: tuple[Uncertain, ...] = ()
 
-    @property
+    @cached_property
     def uncertain(self) -> tuple[Uncertain, ...]:
         """What a fit may move: parameters, behind them levels."""
         return self.recipe.uncertain + self.levels
 
-    @property
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """The names of the uncertain parameters."""
         return tuple(one.name for one in self.uncertain)
@@ -56,10 +56,26 @@ class Candidate:
         """The states that drift."""
         return self.recipe.drifts
 
-    @property
+    @cached_property
     def spans(self) -> Reals:
         """The width of the range of each state (states,), 1 where it has none."""
         return np.array(self.recipe.spans)
+
+    @cached_property
+    def brought(self) -> NDArray[np.bool_]:
+        """Which states effects have brought (states,)."""
+        return np.array(self.recipe.brought, dtype=np.bool_)
+
+    @cached_property
+    def own(self) -> NDArray[np.bool_]:
+        """Which parameters each recording has of its own (parameters,)."""
+        return np.array([one.per_recording for one in self.uncertain], dtype=np.bool_)
+
+    @cached_property
+    def bounds(self) -> Reals:
+        """The ranges as coordinates (parameters, 2)."""
+        ranges = [one.bounds for one in self.uncertain]
+        return np.array(ranges, dtype=np.float64).reshape(-1, 2)
 
     def page(self, values: Mapping[str, float], series: Series) -> Reals:
         """Return the calibration for one recording: values, and where its states start."""
@@ -75,9 +91,10 @@ class Candidate:
         width = len(self._known)
         found = np.array([row[:width] for row in rows])
         found = np.repeat(found, len(values), axis=0) if alike else found
-        for column, place in self._starts:
-            begun = first[:, column]
-            found[:, place] = np.where(np.isfinite(begun), begun, found[:, place])
+        columns, places = self._starts
+        begun = first[:, columns]
+        known = np.isfinite(begun)
+        found[:, places] = begun if known.all() else np.where(known, begun, found[:, places])
         return found
 
     @cached_property
@@ -85,11 +102,13 @@ class Candidate:
         return dict(self.predictor.page)
 
     @cached_property
-    def _starts(self) -> list[tuple[int, int]]:
+    def _starts(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """The columns of compared signals, and of the page where each one's state starts."""
         places = {name: place for place, name in enumerate(self.predictor.page)}
         fresh = [(k, START.format(name)) for k, name in enumerate(self.predictor.seen)]
-        return [(k, places[name]) for k, name in fresh if name in places]
+        known = [(k, places[name]) for k, name in fresh if name in places]
+        columns, starts = np.array(known, dtype=np.intp).reshape(-1, 2).T
+        return columns, starts
 
 
 def candidate(

@@ -74,9 +74,9 @@ def left_over(bench: Bench, selection: Selection, units: Mapping[str, float]) ->
     most, model = 0.0, selection.model
     if is_still(selection, units):
         return most
-    for path in {place_path(tried.layer) for tried in selection.accepted}:
+    paths = [place_path(tried.layer).partition(".") for tried in selection.accepted]
+    for path in {acting(bench, section, place) for section, _, place in paths}:
         section, _, place = path.partition(".")
-        section, _, place = acting(bench, section, place).partition(".")
         try:
             excess = excess_at(bench, model, section, place)
         except SpecError:

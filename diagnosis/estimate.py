@@ -35,7 +35,8 @@ class Estimate:
     """A candidate at a point: cost [nats] with priors, and how it foresees the recordings.
 
     `normal` are the normal equations of the last round, None before the first, and `columns` what
-    they were made from.
+    they were made from. `in_vain` are the columns of a model near it with which steps of screening
+    were sought from here, and led nowhere.
     """
 
     candidate: Candidate
@@ -46,6 +47,7 @@ class Estimate:
     noises: Noises = field(repr=False)
     normal: Normal | None = field(default=None, repr=False)
     columns: Columns = field(default_factory=dict, repr=False)
+    in_vain: Columns | None = field(default=None, repr=False)
 
     @property
     def likelihood(self) -> float:
@@ -171,6 +173,4 @@ def seen_at(estimate: Estimate, series: Sequence[Series], point: Point) -> Estim
     """Return an estimate at a point for some recordings, with the gains that it has."""
     outcome = outcome_at(estimate, series, point)
     cost = outcome.cost() + point.prior(estimate.candidate)
-    return dataclasses.replace(
-        estimate, point=point, cost=cost, outcome=outcome, normal=None, columns={}
-    )
+    return Estimate(estimate.candidate, point, cost, outcome, estimate.gains, estimate.noises)

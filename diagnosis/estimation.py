@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -63,7 +64,7 @@ def estimated(
 
     `known` are slopes of the candidate near the start, if there are such.
     """
-    return completed(followed(candidate, series, noises, start, rounds, known), series, rounds)
+    return completed(led(candidate, series, noises, start, rounds, known), series, rounds)
 
 
 def followed(
@@ -79,9 +80,36 @@ def followed(
 
     A model `like` it may tell where the modes are at the start.
     """
+    return _walked_from(candidate, series, noises, start, rounds, known, like).ended(series)
+
+
+def led(
+    candidate: Candidate,
+    series: Sequence[Series],
+    noises: Noises,
+    start: Mapping[str, float] | Point,
+    rounds: int = MOST_ROUNDS,
+    known: Columns | None = None,
+    like: Estimate | None = None,
+) -> Estimate:
+    """Return what `followed` does, without slopes at its end: those are looked for anew."""
+    return _walked_from(candidate, series, noises, start, rounds, known, like).there
+
+
+def _walked_from(
+    candidate: Candidate,
+    series: Sequence[Series],
+    noises: Noises,
+    start: Mapping[str, float] | Point,
+    rounds: int,
+    known: Columns | None,
+    like: Estimate | None,
+) -> _Walk:
     point = start if isinstance(start, Point) else point_of(candidate, len(series), start)
     now = looked_like(candidate, series, noises, point, like)
-    return _walked(with_normal(now, series, known), series, rounds) if _is_known(now) else now
+    if not _is_known(now):
+        return _Walk(now)
+    return _walked(with_normal(now, series, known), series, rounds)
 
 
 def completed(now: Estimate, series: Sequence[Series], rounds: int = MOST_ROUNDS) -> Estimate:
@@ -91,9 +119,9 @@ def completed(now: Estimate, series: Sequence[Series], rounds: int = MOST_ROUNDS
     for _ in range(COMPLETIONS):
         now = with_normal(now, series)
         further = _walked(now, series, rounds, least=ENOUGH)
-        if now.cost - further.cost < WORTH_ANEW:
-            return further
-        now = further
+        if now.cost - further.there.cost < WORTH_ANEW:
+            return further.ended(series)
+        now = further.there
     return with_normal(now, series)
 
 
@@ -101,22 +129,36 @@ def _is_known(now: Estimate) -> bool:
     return bool(np.isfinite(now.cost))
 
 
+@dataclass(frozen=True)
+class _Walk:
+    """Where steps led: `there`, and the ends of the last one, along which slopes are to be carried
+    to it; None where it has them.
+    """
+
+    there: Estimate
+    step: tuple[Estimate, Estimate] | None = None
+
+    def ended(self, series: Sequence[Series]) -> Estimate:
+        """Return where the steps led, with its slopes."""
+        return _moved(*self.step, self.there, series) if self.step else self.there
+
+
 def _walked(
     now: Estimate, series: Sequence[Series], rounds: int, least: float = ENOUGH_CARRIED
-) -> Estimate:
+) -> _Walk:
     """Return where steps lead until one gains less than the `least` [nats]."""
-    damping = FIRST_DAMPING
+    damping, walk = FIRST_DAMPING, _Walk(now)
     for _ in range(rounds):
+        now = walk.ended(series)
         better, damping = improved(now, series, damping)
         if better is None:
-            return now
-        gained = now.cost - better.cost
+            return _Walk(now)
         renewed = looked_at(now.candidate, series, better.noises, better.point, better.outcome)
         best = renewed if renewed.cost < better.cost + ENOUGH else better
-        now = _moved(now, better, best, series)
-        if gained < least:
-            return now
-    return now
+        walk = _Walk(best, (now, better))
+        if now.cost - better.cost < least:
+            break
+    return walk
 
 
 def _moved(
@@ -137,14 +179,16 @@ def reached(estimate: Estimate, series: Sequence[Series], known: Columns, rounds
     Slopes of what the other model has not are looked for at each step: carried ones did not find
     unequal shafts, which begin far from where they fit.
     """
-    if not _is_known(estimate):
+    if not _is_known(estimate) or estimate.in_vain is known:
         return estimate
     now, damping = estimate, FIRST_DAMPING
     early = ROUNDS_OF_ONE if len(series) == 1 else SCREENED_ROUNDS
     for done in range(1, rounds + 1):
+        least_damping = damping
         better, damping = improved(with_normal(now, series, known), series, damping, least=LITTLE)
         if better is None:
-            break
+            is_all = least_damping <= FIRST_DAMPING
+            return dataclasses.replace(now, in_vain=known) if is_all else now
         gained, now = now.cost - better.cost, better
         late = LATE_PART * (estimate.cost - now.cost) if done >= early else 0.0
         if gained < max(WORTH_A_ROUND, late):

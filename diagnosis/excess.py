@@ -81,7 +81,7 @@ def _answer(
 ) -> tuple[Reals, ...]:
     """Return how the innovations fall where some values act, of each recording."""
     size = float(np.sqrt(np.mean(np.concatenate(values) ** 2))) or 1.0
-    after = probe.innovations(probe.run([one * (PART / size) for one in values]))
+    after = probe.missed([one * (PART / size) for one in values])
     moved = [(a - b) * (size / PART) for a, b in zip(before, after, strict=True)]
     return weigh.flat(moved)
 

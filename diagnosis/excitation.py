@@ -148,14 +148,13 @@ def _steps(times: Values, values: Values, span: float, floor: float) -> list[flo
         return []
     later = np.minimum(np.searchsorted(times, times + STEP_TIME), len(times) - 1)
     change = values[later] - values
-    found, k = [], 0
-    while k < len(change):
-        if abs(change[k]) > max(STEP_SIZE * span, 6.0 * floor):
-            inside = slice(k, later[k] + 1)
-            found.append(float(change[inside][np.argmax(np.abs(change[inside]))]))
-            k = int(later[k]) + int(later[k] - k) + 1
-        else:
-            k += 1
+    large = np.flatnonzero(np.abs(change) > max(STEP_SIZE * span, 6.0 * floor))
+    found, free = [], 0
+    for k in large.tolist():
+        if k >= free:
+            inside = change[k : later[k] + 1]
+            found.append(float(inside[np.argmax(np.abs(inside))]))
+            free = 2 * int(later[k]) - k + 1
     return found
 
 

@@ -10,20 +10,16 @@ from numpy.typing import NDArray
 
 from diagnosis.candidate import Candidate
 from diagnosis.joined import burnt
-from diagnosis.linear import Linear, linearised
+from diagnosis.linear import Linear
+from diagnosis.modes import models_of
 from diagnosis.prediction import Gains, Noises, Outcome
 from diagnosis.series import Series
 
 Reals = NDArray[np.float64]
-Wholes = NDArray[np.int64]
-SHORT_STAY = 5
-"""Samples: a mode that is left sooner has the gain of the mode that lasts longest."""
 START_PART = 0.01
 """Standard deviation of a state at the start, as a part of its range."""
 KEPT = 0.999
 """Part of itself that an integral keeps over a sample, and what decays does not."""
-SMALL = 1e-5
-"""Change of a state for a difference, as a part of its range."""
 MODEL_NOISE = 1e-7
 """Process noise of every state per sample, as a part of its range: no gain is ever quite 0."""
 
@@ -82,26 +78,20 @@ def locals_of(
 ) -> dict[int, Local]:
     """Return a candidate at `values` near where `outcome` saw each mode, the longest stay first.
 
+    Its process noise is that of the inputs, of the drifts, and next to none of what is unsure.
     Delays are left out of it: what is shown late would seem to know nothing of the states.
     """
     prompt = dict.fromkeys(candidate.recipe.delays, 0.0)
     page = candidate.page({**values, **prompt}, series[0])
-    found = {}
-    for mode, point in points_of(candidate, series, outcome).items():
-        linear = near(candidate, page, mode, point.states, point.inputs)
-        if linear is not None:
-            unsure = np.where(_turns(candidate, linear), 0.0, candidate.spans)
-            q = _process_noise(candidate, linear, noises, float(series[0].period), unsure)
-            found[mode] = Local(linear, q, START_PART * unsure, point.stay)
+    pushed, found = np.diag(noises.inputs**2), {}
+    moved = _drift_noise(candidate, noises, float(series[0].period))
+    for mode, (linear, stay) in models_of(candidate, series, page, outcome).items():
+        unsure = np.where(_turns(candidate, linear), 0.0, candidate.spans)
+        q = linear.b @ pushed @ linear.b.T + np.diag((MODEL_NOISE * unsure) ** 2)
+        for place, variance in moved.items():
+            q[place, place] = variance
+        found[mode] = Local(linear, q, START_PART * unsure, stay)
     return found
-
-
-def near(
-    candidate: Candidate, page: Reals, mode: int, states: Reals, inputs: Reals
-) -> Linear | None:
-    """Return a candidate over one sample, linearised in a mode near a point; None if unstable."""
-    substeps, sizes = candidate.recipe.substeps, SMALL * candidate.spans
-    return linearised(candidate.predictor, page, mode, substeps, states, inputs, sizes)
 
 
 def _turns(candidate: Candidate, linear: Linear) -> NDArray[np.bool_]:
@@ -109,83 +99,15 @@ def _turns(candidate: Candidate, linear: Linear) -> NDArray[np.bool_]:
 
     What such a one shows changes its sign as it turns: a gain made at one angle would be wrong.
     """
-    keeps = np.diag(linear.phi) > KEPT
-    return np.asarray(keeps & np.array(candidate.recipe.brought), dtype=np.bool_)
+    keeps = linear.phi.diagonal() > KEPT
+    return np.asarray(keeps & candidate.brought, dtype=np.bool_)
 
 
-def _process_noise(
-    candidate: Candidate, linear: Linear, noises: Noises, period: float, unsure: Reals
-) -> Reals:
-    """Return Q: the noise of the inputs, of the drifts, and next to none of what is `unsure`."""
-    q = linear.b @ np.diag(noises.inputs**2) @ linear.b.T
-    q = q + np.diag((MODEL_NOISE * unsure) ** 2)
-    for name, memory in zip(candidate.drifts, candidate.recipe.memories, strict=True):
-        place = candidate.predictor.states.index(name)
-        kept = np.exp(-period / memory)
-        q[place, place] = noises.drifts.get(name, 0.0) ** 2 * (1.0 - kept**2)
-    return q
-
-
-@dataclass(frozen=True)
-class Seen:
-    """Where a mode was seen: `states` and `inputs` there, and the usual `stay` in it [samples]."""
-
-    states: Reals
-    inputs: Reals
-    stay: int
-
-
-def points_of(
-    candidate: Candidate, series: Sequence[Series], outcome: Outcome | None
-) -> dict[int, Seen]:
-    """Return where each mode was seen, in its longest stay; the mode with the longest first.
-
-    Where the first compared signal is largest: friction is steep near rest alone.
-    """
-    if outcome is None:
-        return _first_seen(candidate, series[0])
+def _drift_noise(candidate: Candidate, noises: Noises, period: float) -> dict[int, float]:
+    """Return the process noise of each state that drifts, by its place."""
     found = {}
-    lows, highs, modes, of = _stays(outcome)
-    for mode in np.unique(modes).tolist():
-        here = np.flatnonzero(modes == mode)
-        lengths = highs[here] - lows[here]
-        best = here[np.argmax(lengths)]
-        if np.max(lengths) >= SHORT_STAY:
-            one, states = series[of[best]], outcome.predictions[of[best]].states
-            k = _away(one.measured, int(lows[best]), int(highs[best]))
-            usual = max(1, round(float(np.median(lengths))))
-            found[mode] = int(np.max(lengths)), Seen(states[k].copy(), one.inputs[k].copy(), usual)
-    ordered = sorted(found.items(), key=lambda item: -item[1][0])
-    return {mode: seen for mode, (_, seen) in ordered}
-
-
-def _stays(outcome: Outcome) -> tuple[Wholes, Wholes, Wholes, Wholes]:
-    """Return the first sample of each stay in a mode, the one behind it, its mode and recording."""
-    found = []
-    for r, run in enumerate(outcome.predictions):
-        modes = run.modes[: run.done]
-        edges = np.flatnonzero(modes[1:] != modes[:-1]) + 1
-        if len(modes):
-            lows, highs = np.append(0, edges), np.append(edges, len(modes))
-            found.append((lows, highs, modes[lows], np.full(len(lows), r)))
-    none = np.zeros(0, dtype=np.int64)
-    whole = [np.concatenate(parts) for parts in zip(*found, strict=True)] if found else [none] * 4
-    return whole[0], whole[1], whole[2], whole[3]
-
-
-def _first_seen(candidate: Candidate, series: Series) -> dict[int, Seen]:
-    """Return where a recording starts."""
-    predictor = candidate.predictor
-    page = candidate.page({}, series)
-    none = np.zeros((len(predictor.modes), len(predictor.states), len(predictor.seen)))
-    short, measured = series.inputs[:2].copy(), series.measured[:2].copy()
-    run = predictor.predict(page, short, measured, none[:0], none, candidate.recipe.substeps, False)
-    return {int(run.modes[0]): Seen(run.states[0].copy(), short[0], 1)}
-
-
-def _away(measured: Reals, low: int, high: int) -> int:
-    """Return the sample of a stay, not near its ends, at which the first signal is largest."""
-    margin = (high - low) // 5
-    inner = np.abs(measured[low + margin : high - margin, 0])
-    known = np.where(np.isfinite(inner), inner, -1.0)
-    return low + margin + int(np.argmax(known)) if len(known) else (low + high) // 2
+    for name, memory in zip(candidate.drifts, candidate.recipe.memories, strict=True):
+        kept = np.exp(-period / memory)
+        place = candidate.predictor.states.index(name)
+        found[place] = noises.drifts.get(name, 0.0) ** 2 * (1.0 - kept**2)
+    return found

@@ -18,6 +18,7 @@ from diagnosis.series import shows_inputs
 from language.continuous import step_limits
 from language.document import Document, Scalar, Table
 from language.effect import Effect, Laying, read_effect
+from language.known import entries_of
 from language.laying import lay_effect
 from language.load import automaton_of, program_of
 from language.memory import applications, applies
@@ -33,6 +34,8 @@ WALKS = ("constant_or_random_walk",)
 """Forms of an effect's parameter that may change along a recording."""
 SECONDS = parse_unit("s").dimension.powers
 KINDS = ("balance", "element", "output")
+SECTIONS = {"flow": "balance", "inputs": "input", "elements": "element", "outputs": "output"}
+"""The kind of place that the names of a section are."""
 LONGEST_STEP = Fraction(5, 1000)
 """Longest major step [s] of a prediction; events inside it are located."""
 STABLE_PART = Fraction(1, 2)
@@ -100,9 +103,11 @@ def drift(kind: str, place: str) -> Layer:
 
 def fitting(document: Document, effect: Effect) -> tuple[Layer, ...]:
     """Return an effect at every place of an automaton where it can be laid."""
-    places = _places(document)
+    root, kinds = document.root, {fit.kind for fit in effect.fits}
     fits = [
-        name for name in places if not isinstance(place_of(document.root, effect, name), Misfit)
+        name
+        for name, own in _places(document).items()
+        if own & kinds and not isinstance(place_of(root, effect, name), Misfit)
     ]
     return tuple(Layer(effect, name, name) for name in fits)
 
@@ -193,11 +198,15 @@ def _scaled(given: Automaton, names: Sequence[str], factor: Fraction) -> Automat
     return dataclasses.replace(given, parameters=parameters)
 
 
-def _places(document: Document) -> list[str]:
-    """Return what effects may be laid on: balances, inputs, outputs and elements, each once."""
-    found: list[str] = []
-    for section in ("flow", "inputs", "elements", "outputs"):
+def _places(document: Document) -> dict[str, set[str]]:
+    """Return what effects may be laid on, with the kinds of place that each could be."""
+    found: dict[str, set[str]] = {}
+    for section, kind in SECTIONS.items():
         node = document.root.get(section)
-        found += [entry.key for entry in getattr(node, "entries", {}).values()]
-        found += [item.text for item in getattr(node, "nodes", ()) if hasattr(item, "text")]
-    return list(dict.fromkeys(found))
+        names = [entry.key for entry in getattr(node, "entries", {}).values()]
+        names += [item.text for item in getattr(node, "nodes", ()) if hasattr(item, "text")]
+        for name in names:
+            found.setdefault(name, set()).add(kind)
+    for name, _ in entries_of(document.root, "flow"):
+        found.get(name, set()).add("balance")
+    return found

@@ -13,8 +13,8 @@ import numpy as np
 
 from diagnosis.candidate import Candidate
 from diagnosis.estimate import Estimate, looked_at
-from diagnosis.estimation import followed
-from diagnosis.gains import near, points_of
+from diagnosis.estimation import led
+from diagnosis.modes import near, points_of
 from diagnosis.point import Point
 from diagnosis.prediction import Noises, noises_of
 from diagnosis.series import Series
@@ -127,7 +127,7 @@ def settled(
 
     `columns` are slopes of the candidate near the start, `like` a model near it, if there are such.
     """
-    now = followed(candidate, series, noises, start, known=columns, like=like)
+    now = led(candidate, series, noises, start, known=columns, like=like)
     return tuned(levelled(now, series, units), series, units)
 
 

@@ -21,7 +21,7 @@ from diagnosis.estimate import Estimate, looked_at
 from diagnosis.finding import Finding
 from diagnosis.level import units_of
 from diagnosis.point import point_of
-from diagnosis.prediction import noises_of, predicted
+from diagnosis.prediction import foreseen_at, noises_of
 from diagnosis.series import Reals, Series, compared, paced, pieces_of, require_one_pace
 from engine.recording import Recording
 from language.document import Document
@@ -195,15 +195,23 @@ def _followed(candidate: Candidate, series: Sequence[Series]) -> Estimate:
 def _costs(model: Estimate, series: Sequence[Series]) -> Reals:
     """Return the negative log likelihood [nats] of the quick part of each recording."""
     values, found = [model.values(0)] * len(series), []
-    outcome = predicted(model.candidate, series, values, model.gains, model.noises.limits)
-    for one, run, missed, counts in zip(
-        series, outcome.predictions, outcome.innovations, outcome.runs.counts, strict=True
+    (there,) = foreseen_at(model.candidate, series, [values], model.gains, model.noises.limits)
+    for one, done, missed, counts in zip(
+        series, there.done.tolist(), there.each, there.counts, strict=True
     ):
         quick = _quick(missed, float(one.period))
-        spread = np.log(np.maximum(np.nanmean(quick**2, axis=0), 1e-300))
-        whole = run.done == one.count
+        spread = np.log(np.maximum(_means(quick**2), 1e-300))
+        whole = done == one.count
         found.append(float(np.sum(0.5 * counts * spread)) if whole else np.inf)
     return np.array(found)
+
+
+def _means(squares: Reals) -> Reals:
+    """Return the mean of what is known of each column."""
+    if np.isnan(squares).any():
+        return np.asarray(np.nanmean(squares, axis=0), dtype=np.float64)
+    found: Reals = squares.sum(axis=0) / len(squares)
+    return found
 
 
 def _quick(innovations: Reals, period: float) -> Reals:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,8 @@ from diagnosis.prediction import Outcome
 from diagnosis.slopes import Columns
 
 Reals = NDArray[np.float64]
+Sums = tuple[Reals, Reals]
+"""J'J (n, n) and J'e (n,) of some blocks."""
 
 
 @dataclass(frozen=True)
@@ -33,6 +36,19 @@ class Normal:
         """Return the equations of the other folds."""
         kept = self.fold != fold
         return Normal(self.a[kept], self.g[kept], self.own, self.of[kept], self.fold[kept])
+
+    @cached_property
+    def whole(self) -> Sums:
+        """The sums over all blocks."""
+        return self.a.sum(axis=0), self.g.sum(axis=0)
+
+    @cached_property
+    def each(self) -> dict[int, Sums]:
+        """The sums over the blocks of each recording; none without coordinates of its own."""
+        if not self.own.any():
+            return {}
+        here = {int(r): self.of == r for r in np.unique(self.of)}
+        return {r: (self.a[of].sum(axis=0), self.g[of].sum(axis=0)) for r, of in here.items()}
 
 
 def normal_of(candidate: Candidate, outcome: Outcome, columns: Columns) -> Normal:
@@ -95,23 +111,23 @@ def foreseen(candidate: Candidate, now: Point, normal: Normal, there: Point) -> 
 
 def _solved(point: Point, normal: Normal, damping: float, held: NDArray[np.bool_]) -> Point:
     """Solve for a step: coordinates of one recording are eliminated before the shared ones."""
-    own, free = normal.own, ~normal.own & ~held
-    matrix = np.eye(int(free.sum())) + normal.a.sum(axis=0)[np.ix_(free, free)]
-    right = -point.shared[free] - normal.g.sum(axis=0)[free]
+    own, free = np.flatnonzero(normal.own), np.flatnonzero(~normal.own & ~held)
+    among = free[:, None], free
+    matrix = np.eye(len(free)) + normal.whole[0][among]
+    right = -point.shared[free] - normal.whole[1][free]
     parts: dict[int, tuple[Reals, Reals, Reals]] = {}
-    for r in np.unique(normal.of) if np.any(own) else ():
-        a, g = normal.a[normal.of == r].sum(axis=0), normal.g[normal.of == r].sum(axis=0)
-        inner = a[np.ix_(own, own)]
-        inner = inner + np.eye(len(inner)) + damping * np.diag(np.diag(inner))
-        cross, rest = a[np.ix_(free, own)], -g[own] - point.own[r, own]
+    for r, (a, g) in normal.each.items():
+        inner = a[own[:, None], own]
+        inner = inner + np.eye(len(inner)) + damping * np.diag(inner.diagonal())
+        cross, rest = a[free[:, None], own], -g[own] - point.own[r, own]
         solved = solution(inner, np.column_stack([cross.T, rest]))
         matrix = matrix - cross @ solved[:, :-1]
         right = right - cross @ solved[:, -1]
-        parts[int(r)] = (inner, cross, rest)
-    matrix = matrix + damping * np.diag(np.maximum(np.diag(matrix), 1e-12))
-    shared = np.zeros(len(own))
+        parts[r] = (inner, cross, rest)
+    matrix = matrix + damping * np.diag(np.maximum(matrix.diagonal(), 1e-12))
+    shared = np.zeros(normal.own.shape)
     shared[free] = solution(matrix, right)
-    each = np.zeros((len(point.own), len(own)))
+    each = np.zeros((len(point.own), len(shared)))
     for r, (inner, cross, rest) in parts.items():
         each[r, own] = solution(inner, rest - cross.T @ shared[free])
     return Point(shared, each)

@@ -25,7 +25,7 @@ class Point:
 
     def moved(self, candidate: Candidate, k: int, size: float) -> Point:
         """Return a point with one coordinate moved, down where up is out of its range."""
-        _, high = candidate.uncertain[k].bounds
+        high = bounds_of(candidate)[k, 1]
         size = size if self.shared[k] + size <= high else -size
         shared, own = self.shared.copy(), self.own.copy()
         shared[k] += size
@@ -35,7 +35,7 @@ class Point:
     def prior(self, candidate: Candidate) -> float:
         """Return half the squares of the coordinates that count [nats]."""
         own = is_own(candidate)
-        return 0.5 * float(np.sum(self.shared[~own] ** 2) + np.sum(self.own[:, own] ** 2))
+        return 0.5 * float((self.shared[~own] ** 2).sum() + (self.own[:, own] ** 2).sum())
 
 
 def point_of(candidate: Candidate, recordings: int, start: Mapping[str, float]) -> Point:
@@ -90,9 +90,9 @@ def all_values_at(candidate: Candidate, point: Point) -> list[dict[str, float]]:
 
 def is_own(candidate: Candidate) -> NDArray[np.bool_]:
     """Return which parameters each recording has of its own (parameters,)."""
-    return np.array([one.per_recording for one in candidate.uncertain], dtype=bool)
+    return candidate.own
 
 
 def bounds_of(candidate: Candidate) -> Reals:
     """Return the ranges as coordinates (parameters, 2)."""
-    return np.array([one.bounds for one in candidate.uncertain], dtype=float).reshape(-1, 2)
+    return candidate.bounds

@@ -9,7 +9,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -89,9 +89,7 @@ class Outcome:
     @cached_property
     def parts(self) -> list[slice]:
         """Where the innovations of each recording are among the joined ones."""
-        lengths = np.maximum(np.diff(self.runs.starts) - self.skips, 0)
-        edges = [0, *np.cumsum(lengths).tolist()]
-        return [slice(low, high) for low, high in pairwise(edges)]
+        return [slice(low, high) for low, high in pairwise(self._edges)]
 
     @property
     def innovations(self) -> tuple[Reals, ...]:
@@ -101,18 +99,20 @@ class Outcome:
     @cached_property
     def blocks(self) -> list[Block]:
         """The recordings, each cut into `FOLDS` blocks."""
-        found = []
-        for r, whole in enumerate(self.parts):
-            edges = np.linspace(0, whole.stop - whole.start, FOLDS + 1).astype(int) + whole.start
-            parts = [slice(low, high) for low, high in pairwise(edges.tolist())]
-            found += [Block(r, (r + k) % FOLDS, part) for k, part in enumerate(parts)]
-        return found
+        return _blocks(self._edges)
+
+    @property
+    def _edges(self) -> tuple[int, ...]:
+        """Where each recording begins among the joined innovations, and where the last one ends."""
+        starts = self.runs.starts
+        lengths = np.maximum(starts[1:] - starts[:-1] - self.skips, 0)
+        return 0, *np.cumsum(lengths).tolist()
 
     def cost(self) -> float:
         """Return sum over channels of N/2 log(mean square), the negative log likelihood [nats]."""
         if not self.is_whole:
             return np.inf
-        return float(np.sum(0.5 * self.counts * np.log(self.variances)))
+        return float((0.5 * self.counts * np.log(self.variances)).sum())
 
     @cached_property
     def squares(self) -> Reals:
@@ -140,9 +140,12 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Innovations:
-    """What was not foreseen of recordings at a point: `whole` (samples, seen) by a predictor."""
+    """What was not foreseen of recordings at a point: `whole` (samples, seen) by a predictor, which
+    has `done` so many samples of each recording before a value left all bounds.
+    """
 
     whole: Reals
+    done: NDArray[np.int64]
     recorded: Recorded
     limits: Reals
     predictor: Predictor
@@ -152,10 +155,24 @@ class Innovations:
         """The innovations behind the burn-in of each recording (n, seen), as in an Outcome."""
         return _counted(self.whole, self.recorded.starts, self.recorded.skips)
 
-    @cached_property
+    @property
+    def each(self) -> tuple[Reals, ...]:
+        """The innovations of each recording behind its burn-in, (samples, seen) each."""
+        return tuple(_each_counted(self.whole, self.recorded.starts, self.recorded.skips))
+
+    @property
     def squares(self) -> Reals:
         """The sums of the squares that count (recordings, seen)."""
-        return self.predictor.squares(self.whole, self.recorded, self.limits)[0]
+        return self._sums[0]
+
+    @property
+    def counts(self) -> Reals:
+        """How many innovations of each recording each channel has (recordings, seen)."""
+        return self._sums[1]
+
+    @cached_property
+    def _sums(self) -> tuple[Reals, Reals]:
+        return self.predictor.squares(self.whole, self.recorded, self.limits)
 
 
 def noises_of(series: Sequence[Series], drifts: Mapping[str, float]) -> Noises:
@@ -198,7 +215,7 @@ def predicted(
         candidate.recipe.substeps,
         limits,
     )
-    whole = bool(np.array_equal(runs.done, np.diff(recorded.starts)))
+    whole = bool(np.all(runs.done == recorded.starts[1:] - recorded.starts[:-1]))
     return Outcome(runs, recorded.skips, limits, whole)
 
 
@@ -215,14 +232,14 @@ def foreseen_at(
     """
     together = joined(series)
     recorded, predictor = together.recorded, candidate.predictor
-    found, _ = predictor.predict_points(
+    runs = predictor.predict_points(
         np.array([candidate.pages(one, together.first) for one in values]),
         recorded,
         gains.first,
         gains.steady,
         candidate.recipe.substeps,
     )
-    return [Innovations(one, recorded, limits, predictor) for one in found]
+    return [Innovations(*run, recorded, limits, predictor) for run in zip(*runs, strict=True)]
 
 
 def foreseen_with(
@@ -241,20 +258,36 @@ def foreseen_with(
     pages, found = candidate.pages(values, together.first), dict[int, Innovations]()
     for count in {len(one.first) for one in gains}:
         alike = [k for k, one in enumerate(gains) if len(one.first) == count]
-        runs, _ = predictor.predict_points(
+        runs = predictor.predict_points(
             np.repeat(pages[np.newaxis], len(alike), axis=0),
             recorded,
             np.array([gains[k].first for k in alike]),
             np.array([gains[k].steady for k in alike]),
             candidate.recipe.substeps,
         )
-        found |= {
-            k: Innovations(r, recorded, limits, predictor) for k, r in zip(alike, runs, strict=True)
-        }
+        for k, run in zip(alike, zip(*runs, strict=True), strict=True):
+            found[k] = Innovations(*run, recorded, limits, predictor)
     return [found[k] for k in range(len(gains))]
+
+
+@lru_cache
+def _blocks(edges: tuple[int, ...]) -> list[Block]:
+    """Return recordings with such edges, each cut into `FOLDS` blocks."""
+    found = []
+    for r, (start, stop) in enumerate(pairwise(edges)):
+        cuts = np.linspace(0, stop - start, FOLDS + 1).astype(int) + start
+        parts = [slice(low, high) for low, high in pairwise(cuts.tolist())]
+        found += [Block(r, (r + k) % FOLDS, part) for k, part in enumerate(parts)]
+    return found
 
 
 def _counted(innovations: Reals, starts: NDArray[np.int64], skips: NDArray[np.int64]) -> Reals:
     """Return the innovations of all recordings behind their burn-in, one after the other."""
+    return np.concatenate(_each_counted(innovations, starts, skips))
+
+
+def _each_counted(
+    innovations: Reals, starts: NDArray[np.int64], skips: NDArray[np.int64]
+) -> list[Reals]:
     edges = zip((starts[:-1] + skips).tolist(), starts[1:].tolist(), strict=True)
-    return np.concatenate([innovations[low:high] for low, high in edges])
+    return [innovations[low:high] for low, high in edges]

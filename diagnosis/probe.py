@@ -9,15 +9,17 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.runs import Prediction
+from codegen.runs import Prediction, Recorded
 from diagnosis.bench import Bench
 from diagnosis.candidate import Candidate, candidate
 from diagnosis.estimate import Estimate
-from diagnosis.joined import burnt
+from diagnosis.joined import burnt, joined
 from diagnosis.layers import DRIFT, Layer, drift
 from diagnosis.scale import KINDS
 from diagnosis.series import Series
@@ -43,33 +45,48 @@ class Probe:
     first: Reals = field(repr=False)
     steady: Reals = field(repr=False)
 
-    def run(self, disturbance: Sequence[Reals]) -> list[Prediction]:
+    def run(self, disturbance: Sequence[Reals]) -> tuple[Prediction, ...]:
         """Return the predictions of all recordings under a disturbance (samples,) of each."""
-        found = []
-        for k, (one, values) in enumerate(zip(self.series, disturbance, strict=True)):
-            nothing = np.full((one.count, len(self.torques)), np.nan)
-            shown = np.ascontiguousarray(np.column_stack([one.measured, nothing, values]))
-            page = self.candidate.page(
-                self.model.values(k), dataclasses.replace(one, measured=shown)
-            )
-            found.append(
-                self.candidate.predictor.predict(
-                    page,
-                    one.inputs,
-                    shown,
-                    self.first,
-                    self.steady,
-                    self.candidate.recipe.substeps,
-                    one.is_linear,
-                )
-            )
-        return found
+        pages, recorded = self._disturbed(disturbance)
+        predictor, substeps = self.candidate.predictor, self.candidate.recipe.substeps
+        limits = np.full(len(predictor.seen), np.inf)
+        runs = predictor.predict_all(pages, recorded, self.first, self.steady, substeps, limits)
+        return runs.each()
+
+    def missed(self, disturbance: Sequence[Reals]) -> list[Reals]:
+        """Return the innovations of such predictions, of which nothing else is told."""
+        pages, recorded = self._disturbed(disturbance)
+        predictor, substeps = self.candidate.predictor, self.candidate.recipe.substeps
+        runs = predictor.predict_points(
+            pages[np.newaxis], recorded, self.first, self.steady, substeps
+        )
+        edges = pairwise(recorded.starts.tolist())
+        return self._counted([runs[0][0][low:high] for low, high in edges])
+
+    def _disturbed(self, disturbance: Sequence[Reals]) -> tuple[Reals, Recorded]:
+        """Return the page of each recording and the recordings, with a disturbance measured."""
+        together, candidate = joined(self.series), self.candidate
+        recorded, seen = together.recorded, candidate.predictor.seen
+        nothing = np.full((len(recorded.inputs), len(self.torques)), np.nan)
+        shown = np.column_stack([recorded.measured, nothing, np.concatenate(disturbance)])
+        first = np.full((len(self.series), len(seen)), np.nan)
+        first[:, : together.first.shape[1]] = together.first
+        first[:, -1] = [values[np.argmax(np.isfinite(values))] for values in disturbance]
+        given = dataclasses.replace(recorded, measured=np.ascontiguousarray(shown))
+        return candidate.pages(self._values, first), given
+
+    @cached_property
+    def _values(self) -> list[dict[str, float]]:
+        return [self.model.values(k) for k in range(len(self.series))]
 
     def innovations(self, predictions: Sequence[Prediction]) -> list[Reals]:
         """Return the innovations of the compared signals behind the burn-in."""
+        return self._counted([one.innovations for one in predictions])
+
+    def _counted(self, innovations: Sequence[Reals]) -> list[Reals]:
         seen = len(self.model.candidate.predictor.seen)
         skip = burnt(self.series[0])
-        return [one.innovations[skip:, :seen] for one in predictions]
+        return [one[skip:, :seen] for one in innovations]
 
 
 def probe_of(bench: Bench, section: str, place: str, model: Estimate) -> Probe:

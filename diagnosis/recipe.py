@@ -22,7 +22,7 @@ from typing import Any
 import codegen
 import diagnosis
 import language
-from codegen.cache import cache_fault, cache_folder
+from codegen.cache import own_folder
 from codegen.predictor import Columns
 from diagnosis.uncertain import Uncertain
 from language.document import Items, Node, Scalar, Table
@@ -86,13 +86,7 @@ def kept(key: str, make: Callable[[], tuple[Recipe, bytes]]) -> tuple[Recipe, Pa
 @cache
 def _folder() -> Path:
     """The user's own folder of candidates; one for this process alone where there is none."""
-    with suppress(OSError, RuntimeError):
-        folder = cache_folder()
-        if not cache_fault(folder):
-            own = folder / "candidates"
-            if not cache_fault(own):
-                return own
-    return Path(tempfile.mkdtemp(prefix="modewright-"))
+    return own_folder("candidates") or Path(tempfile.mkdtemp(prefix="modewright-"))
 
 
 @cache

@@ -14,7 +14,7 @@ from diagnosis.excitation import Excitation, excitation
 from diagnosis.finding import Finding, by_severity
 from diagnosis.free_run import Run, interpreted
 from diagnosis.outlier import outliers, pauses, without_huge
-from diagnosis.reference import Reference
+from diagnosis.reference import reference_of
 from diagnosis.remedy import cured, milliseconds, remedies
 from engine.recording import Recording, pieces
 from language.experiment import RecordingMap
@@ -72,7 +72,7 @@ def check_recordings(
     findings += _too_little(recordings, channels, excited)
     reference = None
     if automaton is not None and automaton.period is None:
-        reference = Reference(automaton, mapping, carry_out)
+        reference = reference_of(automaton, mapping, carry_out)
         findings += [f for one in recordings for f in milliseconds(one, reference)]
     broken = {finding.recording for finding in findings if finding.kind in BROKEN}
     whole = [one for one in recordings if "" not in broken and one.name not in broken]

@@ -85,15 +85,18 @@ def _is_alike(first: Reals, second: Reals) -> bool:
 
 def _far(changes: Reals) -> float:
     """Return the root mean square of what is known of changes; without bound where one is."""
-    known = changes[~np.isnan(changes)]
-    if known.size == 0 or np.max(np.abs(known)) > MOST:
+    is_known = ~np.isnan(changes)
+    known = changes.ravel() if is_known.all() else changes[is_known]
+    if known.size == 0 or max(known.max(), -known.min()) > MOST:
         return np.inf
     return float(np.sqrt(np.mean(known**2)))
 
 
 def _known(changes: Reals) -> Reals:
     """Return changes, 0 where there is none: nothing was seen, or the run left all bounds."""
-    return np.clip(np.where(np.isfinite(changes), changes, 0.0), -MOST, MOST)
+    is_known = np.isfinite(changes)
+    known = changes if is_known.all() else np.where(is_known, changes, 0.0)
+    return np.clip(known, -MOST, MOST)
 
 
 def carried(
@@ -107,7 +110,7 @@ def carried(
     own, names = is_own(candidate), candidate.names
     found = {name: columns[name].copy() for name in names}
     changes = after.joined - before.joined
-    for r, part in enumerate(before.parts):
+    for r, part in enumerate(before.parts if np.any(own) else [slice(None)]):
         moved = np.where(own, step.own[r], step.shared)
         length = float(moved @ moved)
         if length < SHORTEST:

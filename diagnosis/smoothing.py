@@ -196,4 +196,5 @@ def _times(matrices: Reals, vectors: Reals) -> Reals:
 
 
 def _dot(some: Reals, others: Reals) -> Reals:
-    return np.asarray(np.sum(some * others, axis=1), dtype=np.float64)
+    found: Reals = np.add.reduce(some * others, axis=1)
+    return found

@@ -5,7 +5,7 @@ from __future__ import annotations
 import heapq
 import itertools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 
 from language.experiment import Scenario, System
@@ -73,7 +73,7 @@ class Schedule:
                 elif reader not in self.ticks and ticking is not None:
                     self._arrivals.append(Grid(ticking.start + line.delay, ticking.period))
         pages = (page.time for page in scenario.pages)
-        self.events = sorted(dict.fromkeys((*pages, *_events(system, scenario.inputs))))
+        self.events = _in_order([*pages, *_events(system, scenario.inputs)])
         self._require_bounded(scenario)
 
     @property
@@ -110,11 +110,18 @@ class Schedule:
             raise SpecError(problems.found)
 
 
+def _in_order(times: Sequence[Fraction]) -> list[Fraction]:
+    """Return times in their order, each once: as whole numbers of a tick they are soon compared."""
+    bottom = math.lcm(*(time.denominator for time in times))
+    ticks = {time.numerator * (bottom // time.denominator): time for time in times}
+    return [ticks[tick] for tick in sorted(ticks)]
+
+
 def _events(system: System, inputs: Mapping[str, Stimulus]) -> Iterator[Fraction]:
     """Yield when a piece of an input starts, and when that arrives at the end of a line."""
     for name, stimulus in inputs.items():
         delays = [line.delay for line in system.lines.values() if line.source == name]
         for piece in stimulus.pieces:
-            if piece.start > 0:
+            if piece.start.numerator > 0:
                 yield piece.start
             yield from (piece.start + delay for delay in delays if piece.start + delay > 0)

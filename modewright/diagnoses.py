@@ -235,7 +235,7 @@ def _case(
 ) -> tuple[Case, Automaton]:
     project = Project(root or Path())
     document = read_document(project.path_of(spec))
-    automaton = automaton_of(document, project)
+    automaton = checked.automaton or automaton_of(document, project)
     whole = expanded(document, project)
     files = tuple(Path(file) for file in train), tuple(Path(file) for file in held_out)
     candidates = _candidates(effects, project)

@@ -40,11 +40,12 @@ LACKING = ("column", "empty")
 
 @dataclass(frozen=True)
 class CheckedRecordings:
-    """Recordings with what was found of them."""
+    """Recordings with what was found of them, and the automaton of a spec."""
 
     check: RecordingCheck
     mapping: RecordingMap
     recordings: tuple[Recording, ...] = field(repr=False)
+    automaton: Automaton | None = field(default=None, repr=False)
 
     def plot(self, title: str = "") -> Picture:
         """Return a picture of the channels, what they excite and what was found."""
@@ -93,7 +94,7 @@ def check_recordings(
     document = expanded(read_document(project.path_of(spec)), project)
     mistakes = partial(mistakes_of, document, project, automaton, mapping)
     check = _explained(checked(recordings, mapping, automaton, carried_out, mistakes), lacking)
-    return CheckedRecordings(check, mapping, recordings)
+    return CheckedRecordings(check, mapping, recordings, automaton)
 
 
 def held_out_findings(case: Case, automaton: Automaton) -> tuple[str, ...]:

@@ -82,11 +82,11 @@ def base(bench: Bench) -> Estimate:
 @pytest.fixture
 def kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A cache of thresholds of its own, for three replicates."""
-    folder = tmp_path / "cache"
-    folder.mkdir(mode=0o700)
-    monkeypatch.setattr(bootstrap, "cache_folder", lambda: folder)
+    folder = tmp_path / "thresholds"
+    folder.mkdir()
+    monkeypatch.setattr(bootstrap, "own_folder", lambda part: tmp_path / part)
     monkeypatch.setattr(bootstrap, "REPLICATES", 3)
-    yield folder / "thresholds"
+    yield folder
 
 
 def test_the_same_seed_gives_the_same_recordings(bench: Bench, base: Estimate) -> None:

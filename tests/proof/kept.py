@@ -32,6 +32,7 @@ VARIED = (Column("strength", "real", ""), Column("rate", "real", "Hz"))
 MEASURES = (
     Column("verdict", "text", ""),
     Column("cpu", "real", "s"),
+    Column("compiler", "real", "s"),
     Column("wall", "real", "s"),
     Column("sindy", "text", ""),
     Column("free_gain", "text", ""),
@@ -152,7 +153,8 @@ def _row(plan: Plan, cases: Cases, name: str, label: Label, number: int, seed: i
         number=number, variant=plan.name, scenario=name, sample=0, replicate=0, seed=seed,
         values={"strength": plan.strength, "rate": float(label["rate_Hz"])},
         status=DONE if result.verdict else STOPPED, message=result.message,
-        measures={"verdict": result.verdict, "cpu": result.cpu_s, "wall": result.wall_s,
+        measures={"verdict": result.verdict, "cpu": result.cpu_s,
+                  "compiler": result.compiler_s, "wall": result.wall_s,
                   "sindy": result.sindy, "free_gain": result.free_gain},
     )  # fmt: skip
 

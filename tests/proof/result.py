@@ -27,11 +27,13 @@ ALONE = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": str(
 class Result:
     """A verdict as JSON text, empty where there is none; `message` says why. Times in seconds.
 
-    `sindy` and `free_gain` are what simpler methods name (see baseline).
+    `compiler_s` is what the C compiler took of `cpu_s`. `sindy` and `free_gain` are what simpler
+    methods name (see baseline).
     """
 
     verdict: str
     cpu_s: float
+    compiler_s: float
     wall_s: float
     message: str = ""
     sindy: str = ""
@@ -62,12 +64,13 @@ def diagnosed(case: Path, without: tuple[str, ...] = (), is_compared: bool = Tru
                 check=False,
             )
         except subprocess.TimeoutExpired:
-            return Result("", LONGEST, LONGEST, f"no verdict after {LONGEST:g} s")
+            return Result("", LONGEST, 0.0, LONGEST, f"no verdict after {LONGEST:g} s")
         if done.returncode or not found.exists():
             last = done.stderr.strip().splitlines()[-1:]
-            return Result("", 0.0, 0.0, f"exit code {done.returncode}: {' '.join(last)}")
+            return Result("", 0.0, 0.0, 0.0, f"exit code {done.returncode}: {' '.join(last)}")
         kept: dict[str, Any] = json.loads(found.read_text())
-    return Result(json.dumps(kept["verdict"]), kept["cpu_s"], kept["wall_s"], **kept["baselines"])
+    took = (kept[name] for name in ("cpu_s", "compiler_s", "wall_s"))
+    return Result(json.dumps(kept["verdict"]), *took, **kept["baselines"])
 
 
 def _library(folder: Path, without: tuple[str, ...]) -> Path:

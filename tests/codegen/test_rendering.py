@@ -1,0 +1,77 @@
+"""Rendering: templates are compiled once per user, and anew where nothing can be kept."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import jinja2
+import pytest
+
+from codegen import rendering
+from codegen.rendering import COMPILED, render
+
+TEMPLATE = "words_fed.jinja"
+NOTHING: dict[str, list[str]] = {"inputs": []}
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    path = tmp_path / "modewright"
+    monkeypatch.setenv("MODEWRIGHT_CACHE", str(path))
+    rendering._environment.cache_clear()
+    yield path
+    rendering._environment.cache_clear()
+
+
+@pytest.fixture
+def compiled(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The templates that were compiled."""
+    made: list[str] = []
+    real = jinja2.Environment.compile
+
+    def counting(self: jinja2.Environment, source: str, name: str, *more: object) -> object:
+        made.append(name)
+        return real(self, source, name, *more)  # type: ignore[call-overload]
+
+    monkeypatch.setattr(jinja2.Environment, "compile", counting)
+    return made
+
+
+def rendered() -> str:
+    """Return a template filled in as another process would do it."""
+    rendering._environment.cache_clear()
+    return render(TEMPLATE, NOTHING)
+
+
+def test_a_template_is_compiled_once(folder: Path, compiled: list[str]) -> None:
+    assert rendered() == rendered()
+    assert compiled == [TEMPLATE]
+    assert (folder / COMPILED).stat().st_mode & 0o777 == 0o700
+
+
+def test_one_that_is_damaged_is_compiled_anew(folder: Path, compiled: list[str]) -> None:
+    first = rendered()
+    for path in (folder / COMPILED).iterdir():
+        path.write_bytes(path.read_bytes()[:40])
+    assert rendered() == first
+    assert len(compiled) == 2
+
+
+def test_without_a_folder_of_the_users_own_nothing_is_kept(
+    folder: Path, compiled: list[str]
+) -> None:
+    folder.mkdir(mode=0o755)
+    assert rendered() == rendered()
+    assert len(compiled) == 2 and not list(folder.iterdir())
+
+
+def test_a_folder_that_goes_meanwhile_ends_nothing(folder: Path) -> None:
+    first = rendered()
+    rendering._environment.cache_clear()
+    rendering._environment()
+    for path in (folder / COMPILED).iterdir():
+        path.unlink()
+    (folder / COMPILED).rmdir()
+    (folder / COMPILED).write_text("")
+    assert render(TEMPLATE, NOTHING) == first
