@@ -8,6 +8,7 @@ import sys
 from collections import Counter
 from collections.abc import Sequence
 from functools import partial
+from statistics import median
 
 from tests.proof.answer import Answer
 from tests.proof.bar import Bar, bars
@@ -88,7 +89,21 @@ def _beside(every: Sequence[Answer], seed: int) -> list[str]:
     ):
         alarms = f"; false alarms {simpler_alarms(clean, method).text}" if clean else ""
         lines.append(f"{words}: {simpler(full, method).text}{alarms}")
-    return lines
+    return [*lines, _compiled([*full, *clean])]
+
+
+def _compiled(some: Sequence[Answer]) -> str:
+    """Return what the C compiler took of the processor: a model that was made before is kept."""
+    part = sum(one.compiler_s for one in some) / sum(one.cpu_s for one in some)
+    without = median(one.cpu_s - one.compiler_s for one in some if one.plan == "full")
+    return (
+        f"of processor time the C compiler took {part:.0%}, in {sum(map(_is_compiled, some))} of"
+        f" {len(some)} cases; without it the median with an effect is {without:.1f} s"
+    )
+
+
+def _is_compiled(one: Answer) -> bool:
+    return one.compiler_s > 0.1
 
 
 def _wrong(every: Sequence[Answer]) -> list[str]:

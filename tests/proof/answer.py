@@ -14,7 +14,8 @@ BASE = ("J_em", "k", "c", "alpha", "J_v")
 
 @dataclass(frozen=True)
 class Answer:
-    """A label and a verdict (empty where there is none), and the CPU time [s] that it took.
+    """A label and a verdict (empty where there is none), and the CPU time [s] that it took, that of
+    the C compiler counted.
 
     `simpler` is what each simpler method names.
     """
@@ -25,6 +26,7 @@ class Answer:
     verdict: Mapping[str, Any]
     cpu_s: float
     simpler: Mapping[str, str] = field(default_factory=dict)
+    compiler_s: float = 0.0
 
     @property
     def ids(self) -> tuple[str, ...]:

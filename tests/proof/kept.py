@@ -89,7 +89,8 @@ def _store(plan: Plan, seed: int, cases: Cases) -> Store:
 
 def _answer(row: Mapping[str, Any], plan: Plan, label: Label) -> Answer:
     simpler = {name: row[name] for name in ("sindy", "free_gain")}
-    return Answer(row["scenario"], plan.name, label, _verdict(row["verdict"]), row["cpu"], simpler)
+    verdict, took = _verdict(row["verdict"]), row["cpu"]
+    return Answer(row["scenario"], plan.name, label, verdict, took, simpler, row["compiler"])
 
 
 def _folder(plan: Plan, cases: Cases) -> Path:

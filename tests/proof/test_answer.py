@@ -35,8 +35,10 @@ def verdict(*effects: str, says: str = "effect", place: str = "", **more: Any) -
     }
 
 
-def answer(true: tuple[str, ...], said: dict[str, Any], plan: str = "full") -> Answer:
-    return Answer("case", plan, label(*true), said, 8.0)
+def answer(
+    true: tuple[str, ...], said: dict[str, Any], plan: str = "full", cpu_s: float = 8.0
+) -> Answer:
+    return Answer("case", plan, label(*true), said, cpu_s)
 
 
 def test_a_name_is_the_first_of_a_verdict_that_is_an_effect() -> None:
@@ -87,6 +89,16 @@ def test_bars_count_what_they_say() -> None:
     assert found["two effects: both found"].met
     assert not found["effect not in the library: a wrong name with >= 0.9"].met
     assert found["held-out NRMSE falls by, median of the right ones"].measured == pytest.approx(0.8)
+
+
+def test_the_time_of_a_case_is_that_of_cases_with_and_without_an_effect() -> None:
+    said = verdict("tyre_slip")
+    effects = [answer(("tyre_slip",), said, cpu_s=took) for took in (9.0, 13.0, 40.0)]
+    clean = [answer((), verdict(says="nothing_missing"), "clean", cpu_s=4.0)] * 2
+    others = [answer(("tyre_slip",), said, "weak", cpu_s=90.0)] * 5
+    (cost,) = (bar for bar in bars([*effects, *clean, *others]) if bar.about.startswith("CPU"))
+    assert (cost.measured, cost.met) == (9.0, True)
+    assert cost.text == "9.0 (13.0 with an effect, 4.0 without)"
 
 
 def test_permuted_labels_fall_to_chance() -> None:
