@@ -58,12 +58,21 @@ def cache_fault(folder: Path) -> str:
 
 def own_folder(part: str) -> Path | None:
     """Return the folder inside the cache where others than programs are kept; None without one."""
-    with suppress(OSError, RuntimeError):
+    folder, fault = _place(part)
+    return None if fault else folder
+
+
+def _place(part: str) -> tuple[Path, str]:
+    """Return the cache or a `part` inside it, and why it must not be used, if it must not."""
+    try:
         folder = cache_folder()
-        own = folder / part
-        if not cache_fault(folder) and not cache_fault(own):
-            return own
-    return None
+        fault = cache_fault(folder)
+        if part and not fault:
+            folder /= part
+            fault = cache_fault(folder)
+    except (OSError, RuntimeError) as error:  # no home folder
+        return Path(), str(error)
+    return folder, fault
 
 
 def key_of(
@@ -92,14 +101,7 @@ def stored(key: str, make: Callable[[Path], None], spare: Path, part: str = "") 
 
     `part` is the folder inside the cache where others than programs are kept.
     """
-    try:
-        folder = cache_folder()
-        fault = cache_fault(folder)
-        if part and not fault:
-            folder /= part
-            fault = cache_fault(folder)
-    except (OSError, RuntimeError) as error:  # no home folder
-        folder, fault = spare, str(error)
+    folder, fault = _place(part)
     if fault:
         log.warning("nothing is kept: %s", fault)
         make(spare / "program")

@@ -38,7 +38,7 @@ def _environment() -> jinja2.Environment:
 
 
 class _Kept(jinja2.FileSystemBytecodeCache):
-    """Compiled templates, kept where there is room for them: compiling all takes 0.2 s."""
+    """Compiled templates, kept where there is room for them: compiling all takes 0.1 s."""
 
     def load_bytecode(self, bucket: Bucket) -> None:
         with suppress(OSError, EOFError, ValueError, pickle.UnpicklingError):  # damaged: anew

@@ -22,6 +22,8 @@ from tests.proof.seals import is_sealed, sealed, seals_of
 from tests.verify.store import ROOT
 
 VERDICTS = ROOT / "docs" / "evidence" / "proof.parquet"
+ASKED = 0.1
+"""Seconds of a compiler that compiled nothing, at most: it is asked what it is."""
 EXAMPLES = """\
 python -m tests.proof --seal             # make all cases, write the hashes of their labels
 python -m tests.proof                    # diagnose what is not diagnosed yet, write docs/proof.md
@@ -104,7 +106,7 @@ def _compiled(some: Sequence[Answer]) -> str:
 
 
 def _is_compiled(one: Answer) -> bool:
-    return one.compiler_s > 0.1
+    return one.compiler_s > ASKED
 
 
 def _wrong(every: Sequence[Answer]) -> list[str]:
