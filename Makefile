@@ -65,7 +65,7 @@ target-test: setup ## compare the C on an emulated Cortex-M4F with the engine, a
 prove: setup ## check the C of every sampled automaton by compilers, cppcheck and Frama-C
 	$(BIN)/python tests/verify/proofs.py
 
-verify: setup ## measure every acceptance figure; with recordings: ARGS="--recordings DIR"
+verify: setup ## measure every figure of docs/evidence; with recordings: ARGS="--recordings DIR"
 	$(BIN)/python tests/verify/every.py $(ARGS)
 
 verify-part: setup ## measure a fixed part of the figures, as CI does

@@ -53,7 +53,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             every += answers(plan, *source, carried=VERDICTS)
     found = bars(every)
     for bar in found:
-        print(f"{'met ' if bar.met else 'OPEN'} {bar.about}: {bar.asked}: {bar.text}")
+        print(f"{'met   ' if bar.met else 'MISSED'} {bar.about}: {bar.asked}: {bar.text}")
     for line in (*_wrong(every), *_beside(every, given.seed)):
         print(line)
     if given.first is None and len(wanted) == len(study):

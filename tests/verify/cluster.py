@@ -70,7 +70,7 @@ def main() -> int:
         "cluster_with_two_workers_killed": partial(two_killed_and_what_dask_costs, count),
         "cluster_of_a_million_variants": a_million_variants,
     }
-    return measured(10, figures)
+    return measured("large_studies", figures)
 
 
 def side_by_side() -> Figure:

@@ -1,4 +1,4 @@
-"""Verify "Fast": ratios, errors and crossings of the benchmark, into docs/evidence/4.json.
+"""Verify ratios, errors and crossings of the benchmark; writes docs/evidence/performance.json.
 
 Ratios are measured on this machine as it is: a busy one widens their quartiles.
 """
@@ -47,7 +47,7 @@ def main() -> int:
     for step in figures.STEPS:
         found[f"accuracy_at_{step.replace(' ', '_')}"] = partial(accuracy, step)
         found[f"crossings_at_{step.replace(' ', '_')}"] = partial(crossings, step)
-    return measured(4, found)
+    return measured("performance", found)
 
 
 def interpreter_over_scipy(pairs: int) -> Figure:

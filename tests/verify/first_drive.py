@@ -1,4 +1,4 @@
-"""Verify "First drive": every acceptance figure, measured, into docs/evidence/2.json.
+"""Verify runs against reference traces of the paper; writes evidence/reference_traces.json.
 
 Resumable: a figure that was measured with the same code is not measured again. Figures that need
 the real recordings are left as they are, or as "not measured", where these are absent.
@@ -33,7 +33,7 @@ def main() -> int:
     parser.add_argument("--recordings", default=os.environ.get("MODEWRIGHT_RECORDINGS"))
     named = parser.parse_args().recordings
     os.chdir(ROOT)
-    return measured(2, figures(Path(named) if named else None))
+    return measured("reference_traces", figures(Path(named) if named else None))
 
 
 def figures(recordings: Path | None) -> dict[str, Callable[[], Figure]]:

@@ -1,6 +1,6 @@
 """Verify that a diagnosis killed at random instants and run again gives the same verdict.
 
-Into docs/evidence/5.json.
+Into docs/evidence/diagnosis.json.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def main() -> int:
     parser.add_argument("--kills", type=int, default=10, help="instants")
     kills: int = parser.parse_args().kills
     os.chdir(ROOT)
-    return measured(5, {"killed_and_resumed": partial(killed_and_resumed, kills)})
+    return measured("diagnosis", {"killed_and_resumed": partial(killed_and_resumed, kills)})
 
 
 def killed_and_resumed(kills: int = 10) -> Figure:

@@ -1,4 +1,4 @@
-"""Verify "When the car disagrees", real machines: figures of LEAF and EMPS into 5.json.
+"""Verify diagnoses of real machines, LEAF and EMPS; writes docs/evidence/diagnosis.json.
 
 Measured where the real recordings are; resumable.
 """
@@ -35,7 +35,7 @@ def main() -> int:
         "emps_friction_and_offset": partial(servo_axis, folder),
         "leaf_gap": partial(gap, folder),
     }
-    return measured(5, found)
+    return measured("diagnosis", found)
 
 
 def servo_axis(recordings: Path) -> Figure:

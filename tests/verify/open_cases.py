@@ -41,7 +41,7 @@ def main() -> int:
             open_generator, given.seed, given.effects, given.jobs, given.first
         )
     }
-    return measured(5, rates)
+    return measured("diagnosis", rates)
 
 
 def open_generator(seed: int, effects: str, jobs: int, first: int | None = None) -> Figure:

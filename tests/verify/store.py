@@ -1,6 +1,6 @@
-"""Store: figures of an issue with the digest of the code that they were measured with.
+"""Store: the figures of a subject, with the digest of the code that gave them.
 
-Resumable: a figure that was measured with the same code is not measured again.
+A figure that was measured with the same code is not measured again.
 """
 
 from __future__ import annotations
@@ -13,26 +13,26 @@ from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 CODE = ("language", "engine", "codegen", "expectation", "lockstep", "sweep", "modewright", "spec")
-DIAGNOSIS = 5
-"""The issue whose figures depend on `diagnosis/` too."""
+DIAGNOSIS = "diagnosis"
+"""The subject whose figures depend on the package `diagnosis` too."""
 SUFFIXES = (".py", ".yaml", ".lark", ".jinja", ".txt", ".c", ".h", ".ld")
 Figure = dict[str, Any]
 
 
-def measured(issue: int, figures: Mapping[str, Callable[[], Figure]]) -> int:
+def measured(subject: str, figures: Mapping[str, Callable[[], Figure]]) -> int:
     """Measure what is not measured yet, keep and print all; return 0 if every bar is met."""
-    path = ROOT / "docs" / "evidence" / f"{issue}.json"
-    digest = code_digest((*CODE, "diagnosis") if issue == DIAGNOSIS else CODE)
+    path = ROOT / "docs" / "evidence" / f"{subject}.json"
+    digest = code_digest((*CODE, "diagnosis") if subject == DIAGNOSIS else CODE)
     old = json.loads(path.read_text()) if path.exists() else {}
     kept: dict[str, Figure] = old.get("figures", {}) if old.get("code") == digest else {}
     for name, measure in figures.items():
         if name not in kept:
             print(f"measuring {name} ...", flush=True)
             kept[name] = measure()
-            _write(path, issue, digest, kept)
+            _write(path, subject, digest, kept)
     for name, figure in kept.items():
-        print(f"{'met ' if figure['met'] else 'OPEN'} {name}: {json.dumps(figure)}")
-    _write(path, issue, digest, kept)
+        print(f"{'met   ' if figure['met'] else 'MISSED'} {name}: {json.dumps(figure)}")
+    _write(path, subject, digest, kept)
     return 0 if all(figure["met"] for figure in kept.values()) else 1
 
 
@@ -46,8 +46,8 @@ def code_digest(folders: Sequence[str] = CODE) -> str:
     return total.hexdigest()
 
 
-def _write(path: Path, issue: int, digest: str, figures: Mapping[str, Figure]) -> None:
-    write(path, {"issue": issue, "code": digest, "figures": figures})
+def _write(path: Path, subject: str, digest: str, figures: Mapping[str, Figure]) -> None:
+    write(path, {"subject": subject, "code": digest, "figures": figures})
 
 
 def write(path: Path, known: Mapping[str, Any], sort_keys: bool = False) -> None:

@@ -1,6 +1,6 @@
 """Verify what a diagnosis writes: each effect at each place, checked, run, and the same in C.
 
-Into docs/evidence/5.json.
+Into docs/evidence/diagnosis.json.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ def main() -> int:
     parser.add_argument("--every", type=int, default=1, help="only each n-th of them")
     every: int = parser.parse_args().every
     os.chdir(ROOT)
-    return measured(5, {"variants_in_lockstep": partial(variants_in_lockstep, every)})
+    return measured("diagnosis", {"variants_in_lockstep": partial(variants_in_lockstep, every)})
 
 
 def variants_in_lockstep(every: int = 1) -> Figure:
