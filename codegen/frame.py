@@ -22,7 +22,7 @@ ALWAYS = ("hold", "rows_", "columns_")
 
 BESIDE = frozenset({"latch"})
 """Blocks that are apart where one of those is: what holds the inputs compares in software, too; put
-into the step itself, what it saves of registers would lie below a covariance (decision 0087)."""
+into the step itself, what it saves of registers would lie below a covariance (decision 0026)."""
 
 
 def apart(program: Program) -> frozenset[str]:

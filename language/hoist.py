@@ -1,4 +1,4 @@
-"""Hoist: what does not change is computed once (decision 0029). Three passes, each a Program.
+"""Hoist: what does not change is computed once (decision 0001). Three passes, each a Program.
 
     parameters  what reads parameters alone becomes a constant, or is derived where one is tunable;
                 a division by such a value becomes a multiplication by its reciprocal

@@ -1,4 +1,4 @@
-"""Inside: the files that a spec names stay in its project (docs/decisions/0025)."""
+"""Inside: the files that a spec names stay in its project (docs/decisions/0005)."""
 
 from __future__ import annotations
 

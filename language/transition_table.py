@@ -8,7 +8,7 @@
 
 A column is a transition without its target; a cell is the target, or `stay`. Complete: each of the
 modes beside the table has a row, each row all columns. Whether two columns can fire together is a
-question about the transitions that come of it (decision 0047).
+question about the transitions that come of it (decision 0009).
 """
 
 from __future__ import annotations

@@ -69,7 +69,7 @@ def test_a_last_effect_that_pulls_the_others_out_of_their_ranges_is_not_taken(
 def test_a_candidate_has_to_promise_a_part_of_what_it_must_gain(
     rubbing: Bench, monkeypatch: pytest.MonkeyPatch, hope: float, least: float
 ) -> None:
-    """A quarter, but where whole simulations are judged: a tenth (decision 0096)."""
+    """A quarter, but where whole simulations are judged: a tenth (decision 0040)."""
     asked: list[object] = []
 
     def found(*given: object) -> list[Tried]:
