@@ -14,7 +14,7 @@ from tests.diagnosis.machines import Figure, damper, emps, leaf
 def test_friction_and_offset_of_the_servo_axis_are_named_with_their_published_values(
     recordings: Path,
 ) -> None:
-    """But for the viscous friction, which is 12.7 % off (docs/open.md)."""
+    """Mass, dry friction and offset are compared; the viscous friction is not."""
     found = emps(recordings)
     assert found["effects"] == ["coulomb_friction", "sensor_offset"]
     off = found["off"]
