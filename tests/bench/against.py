@@ -21,7 +21,7 @@ def main(module: str, pairs: int) -> None:
     found = run()
     first = time.process_time() - start
     ratio = interleaved(run, lambda: with_scipy.run(TIP_OUT), pairs)
-    figure = {**shown(ratio, "rival", "scipy"), "first_run_s": first}
+    figure = {**shown(ratio, "peer", "scipy"), "first_run_s": first}
     print(json.dumps({**figure, "errors": errors_of(TIP_OUT, found)}))
 
 

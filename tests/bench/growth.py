@@ -1,7 +1,7 @@
-"""Growth: time and memory as a spec, a run or a study gets larger; docs/growth.md.
+"""Measures time and memory over the size of a spec, a run or a study; writes docs/growth.md.
 
-Each point is measured in a process of its own. Times are those of the processor, but for studies by
-several workers, which are on the clock.
+Each point runs in a process of its own. Times are processor times; those of studies with several
+workers are elapsed times.
 """
 
 from __future__ import annotations
@@ -40,28 +40,29 @@ CURVES: Mapping[str, Sequence[int]] = {
     "workers": (1, 2, 4),
 }
 ABOUT = {
-    "states": "a chain of inertias, two states each, in three modes: read, checked and lowered; "
-    "compiled; a second of it at 1 ms, lowered again",
-    "modes": "four states in a ring of modes: the same",
-    "seconds": "the driveline with its estimator at 1 kHz, in compiled C, rows each 10 ms",
-    "variants": "of the tip-out over five parameters, in one call on one core, at 5 ms",
-    "workers": "20 000 variants of the driveline with its estimator, a study in a new folder, on "
-    "the clock",
+    "states": "a chain of inertias with two states each and three modes: reading, checking and "
+    "lowering; compilation; one second at 1 ms, with lowering",
+    "modes": "four states and a ring of modes; the same columns",
+    "seconds": "the driveline with its estimator at 1 kHz in compiled C, rows every 10 ms",
+    "variants": "variants of the tip-out over five parameters, in one call on one core, at 5 ms",
+    "workers": "20 000 variants of the driveline with its estimator, a study in a new folder, "
+    "elapsed time",
 }
 WHY = {
-    "states": "The longest step that is stable is told from eigenvalues of each mode, found in our "
-    "own arithmetic so that their bits are the same everywhere: the cube of the states, half of "
-    "`run again` at 64. What is compiled is a line of C for each operation, and grows with them.",
-    "modes": "Each mode has its equations and its step; nothing is done for pairs of modes. "
-    "Below ten modes reading the language and starting the compiler are most of it.",
-    "seconds": "A tenth of a second is lowering and printing, whatever is run. Memory is the plan: "
-    "instants, what happens at each, and rows.",
-    "variants": "Linear from the first hundred. Memory is what is kept of each variant in one "
-    "call; studies run block by block instead and stay where they are (docs/studies.md).",
-    "workers": "Each worker starts Python, loads the study and finds the compiled library, a "
-    "second and more of a processor, before its first block; more workers than cores add to that.",
+    "states": "The stability limit of the step needs the eigenvalues of each mode. They are "
+    "computed in the arithmetic of the language, with the same bits on every machine; the cost is "
+    "cubic and half of `run again` at 64 states. The compiled C has one line per operation.",
+    "modes": "Each mode has its own equations and its own step; no work depends on pairs of modes. "
+    "Below ten modes the start of the compiler dominates.",
+    "seconds": "Lowering and printing take a tenth of a second. The memory holds the plan of the "
+    "run (instants and their actions) and the rows.",
+    "variants": "The time is linear from one hundred variants on. The memory holds the results of "
+    "the call; studies run in blocks with constant memory (docs/studies.md).",
+    "workers": "Each worker starts Python, loads the study and the compiled library before its "
+    "first block, which takes more than a second of processor time. More workers than cores add to "
+    "that.",
 }
-"""Why growth is what it is: found with a profiler, and to be looked at again with new figures."""
+"""Reasons for the measured exponents, found with a profiler; check them with new figures."""
 STUDY_VARIANTS = 20_000
 SHORT = EngFormatter(sep="")
 GENTLE = Fraction(5)
@@ -225,13 +226,13 @@ def exponent(points: Sequence[Point], what: str) -> float:
 def page(found: Mapping[str, Sequence[Point]]) -> str:
     """Return the page: a table for each curve."""
     lines = [
-        "# Growth",
+        "# Scaling",
         "",
-        '`make bench ARGS="--growth"` measures this page: each point in a process of its own, '
-        "processor time but for workers.",
-        f"{os.cpu_count()} cores; what else runs on them changes the figures.",
+        '`make bench ARGS="--growth"` measures this page. Each point runs in a process of its own. '
+        "Times are processor times; those of workers are elapsed times.",
+        f"{os.cpu_count()} cores; other load on the machine changes the figures.",
         "",
-        "![Time and memory over size](growth.png)",
+        "![Time and memory over the size](growth.png)",
     ]
     for name, points in found.items():
         parts = list(points[0].seconds)

@@ -37,7 +37,7 @@ def table(found: Figure) -> list[str]:
         f"{where['compiler']}; {where['flags']}",
         f"Python {where['python']}, numpy {where['numpy']}, scipy {where['scipy']}",
         "",
-        "processor time over the rival's (sweep, chart: rates): median (quartiles)",
+        "processor time relative to the peer (sweep, chart: rates): median (quartiles)",
     ]
     for group in ("single_run", "sweep"):
         for name, figure in found.get(group, {}).items():
@@ -49,14 +49,14 @@ def table(found: Figure) -> list[str]:
     for name, figure in found["sweep"].items():
         rates = (f"{figure[side + '_variants_per_s']:,.0f}" for side in ("batch", "c"))
         lines.append(
-            f"  {name}: {figure['variants']} variants, {' and '.join(rates)} a second of one core"
+            f"  {name}: {figure['variants']} variants, {' and '.join(rates)} per second and core"
         )
         for who, errors in figure["errors"].items():
             late = f"{1e6 * errors['median_late']:.2f}, {1e6 * errors['late']:.0f} us"
             lines.append(f"    {who:6} first contact late: median, largest {late}")
     first = found["first_step"]
-    took = f"{first['total_s']:.2f} s, {first['compiler_s']:.2f} s of them the compiler's"
-    lines.append(f"  specs to the end of a first compiled run, nothing kept before: {took}")
+    took = f"{first['total_s']:.2f} s, {first['compiler_s']:.2f} s in the compiler"
+    lines.append(f"  from the specs to the end of a first compiled run, empty cache: {took}")
     lines += ["", "errors: events late [us], w_em over its peak (root mean square, largest)"]
     for name, figure in found["single_run"].items():
         for who, errors in figure.get("errors", {}).items():
@@ -74,7 +74,7 @@ def table(found: Figure) -> list[str]:
 def _chart(name: str, figure: Figure) -> str:
     own = next(key for key in figure if key.endswith("_ticks_per_s"))
     spread = f"{figure['median']:.3g} ({figure['low']:.3g} .. {figure['high']:.3g})"
-    rates = f"{figure[own]:,.0f} and {figure['rival_ticks_per_s']:,.0f} ticks a second"
+    rates = f"{figure[own]:,.0f} and {figure['rival_ticks_per_s']:,.0f} ticks per second"
     return f"  {'chart.' + name:36} {spread:24} {rates}, {figure['pairs']} pairs"
 
 

@@ -69,9 +69,9 @@ def _divergence(figure: str, found: Divergence) -> Claim:
         f"{late:.0%} until 1 s; from 0.7 s on the first four cycles of the twist have {car:.2f} Hz "
         f"in the car and {model:.2f} Hz in the model ({values})",
         early < 0.03 and late > 0.3,
-        "The paper's recordings are not published. The car here is ours, chosen so that it parts "
-        "from the model as the paper says: a fifth of the stiffness in rubber that slides at "
-        "25 N*m. It shows that the sentence can be true, not what the paper's car lacked.",
+        "The recordings of the paper are not published. The vehicle here is synthetic: a fifth of "
+        "its stiffness is rubber that slides at 25 N*m. It reproduces the reported difference; it "
+        "does not identify its cause in the vehicle of the paper.",
     )
 
 
@@ -194,8 +194,8 @@ def _table() -> Claim:
         "14, 2 and 0.8 ms at 0.1, 1 and 10 kHz",
         ", ".join(f"{value:.2f}" for value in late.values()) + " ms",
         all(abs(late[rate] - published) < 0.1 for rate, published in PUBLISHED.items()),
-        "The paper says neither how long the wait is nor when the torque steps, nor all values of "
-        "the car. These were chosen so that its three numbers come out: a wait of 0.7 ms, rounded "
-        "up to whole samples, a step 1.5 ms before a sample at 100 Hz. So this table shows that "
-        "one set of values gives all three, and the random manoeuvres below what they are worth.",
+        "The paper states neither the length of the wait nor the instant of the torque step nor "
+        "all parameters. They were chosen to give its three numbers: a wait of 0.7 ms, rounded up "
+        "to whole samples, and a step 1.5 ms before a sample at 100 Hz. One set of values gives "
+        "all three; the random manoeuvres below evaluate the scheme.",
     )

@@ -81,12 +81,12 @@ def _beside(every: Sequence[Answer], seed: int) -> list[str]:
         return []
     chance = permuted(full, random.Random(seed))
     lines = [
-        f"against permuted labels: first name right {chance:.1%}",
+        f"permuted labels: first name right {chance:.1%}",
         f"the most frequent label: {most_frequent(full).text}",
-        "recalibration alone: names nothing",
+        "recalibration without effects: names no effect",
     ]
     for method, words in (
-        ("sindy", "sparse regression of what the recalibrated base lacks (PySINDy)"),
+        ("sindy", "sparse regression of the residual of the recalibrated base (PySINDy)"),
         ("free_gain", "the effect with the largest gain in free simulation"),
     ):
         alarms = f"; false alarms {simpler_alarms(clean, method).text}" if clean else ""
@@ -95,13 +95,13 @@ def _beside(every: Sequence[Answer], seed: int) -> list[str]:
 
 
 def _compiled(some: Sequence[Answer]) -> str:
-    """Return what the C compiler took of the processor: a model that was made before is kept."""
+    """Returns the share of the C compiler; a model of an earlier case is in the cache."""
     part = sum(one.compiler_s for one in some) / sum(one.cpu_s for one in some)
     kept = [one.cpu_s for one in some if one.plan == "full" and not _is_compiled(one)]
-    usual = f": {median(kept):.1f} s in the median" if kept else ""
+    usual = f": median {median(kept):.1f} s" if kept else ""
     return (
-        f"of processor time the C compiler took {part:.0%}; in {len(kept)} cases with an effect"
-        f" all models had been compiled for earlier ones{usual}"
+        f"the C compiler used {part:.0%} of the processor time; in {len(kept)} cases with an effect"
+        f" all models were in the cache{usual}"
     )
 
 

@@ -51,19 +51,23 @@ def _full(full: Answers) -> list[Bar]:
     return [
         _at_least("first name right", 0.95, rate_of(one.is_named for one in full)),
         _at_least("first name right at 100 Hz", 0.90, rate_of(one.is_named for one in slow)),
-        _at_least(f"first name right, worst effect ({least[0]})", 0.70, least[1]),
-        _at_least("right within the stated set", 0.98, rate_of(one.is_stated for one in full)),
+        _at_least(f"first name right, lowest rate of an effect ({least[0]})", 0.70, least[1]),
+        _at_least("true effect in the stated set", 0.98, rate_of(one.is_stated for one in full)),
         _at_most("mean size of the stated set", 1.6, fmean(sizes or [0.0])),
         _at_most("largest stated set", 4, max(sizes, default=0)),
         _at_least("place right", 0.90, rate_of(one.is_placed() for one in full)),
         _at_least("place within the first two", 0.98, rate_of(one.is_placed(2) for one in full)),
         _at_least(
-            f"names given with >= {SURE:g} that are right",
+            f"names with probability >= {SURE:g} that are right",
             0.88,
             rate_of(right for probability, right in said if probability >= SURE),
         ),
-        _at_most("expected calibration error", 0.08, calibration_error(said)),
-        _at_most("base parameters off, p90", 0.05, _percentile(_errors(named), 90)),
+        _at_most("expected calibration error of the probabilities", 0.08, calibration_error(said)),
+        _at_most(
+            "relative error of base parameters, 90th percentile",
+            0.05,
+            _percentile(_errors(named), 90),
+        ),
     ]
 
 
@@ -72,7 +76,13 @@ def _clean(clean: Answers) -> list[Bar]:
     upper = alarms.interval()[1]
     return [
         Bar("false alarms", "<= 3 %", alarms.share, alarms.share <= 0.03, alarms.text),
-        Bar("false alarms, upper end of 95 %", "<= 6 %", upper, upper <= 0.06, f"{upper:.1%}"),
+        Bar(
+            "false alarms, upper limit of the 95 % interval",
+            "<= 6 %",
+            upper,
+            upper <= 0.06,
+            f"{upper:.1%}",
+        ),
     ]
 
 
@@ -80,22 +90,22 @@ def _weak(weak: Answers) -> list[Bar]:
     named, stated = (rate_of(f(one) for one in weak) for f in (_is_named, _is_stated))
     return [
         _at_least("at 0.3 x strength: first name right", 0.75, named),
-        _at_least("at 0.3 x strength: within the stated set", 0.85, stated),
+        _at_least("at 0.3 x strength: true effect in the stated set", 0.85, stated),
     ]
 
 
 def _pairs(pairs: Answers) -> list[Bar]:
     both = rate_of(set(one.ids) <= set(one.named) for one in pairs)
-    return [_at_least("two effects: both found", 0.85, both)]
+    return [_at_least("two effects: both named", 0.85, both)]
 
 
 def _removed(removed: Answers) -> list[Bar]:
     unknown = rate_of(one.said == "unknown" and one.is_placed() for one in removed)
     wrong = rate_of((one.probability or 0.0) >= SURE for one in removed)
     return [
-        _at_least("effect not in the library: unknown, place right", 0.80, unknown),
+        _at_least("effect not in the library: `unknown` at the right place", 0.80, unknown),
         Bar(
-            f"effect not in the library: a wrong name with >= {SURE:g}",
+            f"effect not in the library: wrong name with probability >= {SURE:g}",
             "<= 10 %",
             wrong.share,
             wrong.share <= 0.10,
@@ -125,8 +135,8 @@ def _repaired(full: Answers, clean: Answers) -> list[Bar]:
         if floor is not None and before > floor:
             excesses.append((before - after) / (before - floor))
     return [
-        _share_at_least("held-out NRMSE falls by, median of the right ones", 0.50, falls),
-        _share_at_least("of it above the noise floor, median", 0.80, excesses),
+        _share_at_least("reduction of held-out NRMSE, median of right names", 0.50, falls),
+        _share_at_least("reduction above the noise floor, median", 0.80, excesses),
     ]
 
 
@@ -142,7 +152,7 @@ def _cost(full: Answers, clean: Answers) -> Bar:
         median(one.cpu_s for one in some) for some in ([*full, *clean], full, clean)
     )
     text = f"{both:.1f} ({effect:.1f} with an effect, {none:.1f} without)"
-    return Bar("CPU s per case, median", "<= 10", both, both <= 10.0, text)
+    return Bar("processor time per case [s], median", "<= 10", both, both <= 10.0, text)
 
 
 def _errors(named: Answers) -> list[float]:
