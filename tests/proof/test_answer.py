@@ -84,7 +84,7 @@ def test_bars_count_what_they_say() -> None:
     assert not found["first name right"].met
     assert found["first name right, lowest rate of an effect (road_grade)"].measured == 0.0
     assert found["names with probability >= 0.9 that are right"].measured == 0.5
-    assert found["expected calibration error"].measured == pytest.approx(0.45)
+    assert found["expected calibration error of the probabilities"].measured == pytest.approx(0.45)
     assert found["false alarms"].measured == 0.5
     assert found["two effects: both named"].met
     assert not found["effect not in the library: wrong name with probability >= 0.9"].met
