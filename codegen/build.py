@@ -1,4 +1,4 @@
-"""Build: generated C compiled with the flags under which its bits are defined (rule R7)."""
+"""Build: generated C compiled with the flags under which its bits are defined (rule C3)."""
 
 from __future__ import annotations
 

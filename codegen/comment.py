@@ -11,7 +11,7 @@ LONGEST = 120
 
 
 def comment(text: str) -> str:
-    """Return a text that is safe in a C comment, whatever it holds.
+    """Return a text that is safe in a C comment, whatever it holds (rule C21).
 
     Without `*/` and `/*`, without trigraphs (`??/` is a backslash: C99 5.2.1.1), without a
     backslash at its end, without line ends; other alphabets are written as escapes.

@@ -1,4 +1,4 @@
-"""Expression: an expression of a Program as C99, in the same order of operations."""
+"""Expression: an expression of a Program as C99, in the same order of operations (rule C2)."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def c_expression(expr: Expr, place: Place) -> str:
 
 
 def literal(value: float | int | bool, number: NumberType) -> str:
-    """Return a literal: the shortest decimal that reads back as the same bits (rule R4)."""
+    """Return a literal: the shortest decimal that reads back as the same bits (rule C4)."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, int):

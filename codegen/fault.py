@@ -1,4 +1,4 @@
-"""Fault: why a bit of the fault word is set, as the comment beside it says."""
+"""Fault: why a bit of the fault word is set, as the comment beside it says (rule C16)."""
 
 from __future__ import annotations
 

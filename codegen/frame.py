@@ -27,7 +27,7 @@ into the step itself, what it saves of registers would lie below a covariance (d
 
 def apart(program: Program) -> frozenset[str]:
     """Return the blocks of a sampled automaton that compute much; not those that one of these
-    alone runs, once. In float32 nearly all is in registers.
+    alone runs, once. In float32 nearly all is in registers (rule C23).
     """
     if program.period is None:
         return frozenset()

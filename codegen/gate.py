@@ -35,7 +35,7 @@ LATCH_EACH = "latch_each"
 
 
 def gated(program: Program, by_amount: bool = True) -> Program:
-    """Return a Program that takes its inputs at once where all are within their ranges.
+    """Return a Program that takes its inputs at once where all are within their ranges (rule C17).
 
     `by_amount` compares the size of x with one end of a range, which takes one branch; tools that
     follow ranges through code know x better without it.

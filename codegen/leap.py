@@ -1,4 +1,4 @@
-"""Leap: a step in which nothing happens, as one block of C; bits stay.
+"""Leap: a step in which nothing happens, as one block of C; bits stay (rule C18).
 
 In nearly all steps of a continuous automaton no guard changes, nor in nearly all ticks that run
 one. `leap_<mode>` is what is done then, followed with all that is known of such a step: its length,

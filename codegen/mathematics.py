@@ -1,4 +1,4 @@
-"""Mathematics: ha_math as C99 - functions whose bits do not depend on a library (rule R6)."""
+"""Mathematics: ha_math as C99 - functions whose bits do not depend on a library (rule C6)."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ LAYOUT: Mapping[NumberType, Layout] = {
 
 
 def math_files(number: NumberType) -> dict[str, str]:
-    """Return ha_math (ha_mathf for float32): functions without a library's bits (rule R6)."""
+    """Return ha_math (ha_mathf for float32): functions without a library's bits (rule C6)."""
     suffix = SUFFIX[number]
     context = {
         "functions": [_function(function, number) for function in FUNCTIONS_OF[number].values()],

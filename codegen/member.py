@@ -1,4 +1,4 @@
-"""Member: the members of the structures of a module, with what is told of each."""
+"""Member: the members of the structures of a module, with what is told of each (rule C11)."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Page:
 CONSTANTS = Page("const", ON_PAGE)
 """Nobody writes to it while it is read, and solved numbers are constants: on this machine."""
 PAGE = Page("const volatile", ON_PAGE | {"solved"})
-"""On an ECU: a tool may write to it, also the solved numbers with what they were solved for."""
+"""On an ECU: a tool may write to it, the solved numbers included (rule C14)."""
 
 
 @dataclass(frozen=True)

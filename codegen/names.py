@@ -42,7 +42,7 @@ class CNames:
 
     @property
     def number(self) -> NumberType:
-        """The type of the reals."""
+        """The type of the reals (rule C1)."""
         return self.program.number
 
     def __call__(self, name: str) -> str:
@@ -116,7 +116,7 @@ def c_member(name: str) -> str:
 
 
 def c_type(variable: Variable | Constant, number: NumberType) -> str:
-    """Return the C type of a variable or constant; reals are of a number type."""
+    """Return the C type of a variable or constant; reals are of a number type (rule C10)."""
     if variable.type == "real":
         return REAL[number]
     if variable.type == "truth":
@@ -133,7 +133,7 @@ def c_type(variable: Variable | Constant, number: NumberType) -> str:
 
 
 def mode_constant(program: Program, number: int, region: str = CHART) -> str:
-    """Return the name of a mode in C."""
+    """Return the name of a mode in C (rule C9)."""
     where = "MODE" if region == CHART else region
     return f"{program.name}_{where}_{program.mode_name(number, region)}".replace(".", "_")
 

@@ -44,7 +44,7 @@ class Scratch:
 def scratch_of(
     program: Program, shared: list[Variable], used: Mapping[str, Usage], inside: bool
 ) -> Scratch | None:
-    """Return where the `shared` values of a step live; None where there are none.
+    """Return where the `shared` values of a step live; None where there are none (rule C22).
 
     `inside` allows for a block that `step` runs.
     """

@@ -1,4 +1,4 @@
-"""Source: a Program as C99 - header, source and the mathematics that they use."""
+"""Source: a Program as C99 - header, source, mathematics (rules C12 and C13)."""
 
 from __future__ import annotations
 

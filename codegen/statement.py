@@ -1,4 +1,4 @@
-"""Statement: the operations of a block as lines of C99."""
+"""Statement: the operations of a block as lines of C99 (rules C19 and C20)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Arithmetic: how the interpreter holds a real of each number type, and operates on it (rule R14).
+"""Arithmetic: how the interpreter holds a real of each number type, and operates on it (rule 17a).
 
 A float64 is a Python float. A float32 is a numpy.float32, whose `+ - * /` and comparisons are the
 processor's own; the two are never mixed, and no numpy scalar leaves the interpreter.

@@ -26,7 +26,7 @@ from language.program import ObserverInfo, Program
 Reals = NDArray[np.float64]
 
 NEGLIGIBLE = 1e-9
-"""Most that a number taken as 0 may be of its matrix: the agreement promised (semantics 17)."""
+"""Most that a number taken as 0 may be of its matrix: the agreement promised (rule 17f)."""
 
 
 def reference(system: System, scenario: Scenario, method: Method = "DOP853") -> Trajectory:

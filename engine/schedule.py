@@ -1,4 +1,4 @@
-"""Schedule: the instants at which something happens in a system, in exact time."""
+"""Schedule: the instants at which something happens in a system, in exact time (rule 19b)."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """Elementary: sin, cos and tanh in float64 as operations, for the engine and for codegen.
 
 No libm: its results depend on the CPU and on the C library. Here are only + - * /, comparisons,
-selection, abs and exact powers of two (codegen rules R5 and R6), each of which IEEE 754 defines to
-the last bit; compiled without contraction (R7), C gives the bits that Python gives.
+selection, abs and exact powers of two (rules C5 and C6), each of which IEEE 754 defines to
+the last bit; compiled without contraction (rule C3), C gives the bits that Python gives.
 
 Arguments are clamped to the declared domain. NaN passes the clamp and comes out as NaN, but never
 reaches `pow2`. sin and tanh are odd and cos is even, bit for bit; sin and tanh of -0.0 are -0.0.
@@ -35,7 +35,7 @@ from language.operation import (
 from language.program import Function
 
 ROUND = real(1.5 * 2.0**52)
-"""Adding and subtracting it rounds |x| < 2^51 to the nearest whole number, ties to even (R6)."""
+"""Adding and subtracting it rounds |x| < 2^51 to the nearest integer, ties to even (rule C5)."""
 TINY = real(2.0**-27)
 """Below it sin x and tanh x are x to 2^-54 / 3 relative; keeps -0.0 and the subnormals."""
 
@@ -133,7 +133,7 @@ def nearest(x: Expr, rounding: Value = ROUND) -> Expr:
 
 
 def within(x: Expr, low: Expr, high: Expr) -> Expr:
-    """Return x clamped; NaN stays NaN, unlike `clip` (codegen rule R8)."""
+    """Return x clamped; NaN stays NaN, unlike `clip` (rule C7)."""
     return Select(Compare(">", x, high), high, Select(Compare("<", x, low), low, x))
 
 

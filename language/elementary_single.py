@@ -22,7 +22,7 @@ from language.power import PowerNumbers
 from language.tangent import ArcNumbers
 
 ROUND = real(1.5 * 2.0**23)
-"""Adding and subtracting it rounds |x| < 2^22 to the nearest whole number, ties to even (R6)."""
+"""Adding and subtracting it rounds |x| < 2^22 to the nearest integer, ties to even (rule C5)."""
 TINY = real(2.0**-13)
 """Below it sin x and tanh x are x to 2^-26 / 3 relative; keeps -0.0 and the subnormals."""
 

@@ -1,7 +1,7 @@
 """Entering: which nodes of a chart a transition enters, from the outside in (SCXML's entry set).
 
 A compound node is entered at its `initial` unless a target lies inside it or its history is asked
-for; a parallel one in all of its regions.
+for; a parallel one in all of its regions (rule 15b).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Evaluate: the meaning of each elementary operation, and of a constant expression."""
+"""Evaluate: the meaning of each elementary operation, and of a constant expression (rule 17b)."""
 
 from __future__ import annotations
 
@@ -42,17 +42,17 @@ def square_root(a: float) -> float:
 
 
 def minimum(a: float, b: float) -> float:
-    """Return `b if b < a else a` (codegen rule R8)."""
+    """Return `b if b < a else a` (rule C7)."""
     return b if b < a else a
 
 
 def maximum(a: float, b: float) -> float:
-    """Return `b if b > a else a` (codegen rule R8)."""
+    """Return `b if b > a else a` (rule C7)."""
     return b if b > a else a
 
 
 def clip(x: float, low: float, high: float) -> float:
-    """Return x within [low, high]; NaN becomes low (codegen rule R8)."""
+    """Return x within [low, high]; NaN becomes low (rule C7)."""
     return (x if x < high else high) if x > low else low
 
 
@@ -78,7 +78,7 @@ NO_NUMBER = -(2**31)
 
 
 def whole(x: float) -> int:
-    """Return a whole-valued real as a whole number, the nearest of 32 bits (rule R11)."""
+    """Return a whole-valued real as a whole number, the nearest of 32 bits (rule C8)."""
     if -LARGEST <= x <= LARGEST:
         return int(x)
     return LARGEST if x > 0.0 else (-LARGEST if x < 0.0 else NO_NUMBER)

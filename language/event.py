@@ -3,7 +3,7 @@
 A tick puts the events whose input is true into the queue, in the order in which they are declared;
 a transition that `raise`s one appends it. A micro-step has one event or none: the first one that
 of the queue's head; after that transitions without an event go on until none is enabled, then the
-next event is taken. What no transition takes is lost (SCXML: run to completion).
+next event is taken. What no transition takes is lost (rule 15c; SCXML: run to completion).
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Exponential: the part linear in the states exactly, the rest by its value at the middle.
 
 Exponential midpoint rule: Hochbruck and Ostermann 2010 (Acta Numerica 19, 209-286), eq. (2.40b).
-Inside a step the solution of x' = A x + pull is a Taylor sum of a fixed number of terms.
+Inside a step the solution of x' = A x + pull is a Taylor sum of a fixed number of terms (rule 17e).
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ from language.taylor import in_ranges, largest, row_sum_norm, taylor_terms
 from language.units import per_second
 
 LARGEST_NORM = 4.0
-"""|A h| up to which the Taylor sum is accurate and short (docs/language.md, section 9)."""
+"""|A h| up to which the Taylor sum is accurate and short (rule 17e)."""
 
 
 @dataclass(frozen=True)

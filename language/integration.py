@@ -1,4 +1,4 @@
-"""Integration: the method of a field by its name, with the limits of its step."""
+"""Integration: the method of a field by its name, with the limits of its step (rule 17d)."""
 
 from __future__ import annotations
 

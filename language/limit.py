@@ -1,4 +1,4 @@
-"""Limit: what a sampled automaton does with a value outside its declared range (rule 18).
+"""Limit: what a sampled automaton does with a value outside its declared range (rules 13 and 18).
 
 A value about to be written passes unchanged where `low <= value <= high`. Else a fault bit is set
 in the same step, and the variable gets the nearest bound, its fallback, or keeps its value.
@@ -211,7 +211,7 @@ def _pending(automaton: Automaton, thing: Input | State, value: Expr) -> list[Op
 
 
 def _clipped(thing: Input | State, value: Expr, low: Expr, high: Expr) -> Expr:
-    """The nearest bound; NaN becomes the lower one (codegen rule R8)."""
+    """The nearest bound; NaN becomes the lower one (rule C7)."""
     if thing.type == "real":
         return Call("clip", (value, low, high))
     inner = Select(Compare("<", value, high), value, high)

@@ -1,4 +1,4 @@
-"""Small matrices of floats: arithmetic, the linear solve, the exponential and its integral.
+"""Small matrices of floats: arithmetic, linear solve, exponential and its integral (rule 17f).
 
 The results are printed into ECU C code, so their bits may depend neither on the CPU nor on a
 library: one IEEE 754 binary64 rounding per operation, products summed from left to right by plain

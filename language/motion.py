@@ -44,7 +44,7 @@ from language.units import per_second
 MERGE_ULPS = 4096
 """Events nearer than this are one instant (rule 10): rounding moves a crossing by some ten ULPs."""
 RUN_HALVINGS = 24
-"""Halvings inside a tick: 1 ms / 2^24 = 60 ps (docs/language.md, section 9); in float32 an ULP."""
+"""Halvings inside a tick: 1 ms / 2^24 = 60 ps (rule 9); in float32 an ULP."""
 FLOW_HALVINGS: Mapping[NumberType, int] = {"float64": 44, "float32": 24}
 """Halvings of a continuous automaton's step: 1 ms / 2^44 is below one ULP of a time of 1 s. In
 float32 the times within a step have 24 bits: from then on the middle is one of the two ends."""

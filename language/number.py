@@ -2,7 +2,7 @@
 
 A real of either type is a Python float here; one of float32 has at most 24 significant bits. An
 operation `+ - * / sqrt` in double, rounded once more, is that of float32: 53 >= 2 * 24 + 2
-(Figueroa 1995). numpy is left to the engine.
+(Figueroa 1995; rule 17a). numpy is left to the engine.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ ROUNDING: Mapping[NumberType, Callable[[float], float]] = {"float64": float, "fl
 
 
 def decimal(value: float, number: NumberType) -> str:
-    """Return the shortest decimal that reads back as the same bits of the type (rule R4)."""
+    """Return the shortest decimal that reads back as the same bits of the type (rule C4)."""
     if number == "float64" or not math.isfinite(value):
         return repr(value)
     for digits in range(MOST_DECIMALS):

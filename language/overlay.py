@@ -7,7 +7,7 @@ from language.problem import Problems, nearest
 
 
 def lay(base: Table, over: Table, problems: Problems, *, template: bool = False) -> Table:
-    """Return `base` with `over` laid over it (docs/language.md, section 8).
+    """Return `base` with `over` laid over it (docs/language.md, "Variants, effects, calibrations").
 
     Mappings merge by name, to any depth; a scalar or a list replaces; `{remove: true}` removes.
     A removal of what is absent is a problem; an override by an equal value is a warning,

@@ -84,7 +84,7 @@ def parts_block(
 
 
 def _start(field: Field, known: Names, waits: Waits, histories: tuple[History, ...]) -> Block:
-    """What a run begins with, at time 0 and in the initial mode."""
+    """What a run begins with, at time 0 and in the initial mode (rule 16b)."""
     automaton = field.automaton
     begins = begun(waits)
     return (

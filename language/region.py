@@ -74,7 +74,7 @@ def transitions(mode: Mode) -> Iterator[Transition]:
 
 @once
 def by_priority(mode: Mode) -> list[tuple[int, Transition]]:
-    """Return the transitions of a mode with their index, the smallest priority first."""
+    """Return the transitions of a mode with their index, the smallest priority first (rule 3a)."""
     pairs = list(enumerate(mode.transitions))
     return sorted(pairs, key=lambda pair: (pair[1].priority or 0, pair[0]))
 

@@ -1,4 +1,4 @@
-"""Run: a mode of the model inside a tick, following the model's own located transitions.
+"""Run: a mode of the model inside a tick, following the model's own located transitions (rule 2c).
 
 Blocks: those of the model's field and motion, `switch_<mode>` (one of its transitions), and for a
 mode of ours that runs, `run_<mode>`: the period, segment by segment, at most `events` jumps.

@@ -1,4 +1,4 @@
-"""Sampled: a ticking automaton as a Program - latch, advance, jump, update (semantics, rule 2).
+"""Sampled: a ticking automaton as a Program - latch, advance, jump, update (rule 2).
 
 Blocks: `init` (before the first tick), `step` (one tick) and what they run:
 `start`, `predict_<mode>`, `correct_<mode>`, `run_<mode>` (the advance), `equations_<mode>`,
@@ -237,7 +237,7 @@ class _Sampled:
         return entry(automaton, initial, first_entry(automaton), self.now)
 
     def _init(self, stamps: bool) -> Block:
-        """Before the first tick: nothing has started."""
+        """Before the first tick: nothing has started (rule 16a)."""
         ops: list[Op] = [
             *((Assign("memory.started", Value(False)),) if self._starts() else ()),
             *enter_initial(self.automaton, "memory.mode"),

@@ -11,7 +11,7 @@ from language.program import Constant
 
 STALE_CALIBRATION = "stale_calibration"
 STAMPS = "compare_stamps"
-"""The block that compares: run before the first tick and after each change of the calibration."""
+"""The block that compares: run before the first tick and after a change of the page (rule C15)."""
 
 
 def stamps_of(
@@ -20,7 +20,7 @@ def stamps_of(
     parameters: Mapping[str, Constant],
     problems: Problems,
 ) -> tuple[Constant, ...]:
-    """Return a stamp for each tunable that enters a solved number: its value at that time."""
+    """Return a stamp for each tunable that enters a solved number: its value then (rule 17g)."""
     found = []
     for name in sorted({name for constant in constants for name in constant.depends_on}):
         parameter = parameters[name]

@@ -183,7 +183,7 @@ def not_compared(name: str, program: Program, why: str) -> Verdict:
 
 
 def _different(tape: Tape, ours: bytes, theirs: bytes) -> list[int]:
-    """Return the positions that differ; all NaNs are one (codegen rule R10)."""
+    """Return the positions that differ; all NaNs are one (rule 17c)."""
     pairs = zip(tape.unpack(ours), tape.unpack(theirs), strict=True)
     return [
         position

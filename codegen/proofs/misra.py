@@ -17,7 +17,7 @@ DEVIATIONS = {
     "reads them",
     "21.15": "the bits of a power of two are set by memcpy, which every compiler turns into a move",
 }
-"""Rules that generated C breaks on purpose, and why (docs/c_code.md)."""
+"""Rules that generated C breaks on purpose, and why (rule C24; docs/c_code.md)."""
 KNOWN = ("-DFLT_EVAL_METHOD=0", "-DINT32_MIN=(-2147483647-1)")
 """What headers of the compiler define, which cppcheck does not read."""
 READING = ("--quiet", "--std=c99", "--error-exitcode=1")

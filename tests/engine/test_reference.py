@@ -41,7 +41,7 @@ AWAY = 2e-6
 EXACT_TOLERANCE = 1e-12
 """Events with a closed form [s]: rounding of the states over their rates, some 1e-15 s."""
 NUMBERS_TOLERANCE = 1e-9
-"""Of the largest entry: what semantics.md, rule 17, promises of our matrix routines."""
+"""Of the largest entry: what rule 17f promises of our matrix routines."""
 
 BALL = """language: 1
 automaton: ball

@@ -1,4 +1,4 @@
-"""Angle: every example sentence of docs/language.md, section 4, and of semantics, rule 20."""
+"""Angle: the examples of docs/language.md, "Names, numbers, units", and of rule 20b."""
 
 from __future__ import annotations
 

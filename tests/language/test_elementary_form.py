@@ -49,7 +49,7 @@ def parts(expr: Expr) -> Iterator[Expr]:
 
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_form(name: str) -> None:
-    """Each local is assigned once and before its use, y last; only what rule R5 allows."""
+    """Each local is assigned once and before its use, y last; only what rule C5 allows."""
     callable_names = {"abs", "pow2", *list(FUNCTIONS)[: list(FUNCTIONS).index(name)]}
     parameters = [f"work.{parameter}" for parameter in FUNCTIONS[name].parameters]
     known = list(parameters)

@@ -1,4 +1,4 @@
-"""Overlay: a partial tree laid over another one - docs/language.md, section 8."""
+"""Overlay: a partial tree laid over another one - docs/language.md, "Variants"."""
 
 from __future__ import annotations
 

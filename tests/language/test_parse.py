@@ -1,4 +1,4 @@
-"""Parse: the grammar of docs/language.md, section 3, and what is refused, with its place."""
+"""Parse: the grammar of docs/language.md, "Expressions", and what is refused, with its place."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Parse, refused: what is no expression of docs/language.md, section 3, and where it is said."""
+"""Parse, refused: what is no expression of docs/language.md, and where it is said."""
 
 from __future__ import annotations
 

@@ -83,7 +83,7 @@ def reals(draw: Draw, scope: Scope, depth: int) -> Expr:
         case "+" | "-" | "*" | "/":
             return Binary(kind, part(), part())
         case "sum of product":
-            # What a compiler contracts to one rounding if it may (codegen rule R7).
+            # What a compiler contracts to one rounding if it may (rule C3).
             sides = (multiply(part(), part()), part())
             return Binary(draw(st.sampled_from(("+", "-"))), *draw(st.permutations(sides)))
         case "negative":

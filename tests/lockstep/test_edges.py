@@ -224,7 +224,7 @@ def test_is_in_lockstep(case: str, tmp_path: Path) -> None:
 
 
 def test_a_calibration_that_does_not_fit_the_solved_numbers_is_a_fault_in_both() -> None:
-    """The stamps of docs/language.md, section 9: compared by `init`, in C as in the engine."""
+    """The stamps of rule 17g: compared by `init`, in C as in the engine."""
     used = program("estimator_simple")
     other = tuple(
         dataclasses.replace(c, value=c.value * 2) if c.name == "solved.stamp_J_em" else c

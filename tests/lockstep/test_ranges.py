@@ -77,7 +77,7 @@ def bits(value: float) -> bytes:
 
 
 def nearest(name: str, value: float) -> float:
-    """Return the nearest bound; the lower one for NaN (codegen rule R8)."""
+    """Return the nearest bound; the lower one for NaN (rule C7)."""
     low, high = BOUNDS[name]
     return high if value > high else low
 

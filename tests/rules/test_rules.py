@@ -1,4 +1,4 @@
-"""The rule book: every folder beside this file is one rule with the outcome derived by hand."""
+"""Rules of docs/semantics.md: each folder beside this file is one, its outcome derived by hand."""
 
 from __future__ import annotations
 

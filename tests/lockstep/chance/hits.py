@@ -1,4 +1,4 @@
-"""Hits: how often a run of a random spec did what a rule of semantics.md is about.
+"""Hits: how often a run of a random spec did what a rule of docs/semantics.md is about.
 
 Not among them: rule 12 (livelock and Zeno stop the engine: nothing is left to compare), 15 (the
 language has no nested modes yet), 19 (systems: tests/lockstep/test_random_systems.py), 20 (static).
